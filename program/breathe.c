@@ -13,7 +13,7 @@
 #include "program/drawing.h"
 #include "program/options/basis_input.h"
 #include "program/options/orientation.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 
 static const char name[] = "breathe";
 

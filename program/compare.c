@@ -7,7 +7,7 @@
 
 #include "program/compare_content.h"
 #include "program/options/basis_input.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 #include "program/report/comparison.h"
 
 static const char name[] = "compare";

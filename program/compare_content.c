@@ -11,7 +11,7 @@
 
 #include "program/compare_content.h"
 #include "program/inside.h"
-#include "program/options/expected.h"
+#include "program/options/expected_output.h"
 
 /* Displacements of each name in each posture, [postures, names, 3], mm from the reference
  * surface. */

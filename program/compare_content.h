@@ -6,7 +6,7 @@
 #include <supine/runtime.h>
 
 #include "program/options/orientation.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 
 /* Prints, for every two postures and every name, how far what goes by it moves and where to: the
  * mean over its vertices. As a table, or as JSON; and as CSV where `csv` is not NULL.

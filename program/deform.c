@@ -13,9 +13,9 @@
 
 #include "program/deform_content.h"
 #include "program/options/basis_input.h"
-#include "program/options/expected.h"
+#include "program/options/expected_output.h"
 #include "program/options/orientation.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 
 static const char name[] = "deform";
 

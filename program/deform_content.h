@@ -7,8 +7,8 @@
 
 #include "mesh/io/image.h"
 
-#include "program/options/expected.h"
-#include "program/options/state.h"
+#include "program/options/expected_output.h"
+#include "program/options/state_options.h"
 
 typedef struct supine_deform_content {
   const char *path;   /* -o */

@@ -9,7 +9,7 @@
 #include "program/breath/breath_course.h"
 #include "program/inside.h"
 #include "program/options/orientation.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 #include "program/render/render.h"
 
 /* What the options say. */

@@ -7,7 +7,7 @@
 
 #include "program/inside.h"
 #include "program/options/basis_input.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 
 static const char name[] = "export";
 typedef struct request {

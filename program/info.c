@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine info: describe a basis file and its accuracy. */
-#include <errno.h>
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -8,13 +7,14 @@
 
 #include <jansson.h>
 
+#include "sh/base/findings.h"
 #include "sh/base/text.h"
 
 #include <supine/compare.h>
 #include <supine/runtime.h>
 
 #include "program/options/basis_input.h"
-#include "program/options/expected.h"
+#include "program/options/expected_output.h"
 
 /* Compute the share of the squared displacement in each band, [band + 1]; 0 where the surface has
  * no area. */
@@ -55,13 +55,17 @@ static const char *const shown[] = {"assumed",
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rest_part",
                                      "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
+static const char *const error_lists[] = {"error_harmonics", "error_modes"};
 
 static const char turned_over[] = "turned_over_percent";
-static const char warnings[] = "warnings";
+
+static const char *text_or(const supine_basis *basis, const char *key, const char *missing) {
+  const char *value = supine_basis_metadata(basis, key);
+  return value != NULL ? value : missing;
+}
 
 static const char *text_of(const supine_basis *basis, const char *key) {
-  const char *value = supine_basis_metadata(basis, key);
-  return value != NULL ? value : "?";
+  return text_or(basis, key, "?");
 }
 
 /* Describe the state for which errors are given in mm. */
@@ -139,24 +143,11 @@ static void print_facts(const supine_basis *basis) {
       (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
     }
   }
-  const char *at = supine_basis_metadata(basis, warnings);
-  while (at != NULL && *at != '\0') {
-    const size_t length = strcspn(at, "\n");
-    (void)printf("  %-20s %.*s\n", warnings, (int)length, at);
-    at += length + (at[length] == '\n');
+  const char *at = text_or(basis, "warnings", "");
+  size_t length;
+  for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
+    (void)printf("  %-20s %.*s\n", "warnings", (int)length, line);
   }
-}
-
-/* Return the findings as a list. */
-static json_t *list_warnings(const supine_basis *basis) {
-  json_t *list = json_array();
-  const char *at = supine_basis_metadata(basis, warnings);
-  while (at != NULL && *at != '\0') {
-    const size_t length = strcspn(at, "\n");
-    (void)json_array_append_new(list, json_stringn(at, length));
-    at += length + (at[length] == '\n');
-  }
-  return list;
 }
 
 static void print_text(const char *path, const supine_basis *basis, const double *energy) {
@@ -230,8 +221,8 @@ static const double *error_list(const supine_basis *basis, const char *key, size
 static void print_table(const supine_basis *basis) {
   size_t bands;
   size_t modes;
-  const double *harmonics = error_list(basis, "error_harmonics", &bands);
-  const double *best = error_list(basis, "error_modes", &modes);
+  const double *harmonics = error_list(basis, error_lists[0], &bands);
+  const double *best = error_list(basis, error_lists[1], &modes);
   if (harmonics == NULL || best == NULL) {
     return;
   }
@@ -255,23 +246,37 @@ static void print_table(const supine_basis *basis) {
   }
 }
 
-static json_t *number_or_text(const char *text) {
+/* Add a fact of the metadata, where the basis has it, as a number where it is one. */
+static void add_fact(json_t *object, const char *name, const supine_basis *basis, const char *key) {
+  const char *text = supine_basis_metadata(basis, key);
   double value;
-  return supine_options_parse_number(text, &value) ? json_real(value) : json_string(text);
+  if (text != NULL) {
+    (void)json_object_set_new(object, name,
+                              supine_options_parse_number(text, &value) ? json_real(value)
+                                                                        : json_string(text));
+  }
 }
 
-static bool print_json(const char *path, const supine_basis *basis, const double *energy) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  json_t *bands = json_array();
-  json_t *error = json_object();
-  for (size_t l = 0; l <= info->band; ++l) {
-    (void)json_array_append_new(bands, json_real(energy[l]));
+static json_t *list_numbers(const double *values, size_t count) {
+  json_t *list = json_array();
+  for (size_t k = 0; k < count; ++k) {
+    (void)json_array_append_new(list, json_real(values[k]));
   }
+  return list;
+}
+
+/* Print JSON; a failure of standard output is reported when the command ends. */
+static void print_json(const char *path, const supine_basis *basis, const double *energy) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  json_t *error = json_object();
+  json_t *warnings = json_array();
+  const char *at = text_or(basis, "warnings", "");
+  size_t length;
   for (size_t i = 0; i < sizeof errors / sizeof *errors; ++i) {
-    const char *value = supine_basis_metadata(basis, errors[i]);
-    if (value != NULL) {
-      (void)json_object_set_new(error, errors[i] + strlen("error_"), number_or_text(value));
-    }
+    add_fact(error, errors[i] + strlen("error_"), basis, errors[i]);
+  }
+  for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
+    (void)json_array_append_new(warnings, json_stringn(line, length));
   }
   char printable[PATH_MAX] = "";
   supine_text_add(printable, sizeof printable, "%s", path);
@@ -281,30 +286,20 @@ static bool print_json(const char *path, const supine_basis *basis, const double
       text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
       (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
       (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
-      (int)info->has_volume, "kind", info->vector ? "vector" : "scalar", "energy_per_band", bands,
-      "error", error, warnings, list_warnings(basis));
-  bool good = root != NULL;
-  for (size_t i = 0; good && i < sizeof shown / sizeof *shown; ++i) {
-    const char *value = supine_basis_metadata(basis, shown[i]);
-    good = value == NULL || json_object_set_new(root, shown[i], number_or_text(value)) == 0;
+      (int)info->has_volume, "kind", info->vector ? "vector" : "scalar", "energy_per_band",
+      list_numbers(energy, info->band + 1), "error", error, "warnings", warnings);
+  for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
+    add_fact(root, shown[i], basis, shown[i]);
   }
-  const char *folds = supine_basis_metadata(basis, turned_over);
-  good =
-      good && (folds == NULL || json_object_set_new(root, turned_over, number_or_text(folds)) == 0);
-  for (size_t i = 0; good && i < 2; ++i) {
-    static const char *const keys[] = {"error_harmonics", "error_modes"};
+  add_fact(root, turned_over, basis, turned_over);
+  for (size_t i = 0; i < 2; ++i) {
     size_t count;
-    const double *values = error_list(basis, keys[i], &count);
-    json_t *list = json_array();
-    for (size_t k = 0; values != NULL && k < count; ++k) {
-      (void)json_array_append_new(list, json_real(values[k]));
-    }
-    good = json_object_set_new(root, keys[i], list) == 0;
+    const double *values = error_list(basis, error_lists[i], &count);
+    (void)json_object_set_new(root, error_lists[i], list_numbers(values, count));
   }
-  good = good && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
+  (void)json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
   (void)putchar('\n');
   json_decref(root);
-  return good;
 }
 
 typedef struct request {
@@ -324,10 +319,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
     status = energy != NULL ? band_energy(basis, energy, error) : SUPINE_ERROR_MEMORY;
   }
-  if (status == SUPINE_OK && wanted->json && !print_json(path, basis, energy)) {
-    status = supine_error_set(error, SUPINE_ERROR_WRITE, "cannot print JSON: %s", strerror(errno));
-  }
-  if (status == SUPINE_OK && !wanted->json) {
+  if (status == SUPINE_OK && wanted->json) {
+    print_json(path, basis, energy);
+  } else if (status == SUPINE_OK) {
     print_text(path, basis, energy);
     print_table(basis);
   }

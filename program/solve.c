@@ -11,7 +11,7 @@
 #include "program/model_options.h"
 #include "program/options/basis_input.h"
 #include "program/options/orientation.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 
 static const char name[] = "solve";
 

@@ -9,7 +9,7 @@
 #include "program/observed.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 #include "program/stream/address.h"
 #include "program/stream/live_page.h"
 #include "program/stream/server.h"

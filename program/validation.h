@@ -7,7 +7,7 @@
 #include "precompute/patient/rows.h"
 #include "precompute/patient/validate.h"
 #include "program/options/orientation.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 
 enum { SUPINE_COMMAND_STATES_MAX = 8 };
 

@@ -11,9 +11,9 @@
 #include <unistd.h>
 
 #include "program/stream/address.h"
-#include "program/stream/patient.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
+#include "program/stream/tracked_patient.h"
 #include "sh/base/clock.h"
 
 /* Intervals, s. */

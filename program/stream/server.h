@@ -7,11 +7,11 @@
 #ifndef SUPINE_STREAM_SERVER_H
 #define SUPINE_STREAM_SERVER_H
 
+#include "program/stream/breathing.h"
 #include "program/stream/gravity.h"
 #include "program/stream/latency.h"
 #include "program/stream/poses.h"
 #include "program/stream/sensors.h"
-#include "program/stream/volume.h"
 #include "program/stream/web.h"
 
 /** Numbers of events so far. */

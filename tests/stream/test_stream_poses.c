@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Poses in files, volumes in words, latencies in counts. */
 #include "precompute/writer.h"
+#include "program/stream/breathing.h"
 #include "program/stream/latency.h"
 #include "program/stream/poses.h"
-#include "program/stream/volume.h"
 #include "tests/poses.h"
 #include "tests/runtime_fixture.h"
 #include "tests/test.h"

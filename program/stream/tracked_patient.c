@@ -6,7 +6,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "program/stream/patient.h"
+#include "program/stream/tracked_patient.h"
 
 supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
                                                   const supine_stream_options *options,

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "program/options/basis_input.h"
-#include "program/options/state.h"
+#include "program/options/state_options.h"
 
 /* Plausible volumes, as shares of full inflation; the least is that of tissue alone. */
 static const double least_of_full = 0.1;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "program/options/expected.h"
+#include "program/options/expected_output.h"
 
 supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
                                            const supine_state *from, supine_expected *expected,

@@ -2,7 +2,7 @@
 /* The volume of the lungs at a moment: a fixed one, or that of a breath. */
 #include <string.h>
 
-#include "program/stream/volume.h"
+#include "program/stream/breathing.h"
 
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error) {
