@@ -27,11 +27,7 @@ void supine_findings_add(supine_findings *findings, const char *format, ...) {
 
 const char *supine_findings_next(const char **at, size_t *length) {
   const char *line = *at;
-  const char *end = strchr(line, '\n');
-  if (end == NULL) {
-    return NULL;
-  }
-  *length = (size_t)(end - line);
-  *at = end + 1;
-  return line;
+  *length = strcspn(line, "\n");
+  *at = line + *length + (line[*length] == '\n' ? 1 : 0);
+  return *line != '\0' ? line : NULL;
 }
