@@ -107,40 +107,6 @@ static void test_truncated_obj_every_length_read_or_refused(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-static uint32_t random_next(uint64_t *seed) {
-  *seed = *seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-  return (uint32_t)(*seed >> 33);
-}
-
-static void test_bent_bytes_read_or_refused(void **state) {
-  static const struct {
-    const char *name;
-    int rounds;
-  } cases[] = {{"a.ply", 3000}, {"a.stl", 1500}, {"a.obj", 60}};
-  uint64_t seed = 20080312;
-  char path[256];
-  for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-    size_t size = 0;
-    unsigned char *bytes = saved_box(state, cases[k].name, &size);
-    for (int round = 0; round < cases[k].rounds; ++round) {
-      size_t places[3];
-      unsigned char old[3];
-      for (int b = 0; b < 3; ++b) {
-        places[b] = random_next(&seed) % size;
-        old[b] = bytes[places[b]];
-        const uint32_t kind = random_next(&seed);
-        bytes[places[b]] = (unsigned char)(kind % 3 == 0 ? '0' + kind / 3 % 10 : kind >> 8);
-      }
-      (void)attempt(sample_write(state, cases[k].name, bytes, size, path));
-      for (int b = 2; b >= 0; --b) {
-        bytes[places[b]] = old[b];
-      }
-    }
-    assert_int_equal(unlink(path), 0);
-    free(bytes);
-  }
-}
-
 #define PLY_ASCII "ply\nformat ascii 1.0\n"
 
 static void test_ply_header_illegal_format(void **state) {
@@ -435,7 +401,6 @@ int main(void) {
       cmocka_unit_test(test_truncated_binary_every_length_format),
       cmocka_unit_test(test_truncated_text_every_length_format),
       cmocka_unit_test(test_truncated_obj_every_length_read_or_refused),
-      cmocka_unit_test(test_bent_bytes_read_or_refused),
       cmocka_unit_test(test_ply_header_illegal_format),
       cmocka_unit_test(test_ply_header_too_many_parts_format),
       cmocka_unit_test(test_ply_body_illegal_format),

@@ -514,17 +514,6 @@ static void test_load_from_threads_good_and_bad(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_mesh_free_zeroed_and_twice_legal(void **state) {
-  (void)state;
-  supine_mesh mesh = {0};
-  supine_mesh_free(&mesh);
-  mesh = sample_tetrahedron();
-  supine_mesh_free(&mesh);
-  supine_mesh_free(&mesh);
-  assert_null(mesh.vertices);
-  assert_int_equal(mesh.triangle_count, 0);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_load_stl_soup_equals_indexed),
@@ -550,7 +539,6 @@ int main(void) {
       cmocka_unit_test(test_load_stl_binary_that_says_solid),
       cmocka_unit_test(test_load_obj_materials_not_opened),
       cmocka_unit_test(test_load_from_threads_good_and_bad),
-      cmocka_unit_test(test_mesh_free_zeroed_and_twice_legal),
   };
   return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
 }

@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Check and repair surfaces, and join them into lungs. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "sh/base/text.h"
 
 #include "mesh/anatomy.h"
 #include "mesh/repair.h"
@@ -117,24 +114,6 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   return along < 0 ? 1 : 2;
 }
 
-/* Describe axes other than LPS, as "left and right, head and feet exchanged". */
-static void describe(supine_axes axes, char *text, size_t size) {
-  static const char *const ends[] = {"left and right", "front and back", "head and feet"};
-  double matrix[3][3];
-  supine_mesh_axes_matrix(axes, matrix);
-  text[0] = '\0';
-  for (int k = 0; k < 3; ++k) {
-    if (matrix[k][k] == 0.0) {
-      (void)snprintf(text, size, "they lie along other axes");
-      return;
-    }
-    if (matrix[k][k] < 0.0) {
-      supine_text_add(text, size, "%s%s", text[0] == '\0' ? "" : ", ", ends[k]);
-    }
-  }
-  supine_text_add(text, size, " exchanged");
-}
-
 /* Judge the axes by the lungs' shape, and refuse two lungs in one piece.
  * @param side  written: that of a single lung, +1 left, -1 right; 0: unknown */
 static supine_status judge(const supine_lungs *lungs, const supine_lungs_source *source, int *side,
@@ -153,14 +132,12 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
                             source->name);
   }
   if (found.axes != SUPINE_AXES_LPS) {
-    char what[96];
     char letters[4];
-    describe(found.axes, what, sizeof what);
     supine_mesh_axes_letters(supine_mesh_axes_after(source->axes, found.axes), letters);
     supine_findings_add(findings,
-                        "%s: warning: the axes are doubtful: by the shape of the lungs, %s; if so, "
-                        "add --axes %s",
-                        source->name, what, letters);
+                        "%s: warning: the axes are doubtful: the shape of the lungs fits %s; if "
+                        "they are right, add --axes %s",
+                        source->name, letters, letters);
   }
   return SUPINE_OK;
 }

@@ -20,10 +20,10 @@ size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
   return 20 * frequency * frequency;
 }
 
-/* The icosahedron's corners: cyclic permutations of (+-1, +-golden, 0). */
+/* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
-  const size_t axis = index / 4; /* of the coordinate that is 0: z, x, y */
+  const size_t axis = index / 4; /* the coordinate 2 after it is 0: z, x, y */
   const double one = index % 2 == 0 ? -1.0 : 1.0;
   const double far = index % 4 < 2 ? golden : -golden;
   p[axis % 3] = one;
@@ -31,7 +31,7 @@ static void corner(size_t index, double p[3]) {
   p[(axis + 2) % 3] = 0.0;
 }
 
-/* The edge between two corners, numbered in the order in which the faces show them. */
+/* Number the edge between two corners, in the order of the faces. */
 static size_t edge_index(unsigned a, unsigned b) {
   size_t count = 0;
   for (size_t f = 0; f < FACES; ++f) {
@@ -49,7 +49,7 @@ static size_t edge_index(unsigned a, unsigned b) {
   return count;
 }
 
-/* Number of the vertex at steps (i, j, k) from the corners of a face, i + j + k = f. */
+/* Number the vertex at steps (f - i - j, i, j) from the corners of a face. */
 static size_t number(size_t face, size_t f, size_t i, size_t j) {
   const size_t step[3] = {f - i - j, i, j};
   size_t inside = 0;

@@ -27,14 +27,14 @@ typedef struct supine_lungs {
  *
  * Components whose centres lie left and right of the box's centre, and that hardly overlap in x,
  * are two lungs; otherwise all of them are one lung. The midline is the box's centre for two lungs
- * and the face of the box nearest x = 0 for one. The triangles of
- * a closed lung that face inwards are reversed.
+ * and the face of the box nearest x = 0 for one. If the
+ * triangles of a closed lung face inwards, they are reversed.
  *
  * @param meshes   [count] not changed
- * @param midline  mm, or NULL to find it; given, it alone decides who is left and who is right
+ * @param midline  mm; NULL: found. A given one alone decides which lung is left
  * @param lungs    written on success; release with supine_lungs_free
  * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach;
- *                                one lung given twice, a surface of next to nothing beside another;
+ *                                one lung given twice, a tiny surface beside another;
  *                                a midline through a lung, or with both lungs on one side of it
  * @retval SUPINE_ERROR_ARGUMENT  a midline that is not finite
  * @retval SUPINE_ERROR_MEMORY */
