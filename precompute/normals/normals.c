@@ -19,8 +19,9 @@
  * errors change in the second digit. */
 enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
 
-/* Modes are sums of the normals in at most SNAPSHOTS states, computed LANES states at a time. */
-enum { LANES = 8, SNAPSHOTS = 6 * LANES, MOST = SUPINE_NORMALS_MOST };
+/* Modes are sums of the normals in at most SNAPSHOTS states, computed LANES states at a time, of
+ * which the first is the file's surface. */
+enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
 /* Degrees: a fifth below 0.1 and 1, as postures and vertices other than the held-out ones err a
  * little differently. */
@@ -33,14 +34,14 @@ static const double least_new = 1e-7;
 
 /* One lung's modes before they are rounded; A, n and V as in normals.h. */
 typedef struct fit {
-  size_t count;                 /* of the modes, at most MOST */
-  size_t snapshots;             /* R */
-  size_t state[SNAPSHOTS];      /* [R] */
-  float share[SNAPSHOTS][MOST]; /* n_j = sum over r of share_rj N(state_r) */
-  double *weights;              /* [MOST, 3, terms] V */
-  supine_normals_rows rows;     /* held-out vertices */
-  float *modes;                 /* [rows, 3, MOST] n of these */
-  double *exact;                /* [rows, 3, HELD_OUT] their normals in the held-out states */
+  size_t count;                     /* of the modes, at most MOST */
+  size_t snapshots;                 /* R */
+  size_t state[SNAPSHOTS];          /* [R] */
+  float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share_1+r,j N(state_r) */
+  double *weights;                  /* [MOST, 3, terms] V */
+  supine_normals_rows rows;         /* held-out vertices */
+  float *modes;                     /* [rows, 3, MOST] n of these */
+  double *exact;                    /* [rows, 3, HELD_OUT] their normals in the held-out states */
 } fit;
 
 typedef struct normals_work {
@@ -51,14 +52,6 @@ typedef struct normals_work {
   supine_normals_states held_out;
   fit fits[SUPINE_LUNGS_MAX];
 } normals_work;
-
-static double dot(const double *a, const double *b, size_t count) {
-  double sum = 0.0;
-  for (size_t i = 0; i < count; ++i) {
-    sum += a[i] * b[i];
-  }
-  return sum;
-}
 
 /* Compute out [count, 3, n] = in [count, 3, terms] times matrix_c^T, matrix [n, 3, terms], for
  * each component c. */
@@ -149,7 +142,7 @@ static supine_status find_fit(const normals_work *work, size_t lung,
     for (size_t r = 0; r < made->snapshots; ++r) {
       const size_t state = made->state[r];
       const double share = coefficients[j * made->snapshots + r] / length[state];
-      made->share[r][j] = (float)share;
+      made->share[1 + r][j] = (float)share;
       cblas_daxpy((int)all, share, phi + state * all, 1, mix + j * all, 1);
     }
   }
@@ -201,14 +194,6 @@ static supine_status find_lung(const normals_work *work, size_t lung, fit *made)
   return status;
 }
 
-/* Angle between two vectors, degrees. */
-static double angle_between(const double *a, const double *b) {
-  const double x = a[1] * b[2] - a[2] * b[1];
-  const double y = a[2] * b[0] - a[0] * b[2];
-  const double z = a[0] * b[1] - a[1] * b[0];
-  return degrees * atan2(sqrt(x * x + y * y + z * z), dot(a, b, 3));
-}
-
 /* A vertex's modes along one axis as an open basis has them: rounded to 13, 10 and 9 bits. */
 static void pack(const int16_t *modes, size_t count, double *packed) {
   const size_t words = supine_tiles_normal_words(count);
@@ -224,15 +209,17 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Round modes [n, 3, stride] to 16 bits, [n, 3, count]; the unit of each goes to its weights
- * [count, 3, terms]. */
-static void round_modes(const float *values, size_t n, size_t stride, size_t count, size_t terms,
-                        int16_t *rounded, double *weights) {
+/* Divide modes [n, 3, stride] by the lengths of the normals at rest, NULL: 1, and round them to 16
+ * bits, [n, 3, count]; the unit of each goes to its weights [count, 3, terms]. A vertex without a
+ * normal at rest has no modes. */
+static void round_modes(float *values, const float *rest, size_t n, size_t stride, size_t count,
+                        size_t terms, int16_t *rounded, double *weights) {
   float top[MOST] = {0.0f};
   float scale[MOST];
   for (size_t i = 0; i < 3 * n; ++i) {
+    const float factor = rest == NULL ? 1.0f : rest[i / 3] > 0.0f ? 1.0f / rest[i / 3] : 0.0f;
     for (size_t j = 0; j < count; ++j) {
-      const float size = fabsf(values[i * stride + j]);
+      const float size = fabsf(values[i * stride + j] *= factor);
       top[j] = size > top[j] ? size : top[j];
     }
   }
@@ -248,6 +235,23 @@ static void round_modes(const float *values, size_t n, size_t stride, size_t cou
   }
 }
 
+/* Find the angles, degrees, between vectors a and b [3, count]. */
+SUPINE_CLONES static void find_angles(size_t count, const double *a, const double *b,
+                                      double *angles) {
+  double cosine[HELD_OUT];
+  for (size_t i = 0; i < count; ++i) {
+    const size_t y = count + i;
+    const size_t z = 2 * count + i;
+    const double cross[3] = {a[y] * b[z] - a[z] * b[y], a[z] * b[i] - a[i] * b[z],
+                             a[i] * b[y] - a[y] * b[i]};
+    cosine[i] = a[i] * b[i] + a[y] * b[y] + a[z] * b[z];
+    angles[i] = sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    angles[i] = degrees * atan2(angles[i], cosine[i]);
+  }
+}
+
 /* Add the angles off of a lung's held-out vertices in the held-out states. modes [rows, 3, count]
  * and weights [count, 3, terms] as the file has them. */
 static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
@@ -257,22 +261,20 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   const size_t states = work->held_out.count;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
+  double normals[3 * HELD_OUT];
   double angles[HELD_OUT];
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
               (int)all, weights, (int)all, 0.0, v, (int)count);
   for (size_t r = 0; r < made->rows.count; ++r) {
-    const double *exact = made->exact + 3 * r * states;
+
     double packed[3][MOST];
     for (size_t axis = 0; axis < 3; ++axis) {
       pack(modes + (3 * r + axis) * count, count, packed[axis]);
     }
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, 3, (int)states, (int)count, 1.0, packed[0],
+                MOST, v, (int)count, 0.0, normals, (int)states);
+    find_angles(states, made->exact + 3 * r * states, normals, angles);
     for (size_t i = 0; i < states; ++i) {
-      double normal[3];
-      for (size_t axis = 0; axis < 3; ++axis) {
-        normal[axis] = dot(v + i * count, packed[axis], count);
-      }
-      angles[i] =
-          angle_between((double[]){exact[i], exact[states + i], exact[2 * states + i]}, normal);
       *sum += angles[i];
     }
     supine_accuracy_tally_add(tally, states, angles);
@@ -295,7 +297,7 @@ static supine_status measure_all(const normals_work *work, size_t count,
     memcpy(weights, made->modes != NULL ? made->weights + lung * count * all : of->weights,
            count * all * sizeof *weights);
     if (made->modes == NULL) {
-      round_modes(of->modes, of->rows.count, MOST, count, work->terms, modes, weights);
+      round_modes(of->modes, NULL, of->rows.count, MOST, count, work->terms, modes, weights);
     }
     for (size_t r = 0; r < of->rows.count && made->modes != NULL; ++r) {
       memcpy(modes + 3 * r * count, made->modes + 3 * of->rows.vertex[r] * count,
@@ -317,10 +319,11 @@ static supine_status measure_all(const normals_work *work, size_t count,
 typedef struct planes_work {
   const normals_work *work;
   size_t count;                                       /* Q */
-  size_t first;                                       /* snapshot in the first lane */
+  size_t first;                                       /* snapshot in the first lane, 1 + r */
   float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gains times weights */
   float *at;                                          /* [N, 3, LANES] positions */
   float *modes;                                       /* [N, 3, Q] sums so far */
+  float *rest; /* [N] lengths of the normals in the first lane */
 } planes_work;
 
 static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
@@ -373,6 +376,10 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
     }
     const float(*share)[MOST] =
         (const float(*)[MOST])(planes->work->fits[lung_of(s, i)].share + planes->first);
+    if (planes->first == 0) {
+      planes->rest[i] = sqrtf(normal[0][0] * normal[0][0] + normal[1][0] * normal[1][0] +
+                              normal[2][0] * normal[2][0]);
+    }
     for (size_t axis = 0; axis < 3; ++axis) {
       float sum[MOST] = {0.0f};
       for (size_t l = 0; l < LANES; ++l) {
@@ -388,36 +395,6 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Divide by the lengths of the normals at rest; without one, a vertex has no modes. */
-static void scale_range(void *context, size_t begin, size_t end, size_t thread) {
-  const planes_work *planes = context;
-  const supine_normals_surface *s = planes->work->surface;
-  const supine_normals_fans *fans = &planes->work->fans;
-  (void)thread;
-  for (size_t i = begin; i < end; ++i) {
-    double normal[3] = {0.0, 0.0, 0.0};
-    for (size_t at = fans->begin[i]; at < fans->begin[i + 1]; ++at) {
-      uint32_t others[2];
-      double a[3];
-      double b[3];
-      supine_normals_fan_others(s->triangles, fans->corner[at], others);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const double p = (double)s->vertices[3 * i + axis];
-        a[axis] = (double)s->vertices[3 * others[0] + axis] - p;
-        b[axis] = (double)s->vertices[3 * others[1] + axis] - p;
-      }
-      normal[0] += a[1] * b[2] - a[2] * b[1];
-      normal[1] += a[2] * b[0] - a[0] * b[2];
-      normal[2] += a[0] * b[1] - a[1] * b[0];
-    }
-    const double length = sqrt(dot(normal, normal, 3));
-    const float scale = length > 0.0 ? (float)(1.0 / length) : 0.0f;
-    for (size_t j = 0; j < 3 * planes->count; ++j) {
-      planes->modes[3 * i * planes->count + j] *= scale;
-    }
-  }
-}
-
 /* Set the lanes' gains times weights, which stand in the monomials: of axis a in component a + 2.
  */
 static void find_steer(const planes_work *planes) {
@@ -425,11 +402,12 @@ static void find_steer(const planes_work *planes) {
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
     for (size_t axis = 0; axis < 3; ++axis) {
       for (size_t l = 0; l < LANES; ++l) {
-        const size_t state = work->fits[lung].state[planes->first + l];
+        const size_t lane = planes->first + l;
+        const size_t state = lane > 0 ? work->fits[lung].state[lane - 1] : 0;
         const double *phi = work->states.phi +
                             ((lung * work->states.room + state) * 3 + (axis + 2) % 3) * work->terms;
         for (size_t k = 0; k < work->surface->mode_count; ++k) {
-          planes->steer[lung][axis][k][l] = (float)phi[1 + k];
+          planes->steer[lung][axis][k][l] = lane > 0 ? (float)phi[1 + k] : 0.0f;
         }
       }
     }
@@ -448,7 +426,8 @@ static supine_status make_modes(const normals_work *work, size_t count,
                         .count = count,
                         .steer = steer,
                         .at = malloc(3 * n * LANES * sizeof(float)),
-                        .modes = calloc(3 * n * count, sizeof(float))};
+                        .modes = calloc(3 * n * count, sizeof(float)),
+                        .rest = malloc(n * sizeof(float))};
   made->modes = malloc(3 * n * count * sizeof *made->modes);
   made->weights = malloc(s->lung_count * count * all * sizeof *made->weights);
   made->count = count;
@@ -456,25 +435,24 @@ static supine_status make_modes(const normals_work *work, size_t count,
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
     snapshots = work->fits[lung].snapshots > snapshots ? work->fits[lung].snapshots : snapshots;
   }
-  const bool memory =
-      planes.at != NULL && planes.modes != NULL && made->modes != NULL && made->weights != NULL;
-  for (; memory && planes.first < snapshots; planes.first += LANES) {
+  const bool memory = planes.at != NULL && planes.modes != NULL && planes.rest != NULL &&
+                      made->modes != NULL && made->weights != NULL;
+  for (; memory && planes.first <= snapshots; planes.first += LANES) {
     find_steer(&planes);
     supine_parallel_for(3 * n, 3 * GRAIN, 0, place_range, &planes);
     supine_parallel_for(n, GRAIN, 0, sum_range, &planes);
-  }
-  if (memory) {
-    supine_parallel_for(n, GRAIN, 0, scale_range, &planes);
   }
   for (size_t lung = 0; memory && lung < s->lung_count; ++lung) {
     const size_t begin = s->lung_begin[lung];
     double *weights = made->weights + lung * count * all;
     memcpy(weights, work->fits[lung].weights, count * all * sizeof *weights);
-    round_modes(planes.modes + 3 * begin * count, s->lung_begin[lung + 1] - begin, count, count,
-                work->terms, made->modes + 3 * begin * count, weights);
+    round_modes(planes.modes + 3 * begin * count, planes.rest + begin,
+                s->lung_begin[lung + 1] - begin, count, count, work->terms,
+                made->modes + 3 * begin * count, weights);
   }
   free(planes.at);
   free(planes.modes);
+  free(planes.rest);
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
