@@ -10,7 +10,7 @@
 enum {
   LATITUDES_PER_BAND = 8, /* of the grid; longitudes are twice as many */
   LATITUDES_MIN = 32,
-  LANES = 16 /* right-hand sides of one solve: a cache line of single precision */
+  AT_ONCE = 16 /* right-hand sides of one solve */
 };
 
 void supine_projection_free(supine_projection *projection) {
@@ -56,34 +56,33 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
   supine_sh_transform *plan = NULL;
   grid_heights heights = {malloc(3 * count * sizeof(double)), malloc(count * sizeof(double)),
                           malloc(count * sizeof(double))};
-  double *ring = malloc(2 * latitudes * span->rank * sizeof *ring);
+  double *weights = malloc(count * span->rank * sizeof *weights);
   supine_status status = supine_sh_grid_create(latitudes, 2 * latitudes, &grid);
   if (status == SUPINE_OK) {
     status = supine_sh_transform_create(band, grid, span->rank, &plan, error);
   }
   if (status == SUPINE_OK && (heights.directions == NULL || heights.minimum == NULL ||
-                              heights.maximum == NULL || ring == NULL)) {
+                              heights.maximum == NULL || weights == NULL)) {
     status = SUPINE_ERROR_MEMORY;
   }
   if (status == SUPINE_OK) {
     status = find_heights(lungs, law->pair, grid, &heights);
   }
+  if (status == SUPINE_OK) {
+    const supine_gravities gravities = {count, heights.directions, heights.minimum,
+                                        heights.maximum};
+    status = supine_projection_span_weights(lungs, law, span, &gravities, weights);
+  }
   memset(functions, 0, span->rank * supine_sh_count(band) * sizeof *functions);
   for (size_t j = 0; j < latitudes && status == SUPINE_OK; ++j) {
-    const size_t first = j * 2 * latitudes;
-    const supine_gravities gravities = {2 * latitudes, heights.directions + 3 * first,
-                                        heights.minimum + first, heights.maximum + first};
-    status = supine_projection_span_weights(lungs, law, span, &gravities, ring);
-    if (status == SUPINE_OK) {
-      supine_sh_transform_ring(plan, j, ring, functions);
-    }
+    supine_sh_transform_ring(plan, j, weights + j * 2 * latitudes * span->rank, functions);
   }
   supine_sh_transform_destroy(plan);
   supine_sh_grid_destroy(grid);
   free(heights.directions);
   free(heights.minimum);
   free(heights.maximum);
-  free(ring);
+  free(weights);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "projection to band %zu: %s", band,
                                                 supine_status_string(status));
@@ -91,22 +90,16 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
 
 /* --- columns --------------------------------------------------------------------------------- */
 
-/* A stage of the work for the caller to follow. */
-typedef struct follower {
-  supine_progress_function *progress;
-  void *context;
-} follower;
-
-/* Solves for the span's directions, some at a time, into columns [N, R]. */
+/* Solve for the span's directions, some at a time, into columns [N, R]. */
 static supine_status solve(const supine_lungs *lungs, const supine_model *model,
-                           const follower *caller, supine_projection *made, supine_error *error) {
+                           supine_progress_function *progress, void *context,
+                           supine_projection *made, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const size_t rank = made->rank;
-  const size_t lanes = rank < LANES ? rank : LANES;
   double range[2 * SUPINE_SPAN_MAX];
   supine_equilibrium *equilibrium = NULL;
-  double *force = malloc(n * lanes * sizeof *force);
-  double *caught = malloc(n * lanes * sizeof *caught);
+  double *force = malloc(n * AT_ONCE * sizeof *force);
+  double *caught = malloc(n * AT_ONCE * sizeof *caught);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (force == NULL || caught == NULL ||
       supine_physics_height_range(lungs, model->force.pair, rank, made->span->directions, range,
@@ -115,20 +108,19 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
     goto cleanup;
   }
   status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
-  for (size_t done = 0; done < rank && status == SUPINE_OK; done += lanes) {
-    const size_t first = done + lanes < rank ? done : rank - lanes; /* full lanes are the fastest */
-    const supine_gravities gravities = {lanes, made->span->directions + 3 * first, range + first,
+  for (size_t first = 0; first < rank && status == SUPINE_OK; first += AT_ONCE) {
+    const size_t count = rank - first < AT_ONCE ? rank - first : AT_ONCE;
+    const supine_gravities gravities = {count, made->span->directions + 3 * first, range + first,
                                         range + rank + first};
-    if (caller->progress != NULL &&
-        !caller->progress(caller->context, (double)done / (double)rank)) {
+    if (progress != NULL && !progress(context, (double)first / (double)rank)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
       break;
     }
     supine_physics_force(lungs, &model->force, &gravities, n, NULL, force);
-    status = supine_physics_equilibrium_solve(equilibrium, lanes, force, caught, NULL, error);
+    status = supine_physics_equilibrium_solve(equilibrium, count, force, caught, NULL, error);
     for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
-      memcpy(made->columns + i * rank + first, caught + i * lanes, lanes * sizeof *caught);
+      memcpy(made->columns + i * rank + first, caught + i * count, count * sizeof *caught);
     }
   }
 cleanup:
@@ -143,7 +135,6 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
                                        void *context, supine_projection *projection,
                                        supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
-  const follower caller = {progress, context};
   supine_projection made = {.vertex_count = n, .band = band};
   supine_status status = supine_physics_model_check(model, error);
   if (status == SUPINE_OK && band > SUPINE_SH_BAND_MAX) {
@@ -167,7 +158,7 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
             : transform(lungs, &model->force, band, made.span, made.functions, error);
   }
   if (status == SUPINE_OK) {
-    status = solve(lungs, model, &caller, &made, error);
+    status = solve(lungs, model, progress, context, &made, error);
   }
   if (status == SUPINE_OK) {
     *projection = made;
