@@ -210,12 +210,10 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
 }
 
 /* Divide modes [n, 3, stride] by the lengths of the normals at rest, NULL: 1, and round them to 16
- * bits, [n, 3, count]; the unit of each goes to its weights [count, 3, terms]. A vertex without a
- * normal at rest has no modes. */
+ * bits, [n, 3, count], in the units [count]. A vertex without a normal at rest has no modes. */
 static void round_modes(float *values, const float *rest, size_t n, size_t stride, size_t count,
-                        size_t terms, int16_t *rounded, double *weights) {
+                        int16_t *rounded, double *unit) {
   float top[MOST] = {0.0f};
-  float scale[MOST];
   for (size_t i = 0; i < 3 * n; ++i) {
     const float factor = rest == NULL ? 1.0f : rest[i / 3] > 0.0f ? 1.0f / rest[i / 3] : 0.0f;
     for (size_t j = 0; j < count; ++j) {
@@ -224,14 +222,21 @@ static void round_modes(float *values, const float *rest, size_t n, size_t strid
     }
   }
   for (size_t j = 0; j < count; ++j) {
-    const double unit = top[j] > 0 ? (double)top[j] / INT16_MAX : 1.0;
-    scale[j] = (float)(1.0 / unit);
-    cblas_dscal((int)(3 * terms), unit, weights + 3 * j * terms, 1);
+    unit[j] = top[j] > 0 ? (double)top[j] / INT16_MAX : 1.0;
+    top[j] = (float)(1.0 / unit[j]);
   }
   for (size_t i = 0; i < 3 * n; ++i) {
     for (size_t j = 0; j < count; ++j) {
-      rounded[i * count + j] = (int16_t)lrintf(values[i * stride + j] * scale[j]);
+      rounded[i * count + j] = (int16_t)lrintf(values[i * stride + j] * top[j]);
     }
+  }
+}
+
+/* Compute the weights [count, 3, terms] of modes in the units. */
+static void scale_weights(const double *weights, const double *unit, size_t count, size_t terms,
+                          double *scaled) {
+  for (size_t i = 0; i < count * 3 * terms; ++i) {
+    scaled[i] = weights[i] * unit[i / (3 * terms)];
   }
 }
 
@@ -266,7 +271,6 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
               (int)all, weights, (int)all, 0.0, v, (int)count);
   for (size_t r = 0; r < made->rows.count; ++r) {
-
     double packed[3][MOST];
     for (size_t axis = 0; axis < 3; ++axis) {
       pack(modes + (3 * r + axis) * count, count, packed[axis]);
@@ -290,20 +294,21 @@ static supine_status measure_all(const normals_work *work, size_t count,
   supine_tally *tally = calloc(1, sizeof *tally);
   int16_t *modes = malloc(most * 3 * count * sizeof *modes);
   double *weights = malloc(count * all * sizeof *weights);
+  double unit[MOST];
   double sum = 0.0;
   const bool memory = tally != NULL && modes != NULL && weights != NULL;
   for (size_t lung = 0; lung < work->surface->lung_count && memory; ++lung) {
     const fit *of = &work->fits[lung];
-    memcpy(weights, made->modes != NULL ? made->weights + lung * count * all : of->weights,
-           count * all * sizeof *weights);
     if (made->modes == NULL) {
-      round_modes(of->modes, NULL, of->rows.count, MOST, count, work->terms, modes, weights);
+      round_modes(of->modes, NULL, of->rows.count, MOST, count, modes, unit);
+      scale_weights(of->weights, unit, count, work->terms, weights);
     }
     for (size_t r = 0; r < of->rows.count && made->modes != NULL; ++r) {
       memcpy(modes + 3 * r * count, made->modes + 3 * of->rows.vertex[r] * count,
              3 * count * sizeof *modes);
     }
-    measure(work, lung, count, modes, weights, tally, &sum);
+    measure(work, lung, count, modes,
+            made->modes != NULL ? made->weights + lung * count * all : weights, tally, &sum);
   }
   if (memory) {
     made->mean = tally->count > 0 ? sum / (double)tally->count : 0.0;
@@ -444,11 +449,12 @@ static supine_status make_modes(const normals_work *work, size_t count,
   }
   for (size_t lung = 0; memory && lung < s->lung_count; ++lung) {
     const size_t begin = s->lung_begin[lung];
-    double *weights = made->weights + lung * count * all;
-    memcpy(weights, work->fits[lung].weights, count * all * sizeof *weights);
+    double unit[MOST];
     round_modes(planes.modes + 3 * begin * count, planes.rest + begin,
-                s->lung_begin[lung + 1] - begin, count, count, work->terms,
-                made->modes + 3 * begin * count, weights);
+                s->lung_begin[lung + 1] - begin, count, count, made->modes + 3 * begin * count,
+                unit);
+    scale_weights(work->fits[lung].weights, unit, count, work->terms,
+                  made->weights + lung * count * all);
   }
   free(planes.at);
   free(planes.modes);
