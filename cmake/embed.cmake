@@ -20,7 +20,7 @@ foreach(path IN LISTS FILES)
     file(READ "${path}" text)
     string(REGEX MATCHALL "{{[^}]*}}" tags "${text}")
     foreach(tag IN LISTS tags)
-      string(REGEX REPLACE "^{{[#/^]?(.*)}}$" "\\1" tag "${tag}")
+      string(REGEX REPLACE "^{{[#/]?(.*)}}$" "\\1" tag "${tag}")
       string(FIND "${known}" "\"${tag}\"" found)
       if(found EQUAL -1 AND NOT tag STREQUAL ".")
         message(FATAL_ERROR "nothing fills {{${tag}}} in ${path}") # CMake wraps long messages

@@ -177,9 +177,9 @@ static void test_page_carries_the_basis(void **state) {
   check_motion(page, &s);
   check_corners(page, s.triangles, 3 * s.info->triangle_count);
   check_tensor(page, "modes", s.modes, 6 * 16 * sizeof(double));
-  check_tensor(page, "linear", s.info->volume_linear, 2 * 6 * sizeof(double));
-  check_tensor(page, "quadratic", s.info->volume_quadratic, 2 * 36 * sizeof(double));
-  check_tensor(page, "cubic", s.info->volume_cubic, 2 * 216 * sizeof(double));
+  check_tensor(page, "volume_linear", s.info->volume_linear, 2 * 6 * sizeof(double));
+  check_tensor(page, "volume_quadratic", s.info->volume_quadratic, 2 * 36 * sizeof(double));
+  check_tensor(page, "volume_cubic", s.info->volume_cubic, 2 * 216 * sizeof(double));
   assert_null(strstr(page, "{{"));
   assert_null(strstr(page, "src="));
   assert_null(strstr(page, "@import"));
@@ -194,7 +194,7 @@ static void test_page_of_an_open_surface_has_no_volumes(void **state) {
   char *page = read_page();
   assert_non_null(strstr(page, "&quot;hasVolume&quot;:false"));
   assert_non_null(strstr(page, "&quot;breathLargest&quot;:12"));
-  assert_null(strstr(page, "tensor-linear"));
+  assert_null(strstr(page, "tensor-volume_linear"));
   free(page);
 }
 

@@ -55,13 +55,15 @@ static void test_sections_repeat_and_nest(void **state) {
 
 static void test_sections_ask_whether_there_is_something(void **state) {
   (void)state;
-  static const char text[] = "{{#a}}yes{{b}}{{/a}}{{^a}}no{{/a}}";
-  check(text, "{\"a\": {\"b\": 3}}", "yes3");
-  check(text, "{\"a\": true, \"b\": 4}", "yes4");
-  check(text, "{\"a\": false}", "no");
-  check(text, "{\"a\": null}", "no");
-  check(text, "{\"a\": []}", "no");
-  check(text, "{}", "no");
+  static const char text[] = "{{#a}}yes{{b}}{{/a}}.";
+  check(text, "{\"a\": {\"b\": 3}}", "yes3.");
+  check(text, "{\"a\": true, \"b\": 4}", "yes4.");
+  check(text, "{\"a\": \"x\", \"b\": 5}", "yes5.");
+  check(text, "{\"a\": 0, \"b\": 6}", "yes6.");
+  check(text, "{\"a\": false}", ".");
+  check(text, "{\"a\": null}", ".");
+  check(text, "{\"a\": []}", ".");
+  check(text, "{}", ".");
 }
 
 static void test_inner_names_come_first(void **state) {

@@ -33,6 +33,9 @@ supine_status supine_export_source_open(const char *path, export_source *source,
 /** Close it; a zeroed one is legal. */
 void supine_export_source_close(export_source *source);
 
+/** Widen a box, mm, to the source's vertices. */
+void supine_export_box(const export_source *source, double low[3], double high[3]);
+
 /** Compute the displacement of a vertex for a weight of 1 of a mode, mm. */
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 

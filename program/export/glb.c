@@ -71,7 +71,7 @@ static supine_status add_lungs(glb *g, json_int_t *nodes, double *end, supine_er
   status = supine_export_targets_normals(s, &g->options->breath, &g->targets, base, added, error);
   for (size_t lung = 0; status == SUPINE_OK && lung < s->info->lung_count; ++lung) {
     char name[64];
-    supine_export_glb_lung_name(s, lung, name);
+    (void)snprintf(name, sizeof name, "%s lung", s->info->lung_names[lung]);
     const json_int_t material =
         supine_export_glb_material(g, name, white, g->options->inside != NULL ? 0.3 : 1);
     const uint32_t *own = corners + begin[lung];

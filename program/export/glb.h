@@ -59,9 +59,6 @@ json_int_t supine_export_glb_add(glb *g, const glb_shape *shape);
 /** Append a material and return its index; below an `alpha` of 1 it is seen through. */
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3], double alpha);
 
-/** Write the name of a lung: "left lung", or "lung 0" where the basis names none. */
-void supine_export_glb_lung_name(const export_source *source, size_t lung, char name[64]);
-
 /** Return the extras of the file: how weights follow from gravity and volume. */
 json_t *supine_export_glb_extras(const glb *g, double largest_move);
 

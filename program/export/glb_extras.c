@@ -41,19 +41,6 @@ static const char resting_text[] =
     "have gone the same part of the way to full, which is max(0, -g_z)^2 * fullUprightGain * "
     "referenceVolume.";
 
-void supine_export_glb_lung_name(const export_source *source, size_t lung, char name[64]) {
-  const char *at = supine_basis_metadata(source->basis, "lungs");
-  for (size_t i = 0; i < lung && at != NULL; ++i) {
-    at = strchr(at, ',');
-    at = at == NULL ? NULL : at + 1;
-  }
-  if (at == NULL || strcspn(at, ",") == 0) {
-    (void)snprintf(name, 64, "lung %zu", lung);
-  } else {
-    (void)snprintf(name, 64, "%.*s lung", (int)strcspn(at, ","), at);
-  }
-}
-
 /* "mode_3", and "bend_3" for the same mode's bend. */
 static json_t *target_names(const glb *g) {
   const size_t k = g->source->info->mode_count;

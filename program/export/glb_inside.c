@@ -199,10 +199,8 @@ static void add_shapes(glb *g, const inside *in, size_t *count, json_int_t *node
       corners[p] = in->corners + begin[0];
       corner_count[p] = begin[1] - begin[0];
     }
-    char lung_name[64];
     char name[80];
-    supine_export_glb_lung_name(g->source, lung, lung_name);
-    (void)snprintf(name, sizeof name, "inside %s", lung_name);
+    (void)snprintf(name, sizeof name, "inside %s lung", g->source->info->lung_names[lung]);
     const glb_shape shape = {name, &in->source, lung,    in->normals,  NULL,
                              NULL, in->parts,   corners, corner_count, material};
     if (in->lung_begin[lung] < in->lung_begin[lung + 1] && g->status == SUPINE_OK) {

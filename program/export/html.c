@@ -124,13 +124,6 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
   write_packed(p, file, name, status, packed);
 }
 
-static void add_to_box(const export_source *s, double low[3], double high[3]) {
-  for (size_t i = 0; i < 3 * s->info->vertex_count; ++i) {
-    low[i % 3] = fmin(low[i % 3], (double)s->vertices[i]);
-    high[i % 3] = fmax(high[i % 3], (double)s->vertices[i]);
-  }
-}
-
 /* Choose the sizes of counts: fine enough for positions to 0.02 mm, and so that all fit. */
 static void find_units(page *p) {
   static const double step = 0.005;
@@ -141,13 +134,13 @@ static void find_units(page *p) {
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   double largest = 0;
   double largest_inside = 0;
-  add_to_box(s, low, high);
+  supine_export_box(s, low, high);
   for (size_t i = 0; i < s->info->vertex_count * k; ++i) {
     largest =
         fmax(largest, fabs((double)s->coefficients[i]) * length_of(s->direction + 3 * (i / k)));
   }
   if (inside != NULL) {
-    add_to_box(inside, low, high);
+    supine_export_box(inside, low, high);
     for (size_t i = 0; i < 3 * k * inside->info->vertex_count; ++i) {
       largest_inside = fmax(largest_inside, fabs((double)inside->coefficients[i]));
     }
@@ -161,14 +154,20 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* A tensor of doubles as the basis has it. */
-static void write_all(FILE *file, const char *name, const export_source *s, const char *of) {
-  const supine_tensor *tensor = supine_basis_tensor(s->basis, of);
-  size_t bytes = sizeof(double);
-  for (size_t i = 0; i < tensor->rank; ++i) {
-    bytes *= tensor->shape[i];
+/* Write the basis' tensors of doubles as they are. */
+static void write_doubles(FILE *file, const supine_basis *basis) {
+  static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
+                                      "volume_linear", "volume_quadratic", "volume_cubic"};
+  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+    const supine_tensor *tensor = supine_basis_tensor(basis, names[i]);
+    size_t bytes = sizeof(double);
+    for (size_t axis = 0; tensor != NULL && axis < tensor->rank; ++axis) {
+      bytes *= tensor->shape[axis];
+    }
+    if (tensor != NULL) {
+      write_tensor(file, names[i], tensor->data, bytes);
+    }
   }
-  write_tensor(file, name, tensor->data, bytes);
 }
 
 /* Each map's 256 colours as hexadecimal digits. */
@@ -248,33 +247,12 @@ static json_t *describe_from(const page *p) {
 }
 
 static json_t *describe(const page *p) {
-  static const char *const keys[] = {"lungs",
-                                     "modes",
-                                     "force",
-                                     "direction",
-                                     "direction_constants",
-                                     "stiffness",
-                                     "reference_volume_ml",
-                                     "scan_volume_ml",
-                                     "scanned",
-                                     "full_upright_gain",
-                                     "law",
-                                     "error_rms_percent",
-                                     "error_p95_percent",
-                                     "error_rms_mm",
-                                     "error_volume_ml",
-                                     "expected_error_mm",
-                                     "resting_known",
-                                     "scan_state",
-                                     "attribution",
-                                     "made_by"};
   const supine_basis_info *info = p->source->info;
+  size_t count = 0;
+  const supine_metadata *all = supine_basis_all_metadata(p->source->basis, &count);
   json_t *metadata = json_object();
-  for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
-    const char *value = supine_basis_metadata(p->source->basis, keys[i]);
-    if (value != NULL) {
-      (void)json_object_set_new(metadata, keys[i], json_string(value));
-    }
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_object_set_new(metadata, all[i].key, json_string(all[i].value));
   }
   json_t *title = json_string(p->shown->title);
   const export_breath *breath = &p->shown->breath;
@@ -307,19 +285,10 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   write_rows(p, file, "direction", s, 4, direction_row);
   write_rows(p, file, "coefficients", s, k, coefficient_row);
   write_corners(p, file, "triangles", s, p->corners);
-  write_tensor(file, "modes", s->modes, k * s->terms * sizeof *s->modes);
   if (s->info->normal_count > 0) {
     write_rows(p, file, "normals", s, (s->info->normal_count + 2) / 3 * 9, normal_row);
-    write_all(file, "normal-weights", s, "normal_weights");
   }
-  if (s->info->has_rest) {
-    write_all(file, "resting", s, "resting_volume");
-  }
-  if (s->info->has_volume) {
-    write_all(file, "linear", s, "volume_linear");
-    write_all(file, "quadratic", s, "volume_quadratic");
-    write_all(file, "cubic", s, "volume_cubic");
-  }
+  write_doubles(file, s->basis);
   if (p->shown->inside != NULL) {
     const export_source *inside = p->shown->inside;
     write_rows(p, file, "inside-vertices", inside, 3, place_row);

@@ -36,6 +36,13 @@ void supine_export_source_close(export_source *source) {
   *source = (export_source){0};
 }
 
+void supine_export_box(const export_source *source, double low[3], double high[3]) {
+  for (size_t i = 0; i < 3 * source->info->vertex_count; ++i) {
+    low[i % 3] = fmin(low[i % 3], (double)source->vertices[i]);
+    high[i % 3] = fmax(high[i % 3], (double)source->vertices[i]);
+  }
+}
+
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]) {
   const size_t k = source->info->mode_count;
   for (size_t axis = 0; axis < 3; ++axis) {

@@ -71,16 +71,13 @@ static supine_status find_ranges(const export_source *source, const export_breat
 }
 
 static void find_middle(const export_source *source, export_targets *targets) {
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  supine_export_box(source, low, high);
   targets->reach = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
-    double low = INFINITY;
-    double high = -INFINITY;
-    for (size_t i = 0; i < source->info->vertex_count; ++i) {
-      low = fmin(low, (double)source->vertices[3 * i + axis]);
-      high = fmax(high, (double)source->vertices[3 * i + axis]);
-    }
-    targets->middle[axis] = (low + high) / 2;
-    targets->reach = fmax(targets->reach, (high - low) / 2);
+    targets->middle[axis] = (low[axis] + high[axis]) / 2;
+    targets->reach = fmax(targets->reach, (high[axis] - low[axis]) / 2);
   }
 }
 

@@ -22,7 +22,7 @@ typedef struct scope {
 
 /* What stands between {{ and }}. */
 typedef struct tag {
-  char kind; /* '#', '^', '/' or 0 */
+  char kind; /* '#', '/' or 0 */
   const char *name;
   size_t length;
   const char *begin, *end; /* of the whole of it; end NULL: there is no other */
@@ -36,7 +36,7 @@ static tag next_tag(const char *at, const char *end) {
     found.begin = open;
     found.end = close + 2;
     found.name = open + 2;
-    if (memchr("#^/", *found.name, 3) != NULL) {
+    if (memchr("#/", *found.name, 2) != NULL) {
       found.kind = *found.name++;
       found.end += found.end < end && *found.end == '\n';
     }
@@ -105,7 +105,7 @@ static tag find_end(const char *at, const char *end) {
   size_t depth = 1;
   tag found = next_tag(at, end);
   while (found.end != NULL) {
-    depth += found.kind == '#' || found.kind == '^';
+    depth += found.kind == '#';
     depth -= found.kind == '/';
     if (depth == 0) {
       return found;
@@ -118,15 +118,14 @@ static tag find_end(const char *at, const char *end) {
 static void fill_section(const supine_template *t, const tag *open, const char *end,
                          const scope *around, FILE *file) {
   const json_t *value = look_up(around, open->name, open->length);
-  const bool there = value != NULL && !json_is_false(value) && !json_is_null(value) &&
-                     !(json_is_array(value) && json_array_size(value) == 0);
-  if (open->kind == '^' ? !there : there && !json_is_array(value)) {
-    const scope inner = {value, around};
-    fill(t, open->end, end, there ? &inner : around, file);
-  }
-  for (size_t i = 0; open->kind == '#' && i < json_array_size(value); ++i) {
-    const scope inner = {json_array_get(value, i), around};
+  const scope inner = {value, around};
+  if (json_is_object(value) || json_is_string(value) || json_is_number(value) ||
+      json_is_true(value)) {
     fill(t, open->end, end, &inner, file);
+  }
+  for (size_t i = 0; i < json_array_size(value); ++i) {
+    const scope element = {json_array_get(value, i), around};
+    fill(t, open->end, end, &element, file);
   }
 }
 

@@ -6,7 +6,6 @@
  *                             filled with the same data, anything else as it is
  *     {{#name}} ... {{/name}} once for each element of a list, once for an object or a value that
  *                             is true; not at all where there is none
- *     {{^name}} ... {{/name}} where {{#name}} writes nothing
  *     {{.}}                   the element itself
  *
  * Inside a section its element's names come first, then those around it. A line's end right after

@@ -152,10 +152,9 @@ json_t *supine_report_postures(const supine_comparison *c) {
     }
     for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
-          lungs, json_pack("{s:o, s:o, s:o}", "ml",
-                           json_sprintf("%.0f", c->posture[i].volume[lung]), "percent",
-                           json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung]),
-                           "breath", json_sprintf("%+.1f", c->posture[i].gain[lung])));
+          lungs,
+          json_pack("{s:o, s:o}", "ml", json_sprintf("%.0f", c->posture[i].volume[lung]), "percent",
+                    json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung])));
     }
     for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
       if (strcmp(published[j].posture, c->postures.item[i].name) == 0) {

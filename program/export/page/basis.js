@@ -81,14 +81,14 @@ function readBasis() {
   basis.corners = takeTriangles('triangles', basis.triangles);
   basis.mixes = takeTensor('modes', Float64Array);
   if (basis.hasVolume) {
-    basis.linear = takeTensor('linear', Float64Array);
-    basis.quadratic = takeTensor('quadratic', Float64Array);
-    basis.cubic = takeTensor('cubic', Float64Array);
+    basis.linear = takeTensor('volume_linear', Float64Array);
+    basis.quadratic = takeTensor('volume_quadratic', Float64Array);
+    basis.cubic = takeTensor('volume_cubic', Float64Array);
   }
   basis.words = Math.ceil(basis.normalModes / 3);
   basis.normals = basis.words ? takeNormals(n, basis.words) : new Uint32Array(0);
-  basis.turns = basis.words ? takeTensor('normal-weights', Float64Array) : null;
-  basis.resting = basis.hasResting ? takeTensor('resting', Float64Array) : null;
+  basis.turns = basis.words ? takeTensor('normal_weights', Float64Array) : null;
+  basis.resting = basis.hasResting ? takeTensor('resting_volume', Float64Array) : null;
   basis.byLung = basis.resting?.length > 9;
   basis.lungs = basis.lungBegin.length - 1;
   const names = (basis.metadata.lungs ?? '').split(',');
