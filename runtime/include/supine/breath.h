@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The lung's pressure-volume relation, and the breath that it shapes ([Santhanam2008] III-B, V):
- * what `supine breathe` breathes by. A frame of a basis that breathes is
+ * The pressure-volume relation of a lung, and the breath that follows from it ([Santhanam2008]
+ * III-B, V), as in `supine breathe`. One frame of a breathing basis:
  *
  *     supine_breath_evaluate(&pv, &breath, 1, &time, &volume, NULL, &error);   mL above rest
- *     supine_basis_weights(basis, gravity, weights);
- *     supine_basis_resting_volume(basis, gravity, &rest);
- *     supine_basis_scale(basis, weights, rest + volume, &scale, &error);
- *     supine_deform(basis, weights, scales, xyz);                              `scale` for each
- * lung
+ *     state.volume = (supine_volume){SUPINE_VOLUME_REST, volume};
+ *     supine_basis_pose(basis, &state, &pose, &error);
+ *     supine_deform(basis, &pose, xyz);
  *
  * Each limb of the P-V loop, inhale and exhale, is a second-order differential equation for the
  * volume V over the normalised pressure x, -1 to 1 over the limb's range, driven by a control
@@ -17,22 +15,22 @@
  *     V''(x) = u(x) V'(x)      u(x) = c_1 P_0(x) + c_2 P_1(x) + ... + c_5 P_4(x)
  *     x = (2 P - P_low - P_high) / (P_high - P_low)      V(-1) = V_low      V(1) = V_high
  *
- * The source gives this form and not the functions; these are chosen because:
+ * The source gives the form of the equation but not the functions. These are chosen because:
  * - V' is the compliance, so u is the relative rate at which compliance changes as the lung
- *   inflates. Compliance stays positive whatever the parameters, so V rises with P all the way and
- *   P(V) exists. A control function that is added (V'' = u) can fold a noisy limb over, and its V
- *   is a polynomial, which does not follow the flat ends of a stiff lung's sigmoid.
- * - Constant u is Salazar-Knowles' V = Vmax (1 - exp(-k P)) exactly, with c_1 = -k (P_high - P_low)
- *   / 2. Venegas' sigmoid V = a + b / (1 + exp(-(P - c) / d)) is u = -tanh((P - c) / 2d) in units
- *   of 1/d: smooth and bounded, what few polynomials follow.
+ *   inflates. Compliance is positive for all parameters, so V rises with P everywhere and P(V)
+ *   exists. With an added control function (V'' = u) a noisy limb can fold over, and V is a
+ *   polynomial, which does not follow the flat ends of a stiff lung's sigmoid.
+ * - A constant u is exactly Salazar-Knowles' V = Vmax (1 - exp(-k P)), with c_1 = -k (P_high -
+ * P_low) / 2. Venegas' sigmoid V = a + b / (1 + exp(-(P - c) / d)) is u = -tanh((P - c) / 2d) in
+ * units of 1/d: smooth and bounded, so that few polynomials approximate it.
  * - Legendre polynomials P_0 to P_4 are orthogonal over the range, so that the parameters are as
  *   independent as evenly spread samples allow. c_1 is half the logarithm of the ratio of the
  *   compliances at the two ends (negative: stiffer when full), c_2 < 0 puts the greatest compliance
  *   inside the range (a sigmoid), c_3 skews it, c_4 and c_5 sharpen its knees.
  *
- * Pressures are cmH2O (transpulmonary for a lung, airway for lung and chest wall together; the
- * samples decide), volumes mL. Nothing is said outside the range of a limb's samples.
- * Everything here is thread-safe and allocates nothing.
+ * Pressures are in cmH2O: transpulmonary for a lung, airway for lung and chest wall together,
+ * whichever was sampled. Volumes are in mL. A limb is not defined outside its range. Every function
+ * is thread-safe and allocates nothing.
  *
  * [Santhanam2008]  Santhanam, Imielinska, Davenport, Kupelian, Rolland, IEEE Trans. Inf. Technol.
  *                  Biomed. 12(2), 2008
@@ -67,15 +65,16 @@ typedef struct supine_pv_curve {
   double control[SUPINE_PV_CONTROLS]; /**< c_1 to c_5 */
 } supine_pv_curve;
 
-/** Both limbs of a lung; the same twice where there is no hysteresis to speak of. */
+/** Both limbs of a lung; equal without hysteresis. */
 typedef struct supine_pv {
   supine_pv_curve limb[SUPINE_PV_LIMB_COUNT];
 } supine_pv;
 
-/** "inhale" or "exhale"; never NULL. */
+/** Return "inhale" or "exhale"; never NULL. */
 SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
 
-/** The normal adult lung that stands in where nothing was measured, 0 to 30 cmH2O, 0 to 6000 mL.
+/** Return the normal adult lung, the default where nothing was measured: 0 to 30 cmH2O, 0 to 6000
+ * mL.
  *
  * Exhale: Salazar-Knowles with k = ln 2 / 7.58 cmH2O, the mean half-inflation pressure of 20 normal
  * subjects [Salazar1964], and 6000 mL, an adult's total lung capacity, at 30 cmH2O. Inhale: a
@@ -85,18 +84,19 @@ SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
  * lungs. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
-/** Whether a limb's numbers are finite, its ranges rise and its parameters are within bounds.
- * @retval SUPINE_ERROR_ARGUMENT */
+/** Check a limb: finite numbers, rising ranges, and parameters within bounds.
+ * @retval SUPINE_ERROR_ARGUMENT  it fails one of these */
 SUPINE_API supine_status supine_breath_curve_check(const supine_pv_curve *curve,
                                                    supine_error *error);
 
-/** V(P) and the compliance dV/dP. The equation is linear in V and has the solution
+/** Compute the volume V(P) and the compliance dV/dP. The equation is linear in V and has the
+ * solution
  *
  *     V(x) = V_low + (V_high - V_low) I(x) / I(1)        I(x) = integral from -1 to x of exp(U)
- *     U(x) = integral from -1 to x of u = c_1 (x + 1) + sum over n of c_n+1 (P_n+1 - P_n-1) / (2n +
- * 1)
+ *     U(x) = integral from -1 to x of u
+ *          = c_1 (x + 1) + sum over n of c_n+1 (P_n+1 - P_n-1) / (2 n + 1)
  *
- * whose outer integral is Gauss-Legendre's, 16 points in each of 32 parts of the range. Cost: 512
+ * with I by Gauss-Legendre quadrature, 16 points in each of 32 parts of the range. Cost: 512
  * exponentials, and 16 for each pressure.
  *
  * @param pressures    [count] cmH2O within the limb's range, in any order
@@ -107,7 +107,8 @@ SUPINE_API supine_status supine_breath_curve_evaluate(const supine_pv_curve *cur
                                                       const double *pressures, double *volumes,
                                                       double *compliances, supine_error *error);
 
-/** P(V), the inverse of supine_breath_curve_evaluate; it exists for every limb.
+/** Compute the pressure P(V), the inverse of supine_breath_curve_evaluate; it exists for every
+ * limb.
  *
  * @param volumes    [count] mL within the limb's range, in any order
  * @param pressures  [count] cmH2O, written
@@ -117,16 +118,16 @@ SUPINE_API supine_status supine_breath_invert(const supine_pv_curve *curve, size
                                               const double *volumes, double *pressures,
                                               supine_error *error);
 
-/** How pressure goes from rest to its peak and back. */
+/** The course of pressure from rest to its peak and back. */
 typedef enum supine_pv_course {
   SUPINE_PV_COSINE = 0,    /**< half a cosine each way: quiet breathing */
   SUPINE_PV_RAMP,          /**< straight lines: a ventilator's pressure ramp */
-  SUPINE_PV_CONSTANT_FLOW, /**< volume, not pressure, goes in straight lines: [Santhanam2008] V,
-                                500 mL over 5 s of inhalation, 1.5 mL in each step of 15 ms */
+  SUPINE_PV_CONSTANT_FLOW, /**< straight lines of volume instead of pressure: [Santhanam2008] V, 500
+                              mL in 5 s of inhalation, 1.5 mL in each step of 15 ms */
   SUPINE_PV_COURSE_COUNT
 } supine_pv_course;
 
-/** A breath, over and over. */
+/** A breath that repeats. */
 typedef struct supine_pv_breath {
   double tidal;           /**< mL inhaled, > 0 */
   double rate;            /**< breaths a minute, > 0 */
@@ -135,13 +136,15 @@ typedef struct supine_pv_breath {
   supine_pv_course course;
 } supine_pv_breath;
 
-/** 500 mL, 12 a minute, inhaling a third of the time, from 5 cmH2O, half cosines. */
+/** Return a breath of 500 mL, 12 times a minute, a third of the time inhaling, from 5 cmH2O, of
+ * half cosines. */
 SUPINE_API supine_pv_breath supine_breath_default(void);
 
-/** Volume above rest, and pressure, at given times. A breath begins at time 0, at rest.
+/** Compute the volume above rest, and the pressure, at given times. A breath begins at time 0, at
+ * rest.
  *
- * The inhale limb says which peak pressure holds the tidal volume over rest; both limbs are
- * followed between rest and that pressure and scaled to the tidal volume, so that the loop closes:
+ * The peak pressure is where the inhale limb holds the tidal volume above rest. Both limbs are
+ * followed between rest and that pressure, and scaled to the tidal volume so that the loop closes:
  *
  *     V(t) = tidal (V_limb(P(t)) - V_limb(P_rest)) / (V_limb(P_peak) - V_limb(P_rest))
  *
@@ -151,9 +154,9 @@ SUPINE_API supine_pv_breath supine_breath_default(void);
  * @param times      [count] s, any finite
  * @param volumes    [count] mL, written; NULL: not wanted
  * @param pressures  [count] cmH2O, written; NULL: not wanted
- * @retval SUPINE_ERROR_ARGUMENT  a breath outside its documented ranges, a rest pressure outside a
- *                                limb, or a tidal volume or its peak pressure past a limb's end
- * @retval SUPINE_ERROR_NUMERICAL  a limb so flat between rest and peak that it holds no air
+ * @retval SUPINE_ERROR_ARGUMENT   the breath is outside its documented ranges, the pressure at rest
+ * is outside a limb, or the tidal volume or its peak pressure is beyond the end of a limb
+ * @retval SUPINE_ERROR_NUMERICAL  a limb is so flat between rest and peak that it holds no air
  * Cost: some 20 microseconds, and less than one for each time. */
 SUPINE_API supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
                                                 size_t count, const double *times, double *volumes,

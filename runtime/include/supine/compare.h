@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Comparing orientations: distances between deformed lungs, and who ventilates where.
+ * Comparisons of orientations: distances between deformed lungs, and ventilation by height.
  *
- * Averages are over the rest surface's area: vertex i counts with a_i, a third of its triangles'
- * area, over the sum of all. A deformed state is a supine_pose. */
+ * Averages are over the area of the reference surface: the weight a_i of vertex i is a third of the
+ * area of its triangles, divided by the area of all. A deformed state is a supine_pose. */
 #ifndef SUPINE_COMPARE_H
 #define SUPINE_COMPARE_H
 
@@ -16,11 +16,10 @@
 extern "C" {
 #endif
 
-/** What comparisons of one basis need: areas and Gram matrices. Nothing changes it, so that any
- * number of threads may use one. */
+/** Areas and Gram matrices of a basis. Any number of threads may use one, as nothing changes it. */
 typedef struct supine_compare supine_compare;
 
-/** Makes it: the Gram matrix of each lung and axis j, by one pass over the vertices,
+/** Compute the Gram matrix of each lung and axis j, in one pass over the vertices:
  *
  *     G_j,kl = sum over i of a_i d_ij^2 c_ik c_il       (vector fields: a_i c_ijk c_ijl)
  *
@@ -30,20 +29,21 @@ typedef struct supine_compare supine_compare;
  * @retval SUPINE_ERROR_MEMORY */
 SUPINE_API supine_status supine_compare_create(const supine_basis *basis, supine_compare **compare,
                                                supine_error *error);
-/** Releases it; NULL is legal. */
+/** Free a comparison; NULL is legal. */
 SUPINE_API void supine_compare_destroy(supine_compare *compare);
 
-/** Area of the rest surface, mm^2. */
+/** Return the area of the reference surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
 
-/** supine_basis_pose or, where `rms` is above 0, the gain at which the RMS displacement is that,
- * mm: for open surfaces.
- * @retval as supine_basis_pose; SUPINE_ERROR_NUMERICAL also where nothing moves */
+/** Compute supine_basis_pose or, with `rms` above 0, the pose whose RMS displacement is that: for
+ * open surfaces.
+ * @param rms  mm, or 0
+ * @retval as supine_basis_pose; SUPINE_ERROR_NUMERICAL also if nothing moves */
 SUPINE_API supine_status supine_compare_pose(const supine_compare *compare,
                                              const supine_state *state, double rms,
                                              supine_pose *pose, supine_error *error);
 
-/** RMS distance between two poses, mm, from the Gram matrices alone:
+/** Compute the RMS distance between two poses, mm, from the Gram matrices alone:
  *
  *     d^2 = sum over lungs and axes of q^T G q,     q = A w - A' w'
  *
@@ -52,14 +52,14 @@ SUPINE_API supine_status supine_compare_pose(const supine_compare *compare,
 SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
                                      const supine_pose *from);
 
-/** Distance of every vertex between two poses, mm.
+/** Compute the distance of every vertex between two poses, mm.
  * @param from      NULL: the reference surface
  * @param distance  [N], written
  * Cost: one pass, 3 K + 6 multiplications per vertex. */
 SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
                                          const supine_pose *from, float *distance);
 
-/** How distances are spread over the surface, mm. */
+/** Statistics of distances over the surface, mm. */
 typedef struct supine_distance_statistics {
   double mean; /**< area-weighted */
   double rms;  /**< area-weighted */
@@ -67,37 +67,38 @@ typedef struct supine_distance_statistics {
   double max;  /**< of any vertex */
 } supine_distance_statistics;
 
-/** Statistics of distances [N], none negative. Exact, by four passes, without allocation. */
+/** Compute the statistics of distances [N], none of which is negative: exactly, in four passes,
+ * without allocation. */
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Squared displacement at gain 1, averaged over area and over all directions of gravity,
- * that the harmonics of each band carry, mm^2:
+/** Compute the energy of each band of harmonics, mm^2: the part of the squared displacement at gain
+ * 1 that it gives, averaged over the area and over all directions of gravity,
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm       M_lm: column lm of `modes`
  *
- * Odd bands change sign with gravity, even ones do not.
+ * Odd bands change their sign with gravity, even bands do not.
  * @param energy  [L + 1], written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
-/** Directions that differ most, at one volume. */
+/** The directions of gravity that differ most, at one volume. */
 typedef struct supine_extremes {
-  size_t directions;  /**< sampled in which the lungs reach the volume */
-  double pair[2][3];  /**< the two directions of gravity that differ most, unit */
+  size_t directions;  /**< sampled directions in which the lungs reach the volume */
+  double pair[2][3];  /**< the two directions that differ most, unit */
   double pair_rms;    /**< RMS distance between them, mm */
   double farthest[3]; /**< the direction that differs most from the given one, unit */
   double farthest_rms;
 } supine_extremes;
 
-/** Searches the sphere. Compares a golden-angle spiral of directions with each other and with
- * `from`, each to each, then moves the best ones along the sphere, by steps that halve from the
- * spiral's spacing to 1e-6 rad, while that raises the distance. A maximum whose whole summit is
- * narrower than the spacing, 3.5 / sqrt(directions) rad, can be missed. Directions in which the
- * lungs cannot reach the volume do not take part.
+/** Search the sphere for the directions that differ most. Compare the directions of a golden-angle
+ * spiral and `from` with each other, then move the best ones along the sphere while that raises the
+ * distance, by steps that halve from the spacing of the spiral to 1e-6 rad. A maximum narrower than
+ * the spacing, 3.5 / sqrt(directions) rad, can be missed. Directions in which the lungs cannot
+ * reach the volume are left out.
  *
- * @param from        posture and volume; the volume is that of every direction
+ * @param from        posture, and the volume in every direction
  * @param rms         mm, see supine_compare_pose
- * @param directions  of the spiral, 2 to 16384; 2048 are 4.5 degrees apart
+ * @param directions  in the spiral, 2 to 16384; 2048 are 4.5 degrees apart
  * Cost: 3 G K directions^2 / 2 multiplications; allocates 6 G K directions numbers meanwhile.
  * @retval SUPINE_ERROR_ARGUMENT   directions out of range, or `from` is zero or not finite
  * @retval SUPINE_ERROR_NUMERICAL  `from`, or all but one, cannot reach the volume
@@ -107,28 +108,28 @@ SUPINE_API supine_status supine_compare_search(const supine_compare *compare,
                                                size_t directions, supine_extremes *extremes,
                                                supine_error *error);
 
-/** The tissue of one lung between two heights. */
+/** The part of one lung between two heights. */
 typedef struct supine_slab {
   double volume; /**< before the breath, mL */
-  double gain;   /**< mL that it gains; over `volume`, its regional expansion */
+  double gain;   /**< mL; divided by `volume`, the regional expansion */
 } supine_slab;
 
 /** Most slabs. */
 enum { SUPINE_SLABS_MAX = 64 };
 
-/** Ventilation by height: cuts the surface before a breath into slabs of equal thickness across
- * gravity, the lungs' common lowest and highest points its ends, and finds what the tissue in each
- * gains.
+/** Compute ventilation by height: cut the surface before a breath into slabs of equal thickness
+ * across gravity, from the highest to the lowest point of all lungs, and find the volume that the
+ * tissue in each gains.
  *
- *     gain = volume that the slab's part of the surface sweeps
+ *     gain = the volume that the slab's part of the surface sweeps
  *            + A mean(u.g) of its lower cut - A mean(u.g) of its upper cut
  *
- * The sweep of each triangle is exact, so that a lung's slabs sum to the volume that it gains. A
- * cut inside the lung has no vertices: its area A is exact, and its mean displacement along gravity
- * is that of the plane fitted (least squares) to u.g along the cut's outline, at the cut's
- * centroid. This is exact for translations, and to first order for every displacement that is
- * linear in position: a turning lung does not ventilate, one that swells evenly expands by the same
- * share everywhere.
+ * The sweep of each triangle is exact, so that the slabs of a lung sum to the volume that it gains.
+ * A cut inside the lung has no vertices: its area A is exact, and its mean displacement along
+ * gravity is the value at its centroid of the plane fitted (least squares) to u.g along its
+ * outline. This is exact for translations and, to first order, for displacements that are linear in
+ * position: a turning lung does not ventilate, and one that swells evenly expands by the same
+ * fraction everywhere.
  *
  * @param gravity  [3], any length but 0
  * @param from     [N, 3] positions before the breath; NULL: the file's surface
@@ -136,7 +137,7 @@ enum { SUPINE_SLABS_MAX = 64 };
  * @param count    1 to SUPINE_SLABS_MAX
  * @param slabs    [G, count], uppermost first, written
  * Cost: one pass over the triangles.
- * @retval SUPINE_ERROR_ARGUMENT      no direction, or a count out of range
+ * @retval SUPINE_ERROR_ARGUMENT      gravity has no direction, or the count is out of range
  * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes */
 SUPINE_API supine_status supine_compare_slabs(const supine_basis *basis, const double gravity[3],
                                               const float *from, const float *xyz, size_t count,

@@ -3,20 +3,20 @@
  * The run-time library: open a basis file, then deform its lungs for any direction of gravity and
  * any volume.
  *
- *     x_ij = p_ij + A_j (sum over k of w_k(g) c_ik) d_ij      w_k(g) = sum over lm of modes[k, lm]
- * Y_lm(g)
+ *     x_ij   = p_ij + A_j (sum over k of w_k(g) c_ik) d_ij
+ *     w_k(g) = sum over l, m of modes[k, lm] Y_lm(g)
  *
- * for axis j = x, y, z; the gains A_j of each lung follow from its volume. A program parses or
- * fills a supine_state (posture and volume), asks supine_basis_pose for its weights and gains, and
- * supine_deform for the positions.
+ * x_ij is coordinate j (x, y, z) of vertex i, p_ij the same of the reference surface, d_ij its
+ * direction and c_ik its coefficient of mode k. The weights w_k depend on gravity g, the gains A_j
+ * of each lung on its volume. A program parses or fills in a supine_state (posture and volume),
+ * gets its weights and gains from supine_basis_pose, and the positions from supine_deform.
  *
- * Nothing allocates, reads files or locks after opening; any number of threads may use one basis.
- * Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine (0,1,0),
- * prone (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
+ * After opening, no function allocates, reads files or locks; any number of threads may use one
+ * basis. Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine
+ * (0,1,0), prone (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
  *
- * Structs grow without breaking a program that was compiled before: those that the library owns
- * and shows (supine_basis_info) at their end, and options begin with their own size. All others
- * stay as they are. */
+ * A newer library works with a program that was compiled before: supine_basis_info only grows at
+ * its end, supine_basis_options begins with its size, and no other struct changes. */
 #ifndef SUPINE_RUNTIME_H
 #define SUPINE_RUNTIME_H
 
@@ -33,28 +33,28 @@
 extern "C" {
 #endif
 
-/** Most modes (columns of coefficients) that a basis file may have. */
+/** Most modes of a basis, the columns of its coefficients. */
 enum { SUPINE_MODES_MAX = 256 };
-/** Most lungs in one file. */
+/** Most lungs of a basis. */
 enum { SUPINE_LUNGS_MAX = 16 };
 /** Most modes of the normals. */
 enum { SUPINE_NORMAL_MODES_MAX = 64 };
 
 typedef struct supine_basis supine_basis;
 
-/** How an open basis keeps its numbers in memory. The file always has float32. */
+/** How an open basis keeps its numbers in memory. In the file they are float32. */
 typedef enum supine_storage {
-  SUPINE_STORAGE_AUTO = 0, /**< the smallest of MIXED, INT16 and EXACT that errs by 0.005 mm at most
-                                (see storage_error) */
-  SUPINE_STORAGE_EXACT,    /**< everything as in the file */
-  SUPINE_STORAGE_INT16,    /**< 16-bit coefficients, a scale for each mode; compact directions and
-                                rest positions */
-  SUPINE_STORAGE_MIXED,    /**< INT16, but the last three in eight modes at 10 or 11 bits; INT16
-                                itself where there are fewer than eight modes */
+  SUPINE_STORAGE_AUTO = 0, /**< the smallest of MIXED, INT16 and EXACT whose storage_error is at
+                              most 0.005 mm */
+  SUPINE_STORAGE_EXACT,    /**< float32, as in the file */
+  SUPINE_STORAGE_INT16,    /**< 16-bit coefficients with a scale for each mode; directions and
+                                reference positions of 21 bits */
+  SUPINE_STORAGE_MIXED, /**< INT16, but the last 3 of every 8 modes have 10 or 11 bits; the same as
+                             INT16 below 8 modes */
   SUPINE_STORAGE_COUNT
 } supine_storage;
 
-/** Which code evaluates. All give the same positions within supine_basis_error. */
+/** The instructions that evaluate. All give the same positions within supine_basis_error. */
 typedef enum supine_simd {
   SUPINE_SIMD_AUTO = 0, /**< the widest that this processor has */
   SUPINE_SIMD_PORTABLE, /**< vectors of four numbers: SSE2, NEON, WebAssembly */
@@ -63,59 +63,60 @@ typedef enum supine_simd {
   SUPINE_SIMD_COUNT
 } supine_simd;
 
-/** How to open a basis; zeros after the size are the defaults. */
+/** Options of opening a basis; zeros after the size are the defaults. */
 typedef struct supine_basis_options {
   size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
-  bool without_normals; /**< as if the file had none: saves 6 bytes a vertex and normal mode */
+  bool without_normals; /**< ignore the file's normals: saves 12 bytes a vertex for 3 modes */
 } supine_basis_options;
 
-/** What a basis holds, owned by it and as in the file: nothing is copied. */
+/** The content of an open basis, which owns it. Arrays point into the file's memory. */
 typedef struct supine_basis_info {
   size_t vertex_count;
   size_t triangle_count;
   size_t mode_count; /**< K */
   size_t band;       /**< L */
-  size_t lung_count; /**< G; the vertices of lung j are lung_begin[j] <= i < lung_begin[j + 1] */
+  size_t lung_count; /**< G; the vertices of lung g are lung_begin[g] <= i < lung_begin[g + 1] */
   const size_t *lung_begin; /**< [G + 1] */
-  bool vector;     /**< three coefficients per vertex and mode instead of one and a direction */
-  bool has_volume; /**< the surface is closed: volumes can be asked for */
-  supine_storage storage;  /**< as chosen, never AUTO */
-  supine_simd simd;        /**< as chosen, never AUTO */
+  bool vector;            /**< kind vector: a vertex has three coefficients a mode and no direction;
+                               false: kind scalar, one coefficient a mode and a direction */
+  bool has_volume;        /**< the surface is closed, and states may have volumes */
+  supine_storage storage; /**< the storage in use, never AUTO */
+  supine_simd simd;       /**< the instructions in use, never AUTO */
   double bytes_per_vertex; /**< that an evaluation reads */
-  /** Bound, in mm, on the error of storage and rounding at a breath of 500 mL (on an open surface:
-   * where the largest displacement is 20 mm), over the 26 directions of the faces, edges and
-   * corners of a cube. supine_basis_error gives it for any other. */
+  /** Bound, in mm, on the error of storage and rounding 500 mL above the reference (on an open
+   * surface: where the largest displacement is 20 mm), over the 26 directions of the faces, edges
+   * and corners of a cube. supine_basis_error has the bound for any pose. */
   double storage_error;
-  const char *const *lung_names; /**< [G] "left", ...; numbers from 0 where the file names none */
-  const float *bounds;   /**< [G, 2, 3] lowest and highest corner of each lung's box at rest, mm */
-  const float *vertices; /**< [N, 3] rest positions, mm, LPS */
-  const uint32_t *triangles;      /**< [M, 3] */
-  const float *direction;         /**< [N, 3] d_i, mm; NULL where the kind is vector */
-  const float *coefficients;      /**< [N, K] c_ik, or [N, 3, K], mm, where the kind is vector */
-  const double *modes;            /**< [K, (L+1)^2] */
-  const double *volume_linear;    /**< [G, A, K] the volumes' forms, mL, see
-                                       supine_volume_contract; A: volume_axes; these three NULL
-                                       where has_volume is false */
+  const char *const *lung_names;  /**< [G] "left", ...; a lung without a name has its number */
+  const float *bounds;            /**< [G, 2, 3] lowest and highest corner of the box around each
+                                       lung of the reference surface, mm */
+  const float *vertices;          /**< [N, 3] p, reference positions, mm, LPS */
+  const uint32_t *triangles;      /**< [M, 3] vertices of each triangle */
+  const float *direction;         /**< [N, 3] d, mm; NULL if the kind is vector */
+  const float *coefficients;      /**< [N, K] c; [N, 3, K] in mm if the kind is vector */
+  const double *modes;            /**< [K, (L + 1)^2] */
+  const double *volume_linear;    /**< [G, A, K] volume forms, mL, see supine_volume_contract; A is
+                                       volume_axes; these three are NULL without volumes */
   const double *volume_quadratic; /**< [G, A, K, K] */
   const double *volume_cubic;     /**< [G, K, K, K] */
-  /** What an evaluation reads, bytes_per_vertex for each vertex in whole runs of 16 vertices: for
-   * measuring what its traffic costs. What it means changes between versions. */
+  /** The memory that an evaluation reads, bytes_per_vertex for each vertex in runs of 16 vertices,
+   * for measurements of its traffic. Its layout changes between versions. */
   const void *packed;
-  /** Q, modes of the normals (supine_deform_lit); 0 where the file has none. */
-  size_t normal_count;
+  size_t normal_count;            /**< Q, modes of the normals (supine_deform_lit); 0: none */
   const int16_t *normals;         /**< [N, 3, Q] n */
   const double *normal_weights;   /**< [G, Q, 3, T] V, T = 1 + 2 K + K (K + 1) / 2; in files of
                                        versions 1 and 2 [G, Q, (K + 1)(K + 2) / 2] */
-  const double *reference_volume; /**< [G] mL that each lung of the reference surface holds, gas and
-                                       tissue; 0 where has_volume is false */
-  bool has_rest;                  /**< the volume at rest is known in every posture */
-  bool has_full;                  /**< the reference surface is full inflation */
-  bool is_fields; /**< made from another simulator's fields: gain 1 gives them back */
-  size_t
-      volume_axes; /**< A: 3; 1 in files of versions 1 and 2, whose gains are equal on all axes */
-  double bend[3];  /**< of the path between full inflation and rest, see supine_volume_bend */
+  const double *reference_volume; /**< [G] volume of each lung of the reference surface, gas and
+                                       tissue, mL; 0 without volumes */
+  bool has_rest;                  /**< the file has the volume at rest for every posture */
+  bool has_full;                  /**< the reference surface is at full inflation */
+  bool is_fields;     /**< made from another simulator's fields, which gain 1 restores */
+  size_t volume_axes; /**< A: 3; 1 in files of versions 1 and 2, whose gains are equal on
+                           all axes */
+  double bend[3];     /**< of the path between full inflation and rest, see
+                           supine_volume_bend */
 } supine_basis_info;
 
 /** Weights and gains of one state. */
@@ -124,185 +125,198 @@ typedef struct supine_pose {
   double gains[SUPINE_LUNGS_MAX][3]; /**< A_j of each lung, x, y, z; 0: the reference surface */
 } supine_pose;
 
-/** Opens and fully validates a basis file, or one in memory (which must outlive the basis), and
- * packs it for evaluation. `options` may be NULL.
- * @retval SUPINE_ERROR_READ    missing or unreadable
- * @retval SUPINE_ERROR_FORMAT  truncated, corrupted, or not a basis file (detail in `error`)
- * @retval SUPINE_ERROR_ARGUMENT     an option out of range, or options without their size
- * @retval SUPINE_ERROR_UNSUPPORTED  this processor, or this build, lacks the code asked for
+/** Open a basis file, or one in memory that must outlive the basis: check everything in it, and
+ * pack it for evaluation.
+ * @param options  NULL: the defaults
+ * @param basis    written; NULL on failure
+ * @retval SUPINE_ERROR_READ         the file is missing or unreadable
+ * @retval SUPINE_ERROR_FORMAT       it is truncated, corrupted, or no basis file; `error` says
+ * where
+ * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or the options lack their size
+ * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instructions asked for
  * @retval SUPINE_ERROR_MEMORY
- * Cost: a few passes over the file; memory of bytes_per_vertex besides the mapped file. */
+ * Cost: a few passes over the file. Memory: bytes_per_vertex for each vertex, 12 bytes for each
+ * vertex and three modes of the normals, and the mapped file. */
 SUPINE_API supine_status supine_basis_open_with(const char *path,
                                                 const supine_basis_options *options,
                                                 supine_basis **basis, supine_error *error);
 SUPINE_API supine_status supine_basis_open_memory_with(const void *bytes, size_t size,
                                                        const supine_basis_options *options,
                                                        supine_basis **basis, supine_error *error);
-/** The same with default options. */
+/** Open a basis with the default options. */
 SUPINE_API supine_status supine_basis_open(const char *path, supine_basis **basis,
                                            supine_error *error);
 SUPINE_API supine_status supine_basis_open_memory(const void *bytes, size_t size,
                                                   supine_basis **basis, supine_error *error);
-/** Releases a basis; NULL is legal. */
+/** Close a basis; NULL is legal. */
 SUPINE_API void supine_basis_close(supine_basis *basis);
 
+/** Return the content of a basis, valid until it is closed. */
 SUPINE_API const supine_basis_info *supine_basis_get_info(const supine_basis *basis);
-/** A metadata string ("format", "error_rms_percent", ...), or NULL. */
+/** Return a metadata string ("format", "error_rms_percent", ...), or NULL. */
 SUPINE_API const char *supine_basis_metadata(const supine_basis *basis, const char *key);
-/** All of them, in the file's order.
- * @param count  written */
+/** Return all metadata, in the order of the file.
+ * @param count  how many, written */
 SUPINE_API const supine_metadata *supine_basis_all_metadata(const supine_basis *basis,
                                                             size_t *count);
-/** Any tensor of the file ("error_modes", ...), or NULL. */
+/** Return a tensor of the file by its name ("error_modes", ...), or NULL. */
 SUPINE_API const supine_tensor *supine_basis_tensor(const supine_basis *basis, const char *name);
-/** Rest positions [N, 3], mm, LPS. */
+/** Return the reference positions [N, 3], mm, LPS. */
 SUPINE_API const float *supine_basis_vertices(const supine_basis *basis);
-/** Triangles [M, 3]. */
+/** Return the triangles [M, 3]. */
 SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
 
-/** Weights w [K] of the modes for gravity along `gravity` (any length but 0).
- * Cost: K (L+1)^2 multiplications, once a frame.
+/** Compute the weights of the modes for a direction of gravity.
+ * @param gravity  [3], any length but 0
+ * @param weights  w [K], written
+ * Cost: K (L + 1)^2 multiplications, once a frame.
  * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite */
 SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                               double *weights);
 
-/** Weights and gains of a state.
+/** Compute the weights and gains of a state. The lungs of the pose hold exactly the volume of the
+ * state, without a pass over the vertices.
  *
- * A total volume is shared out among the lungs: each fills on the straight line between its rest
- * and its full volume [MilicEmili1966], all at the same part of the way; below rest all shrink in
- * proportion. Its gains lie on a path from full inflation through rest (supine_volume_bend). Files
- * of versions 1 and 2 have one gain for all lungs and axes instead. Volumes are met exactly,
- * without a pass over the vertices.
+ * A total volume is shared out among the lungs. Above rest all have gone the same part of the way
+ * from their own rest to their own full volume [MilicEmili1966]; below rest all shrink in
+ * proportion. The gains of a lung lie on a path from full inflation through rest
+ * (supine_volume_bend). Files of versions 1 and 2 have one gain for all lungs and axes.
  *
- * SUPINE_VOLUME_DEFAULT is rest where it is known; the fields as given (gain 1) where the basis was
+ * SUPINE_VOLUME_DEFAULT is rest if the basis has it; else the fields as given (gain 1) if it was
  * made from fields; else 500 mL above the scan.
- * @param state  gravity of any length but 0
- * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite; rest or full where the basis
- * knows none; a lung that it does not have
- * @retval SUPINE_ERROR_OPEN_SURFACE  a volume of an open surface
- * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume. Triangles may
- * turn over earlier: that takes a look at the positions Cost: K (L+1)^2 multiplications for the
- * weights, G K^3 for the gains, once a frame. */
+ * @param state  its gravity has any length but 0
+ * @param pose   written
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis has no rest or full,
+ * or no lung of that name
+ * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
+ * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume. Single
+ * triangles may turn over earlier, which this does not detect Cost: K (L + 1)^2 multiplications for
+ * the weights, G K^3 for the gains, once a frame.
+ *
+ * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
+ *                   749-759 */
 SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                            supine_pose *pose, supine_error *error);
 
-/** The gains alone, for weights that `pose` already has: a breath in one posture. */
+/** Compute the gains alone, for the weights that `pose` already has, as in a breath in one posture.
+ * Statuses as supine_basis_pose. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
-/** The volume that SUPINE_VOLUME_DEFAULT stands for; itself where that is the fields as given. */
+/** Return the volume that SUPINE_VOLUME_DEFAULT stands for; DEFAULT itself if the basis was made
+ * from fields and has no rest. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
-/** Set every gain to one number, which is free of volumes: for open surfaces and fields. */
+/** Set every gain to one number, whatever volume that gives: for open surfaces and fields. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
-/** The state of the scan: its posture, SUPINE_VOLUME_SCAN. */
+/** Return the state of the scan: its posture and SUPINE_VOLUME_SCAN. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
-/** Volumes of the lungs in a pose, gas and tissue, mL. Requires has_volume.
+/** Compute the volume of each lung in a pose, gas and tissue, mL. Requires has_volume.
  * @param volumes  [G], written */
 SUPINE_API void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
                                      double *volumes);
 
-/** Bound, in mm, on the distance of any deformed vertex from exact arithmetic on the numbers of the
- * file: what storage and rounding may cost in this pose. */
+/** Return a bound, in mm, on the error of storage and rounding in a pose: no deformed vertex is
+ * farther from where exact arithmetic on the numbers of the file would put it. */
 SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pose *pose);
 
-/** Deformed positions of every vertex, in the caller's thread.
+/** Compute the deformed position of every vertex, in the caller's thread.
  *
- *     x_ij = p_ij + A_j (w . c_i) d_ij        A: the gains of the lung of i
+ *     x_ij = p_ij + A_j (w . c_i) d_ij        A: the gains of the lung of vertex i
  *
- * Rigid parts (tensor `rigid` U32 [R, 2], ranges of vertices) are moved by the rigid motion that
- * fits this best. Every function that places vertices has them so.
+ * Rigid parts (tensor `rigid` U32 [R, 2], ranges of vertices) move by the rigid motion that fits
+ * these positions best, here and in every function that places vertices.
  *
  * @param xyz  [N, 3], written, mm, LPS; any alignment of a float
- * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). Where positions
- * outgrow the cache they are stored past it, fastest where `xyz` is aligned to 64 bytes. */
+ * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). Positions that
+ * outgrow the cache are stored past it, fastest if `xyz` is aligned to 64 bytes. */
 SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz);
 
-/** supine_deform of vertices begin <= i < end into xyz [end - begin, 3]: a thread's share. Shares
- * that begin at multiples of 16 are fastest. */
+/** Compute supine_deform for vertices begin <= i < end into xyz [end - begin, 3], as the share of
+ * one thread. Shares that begin at multiples of 16 are fastest. */
 SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose *pose,
                                     size_t begin, size_t end, float *xyz);
 
-/** supine_deform_range into three arrays [end - begin]. */
+/** Compute supine_deform_range into three arrays [end - begin]. */
 SUPINE_API void supine_deform_separate(const supine_basis *basis, const supine_pose *pose,
                                        size_t begin, size_t end, float *x, float *y, float *z);
 
-/** supine_deform_range for many poses at once, at about the speed of a matrix product: each vertex
- * is read once.
+/** Compute supine_deform_range for many poses at once, at about the speed of a matrix product, as
+ * each vertex is read from memory only once.
  *
  * @param poses  [count]
  * @param xyz    [count, end - begin, 3], written */
 SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
                                     const supine_pose *poses, size_t begin, size_t end, float *xyz);
 
-/** Displacements A_j (w . c_i) d_ij of vertices begin <= i < end, mm, without the reference
- * positions: what supine_step adds. Every vertex's displacement is linear in the gains. */
+/** Compute the displacements A_j (w . c_i) d_ij of vertices begin <= i < end, in mm, without the
+ * reference positions. They are linear in the gains: supine_step adds those of one step. */
 SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
                                       size_t begin, size_t end, float *xyz);
 
-/** One step of a breath at a frozen orientation, three additions a vertex [Santhanam2008] (III-B):
+/** Add one step of a breath in a fixed posture, three additions a vertex [Santhanam2008] (III-B):
  *
  *     xyz += step
  *
  * @param count  vertices
- * @param step   [count, 3] displacement of one step, of supine_displace_range with the gains of
- * one step; subtract a step by displacing with its negative
- * @param xyz    [count, 3], positions before and after; must not overlap `step`
- * Rounding accumulates: at most 2^-24 of the coordinate a step. Begin each breath from
+ * @param step   [count, 3] displacements of one step, from supine_displace_range with its gains;
+ * the gains' negatives undo it
+ * @param xyz    [count, 3] positions before and after; must not overlap `step`
+ * Rounding errors add up, by at most 2^-24 of the coordinate a step. Begin each breath from
  * supine_deform. */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
-/** Weights v [G, Q] of the normals' modes for each lung, from the three components c of a normal,
- * which are quadratic in the weights w and the gains a, b of the two axes after c (cyclically):
+/** Compute the weights v of the normals' modes for each lung. Component c of a normal is quadratic
+ * in the weights w and in the gains a and b of the two axes after c (cyclically), so that
  *
  *     v_j = sum over c of V_jc . (1, a w_k, b w_k, a b w_k w_l (k <= l))
  *
- * In files of versions 1 and 2, whose gains are equal: V_j . (1, a w_k, a^2 w_k w_l).
+ * In files of versions 1 and 2, whose gains are equal: v_j = V_j . (1, a w_k, a^2 w_k w_l).
+ * @param normal_weights  v [G, Q], written
  * Cost: 1.5 G Q K^2 multiplications, once a frame. */
 SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
                                             double *normal_weights);
 
-/** Deformed positions, as supine_deform gives them, and unit normals, without a look at triangles:
+/** Compute the positions of supine_deform and unit normals, without a pass over the triangles:
  *
  *     n_i = sum over j of v_j n_ij, normalised
  *
- * How far these are from supine_normals' the file says, over postures and volumes that took no part
- * in making them: metadata "normals_mean_degrees" and "normals_p999_degrees", volumes
- * "normals_range_ml". Beyond those volumes they are farther.
+ * The file states the angle between these and the normals of supine_normals, measured on held-out
+ * states: metadata "normals_mean_degrees" and "normals_p999_degrees" (mean and 99.9th percentile),
+ * for the volumes "normals_range_ml". It is larger outside those volumes.
  *
  * @param xyz      [N, 3], written; NULL: the normals alone
- * @param normals  [N, 3], written; 0 where a vertex has no triangle
+ * @param normals  [N, 3], written; 0 for a vertex without triangles
  * Cost per vertex beside the position's: 3 Q + 8 multiplications, and as many additions.
  * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals */
 SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose,
                                            float *xyz, float *normals);
 
-/** supine_deform_lit of vertices begin <= i < end into arrays [end - begin, 3]: a thread's share.
- */
+/** Compute supine_deform_lit for vertices begin <= i < end into arrays [end - begin, 3], as the
+ * share of one thread. */
 SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, const supine_pose *pose,
                                                  size_t begin, size_t end, float *xyz,
                                                  float *normals);
 
-/** supine_deform_batch with normals [count, end - begin, 3]. */
+/** Compute supine_deform_batch and normals [count, end - begin, 3]. */
 SUPINE_API supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
                                                  const supine_pose *pose, size_t begin, size_t end,
                                                  float *xyz, float *normals);
 
-/** Unit normals of a deformed surface at its vertices, exactly: the mean of the triangles' normals,
- * weighted by their areas.
+/** Compute the unit normals of a deformed surface from its triangles: at each vertex the mean of
+ * its triangles' normals, weighted by area.
  *
- * @param xyz      [N, 3] positions of every vertex
- * @param normals  [N, 3], written; 0 where a vertex has no triangle of positive area
+ * @param xyz      [N, 3] positions of all vertices
+ * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area
  * Cost: one pass over the triangles, in the caller's thread. */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
-/** Most modes that the GPU form has room for, and floats of one vertex's attributes before its
- * coefficients. */
+/** Most modes of supine.glsl, and floats of a vertex's attributes before its coefficients. */
 enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 
-/** Attributes of vertices begin <= i < end for supine.glsl, as one vertex buffer has them:
+/** Fill a vertex buffer for supine.glsl with vertices begin <= i < end, each of which has
  *
  *     rest vec4 (offset 0; w is the lung's number), direction vec3 (offset 16),
  *     coefficients (offset 28): (K + 3) / 4 vec4s, the last of which may have fewer numbers
@@ -312,7 +326,7 @@ enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
-/** The uniforms supine_weights and supine_gains of supine.glsl, whose SUPINE_VECTORS is
+/** Compute the uniforms supine_weights and supine_gains of supine.glsl with SUPINE_VECTORS
  * V = (K + 3) / 4.
  * @param weights  [4 V], written
  * @param gains    [G, 3], written
@@ -320,14 +334,15 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 
-/** The normals' modes of vertices begin <= i < end for supine.glsl, three to a word, in
- * SUPINE_WORDS W = (Q + 2) / 3 attributes uvec3.
- * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes of 6 modes
+/** Pack the normals' modes of vertices begin <= i < end for supine.glsl: three to a word, in
+ * SUPINE_WORDS W = (Q + 2) / 3 attributes of type uvec3.
+ * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes a vertex of 6
+ * modes
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis has no normals, or was opened without_normals */
 SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
                                                 uint32_t *words);
 
-/** The uniform supine_normal_weights of supine.glsl.
+/** Compute the uniform supine_normal_weights of supine.glsl.
  * @param uniforms  [G, W, 3], written, for glUniform3fv(location, G W, uniforms)
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_normals */
 SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis,

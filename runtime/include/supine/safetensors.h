@@ -4,9 +4,9 @@
  *
  *     8 bytes   length of the header, unsigned little-endian
  *     header    JSON: name -> {dtype, shape, data_offsets [begin, end)}, __metadata__ -> strings
- *     data      the tensors, back to back, no holes
+ *     data      the tensors, one after the other without gaps
  *
- * Files that Supine writes carry a checksum of names, shapes, numbers and metadata in the metadata
+ * Files that Supine writes have a checksum of names, shapes, numbers and metadata in the metadata
  * key "checksum". */
 #ifndef SUPINE_SAFETENSORS_H
 #define SUPINE_SAFETENSORS_H
@@ -33,8 +33,8 @@ typedef enum supine_dtype {
 
 enum { SUPINE_TENSOR_RANK_MAX = 4 };
 
-/** One tensor, row-major. When written: owned by the caller. When read: inside the file's memory,
- * `data` aligned to its element size. */
+/** One tensor, row-major. A tensor that is written belongs to the caller; one that is read points
+ * into the memory of the file, with `data` aligned to the element size. */
 typedef struct supine_tensor {
   const char *name;
   supine_dtype dtype;
@@ -49,13 +49,14 @@ typedef struct supine_metadata {
   const char *value;
 } supine_metadata;
 
-/** A 64-bit checksum of everything but the layout: the sum, modulo 2^64, over
+/** Compute a 64-bit checksum that does not depend on the layout of the file: the sum, modulo 2^64,
+ * over
  *
- *     tensors    h(data, h("F32 [20000,3]", h(name, 0)))         element type and shape, thus
- * written metadata   h(value, h(key, 1))                             the key "checksum" left out
+ *     tensors   h(data, h("F32 [20000,3]", h(name, 0)))    with the element type and shape as text
+ *     metadata  h(value, h(key, 1))                        without the key "checksum"
  *
- * where h(bytes, seed) is XXH64 (as in xxHash's libraries for other languages), text is UTF-8 and
- * numbers are little-endian. In Python, with `import xxhash`:
+ * where h(bytes, seed) is XXH64, text is UTF-8 and numbers are little-endian. In Python, with
+ * `import xxhash`:
  *
  *     h = xxhash.xxh64_intdigest
  *     total = sum(h(data, h(f"{dtype} [{','.join(map(str, shape))}]", h(name, 0)))
@@ -63,50 +64,53 @@ typedef struct supine_metadata {
  *     total += sum(h(value, h(key, 1)) for key, value in metadata if key != "checksum")
  *     checksum = f"xxh64:{total % 2**64:016x}"
  *
- * Cost: one pass at about the speed of memory. Guards against accidents, not against forgery. */
+ * It detects accidents, not forgery. Cost: one pass at about the speed of memory. */
 SUPINE_API uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
                                                 const supine_metadata *metadata,
                                                 size_t metadata_count);
 
-/** An opened file. */
+/** An open file. */
 typedef struct supine_safetensors supine_safetensors;
 
-/** Maps and validates a file (not its checksum: see supine_safetensors_verify): header length,
- * JSON, dtypes, shapes, sizes that overflow, offsets that overlap, leave holes or pass the end,
- * trailing bytes, duplicate names. The file must not change while it is open.
+/** Map a file and check all of it but its checksum (supine_safetensors_verify): length of the
+ * header, JSON, element types, shapes, sizes that overflow, offsets that overlap, leave gaps or
+ * pass the end, trailing bytes, repeated names. The file must not change while it is open.
+ * @param file  written; NULL on failure
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
 SUPINE_API supine_status supine_safetensors_open(const char *path, supine_safetensors **file,
                                                  supine_error *error);
 
-/** The same from memory that the caller keeps until close; `name` is for messages. Bytes need no
- * alignment: where a tensor is misaligned the content is copied. */
+/** Open a file in memory, which the caller keeps until it is closed. It needs no alignment, as
+ * misaligned tensors are copied.
+ * @param name  for messages */
 SUPINE_API supine_status supine_safetensors_open_memory(const void *bytes, size_t size,
                                                         const char *name, supine_safetensors **file,
                                                         supine_error *error);
+/** Close a file; NULL is legal. */
 SUPINE_API void supine_safetensors_close(supine_safetensors *file);
 
-/** The tensor of that name, or NULL. */
+/** Return the tensor of a name, or NULL. */
 SUPINE_API const supine_tensor *supine_safetensors_find(const supine_safetensors *file,
                                                         const char *name);
 
-/** The metadata string of that key, or NULL. */
+/** Return the metadata string of a key, or NULL. */
 SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key);
 
-/** All metadata, in the file's order.
- * @param count  written */
+/** Return all metadata, in the order of the file.
+ * @param count  how many, written */
 SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
                                                                   size_t *count);
 
-/** Checks the file's content against its metadata "checksum": "xxh64:" and 16 hexadecimal digits,
- * or the 16 digits alone of a hash of Supine's own that basis files of version 1 have.
- * @retval SUPINE_ERROR_FORMAT  no checksum, or the content differs: the file is corrupted */
+/** Check the content against the metadata "checksum": "xxh64:" and 16 hexadecimal digits, or in
+ * basis files of version 1 the 16 digits alone, of another hash.
+ * @retval SUPINE_ERROR_FORMAT  the file has no checksum, or another one: it is corrupted */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
 
-/** Write a file to a stream, and add the metadata "checksum". Tensors are laid out by descending
+/** Write a file to a stream, with the metadata "checksum" added. Tensors are laid out by descending
  * element size, in the given order within one size, so that each begins at a multiple of its
- * element size; the header is padded with spaces to a multiple of 8. Errors of writing stay in the
- * stream: see ferror, fclose.
+ * element size; the header is padded with spaces to a multiple of 8. The caller checks the stream
+ * for errors (ferror, fclose).
  * @param name  of the file, for messages
  * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys of one name, a dtype, rank or size out of
  *                                range, text that is not UTF-8, or the key "checksum", which is the

@@ -8,7 +8,7 @@
  *     Y(0, 0) = 0.28209479        Y(1,-1) = 0.48860251 y
  *     Y(1, 0) = 0.48860251 z      Y(1, 1) = 0.48860251 x
  *
- * Everything here is thread-safe, allocates nothing and needs libm alone. */
+ * Every function is thread-safe, allocates nothing and needs libm alone. */
 #ifndef SUPINE_SH_H
 #define SUPINE_SH_H
 
@@ -23,13 +23,13 @@ extern "C" {
 /** The highest band that the recurrences are tested for. */
 #define SUPINE_SH_BAND_MAX 64
 
-/** Number of harmonics with l <= band: (band + 1)^2. */
+/** Return the number of harmonics with l <= band: (band + 1)^2. */
 SUPINE_API size_t supine_sh_count(size_t band);
 
-/** Position of Y(l, m) in a coefficient vector: l*l + l + m. Requires |m| <= l. */
+/** Return the index of Y(l, m) in a vector of coefficients: l*l + l + m. Requires |m| <= l. */
 SUPINE_API size_t supine_sh_index(size_t l, int m);
 
-/** Every Y_lm with l <= band at one direction.
+/** Compute every Y(l, m) with l <= band at one direction.
  *
  * @param band       0 to SUPINE_SH_BAND_MAX
  * @param direction  [3], any length but 0; normalised here
@@ -37,7 +37,7 @@ SUPINE_API size_t supine_sh_index(size_t l, int m);
  * @retval SUPINE_ERROR_ARGUMENT  band too high, or a direction that is zero or not finite */
 SUPINE_API supine_status supine_sh_evaluate(size_t band, const double direction[3], double *y);
 
-/** supine_sh_evaluate for `count` directions [count, 3] into y [count, (band + 1)^2]. */
+/** Compute supine_sh_evaluate for `count` directions [count, 3] into y [count, (band + 1)^2]. */
 SUPINE_API supine_status supine_sh_evaluate_many(size_t band, size_t count,
                                                  const double *directions, double *y);
 

@@ -8,7 +8,8 @@
 extern "C" {
 #endif
 
-/** Marks the symbols that a shared library shows; SUPINE_EXPORTS while Windows' is built. */
+/** Mark the symbols that the shared library exports. SUPINE_EXPORTS is defined while the DLL for
+ * Windows is built. */
 #if defined(_WIN32) && defined(SUPINE_EXPORTS)
 #define SUPINE_API __declspec(dllexport)
 #elif defined(__GNUC__) && !defined(_WIN32)
@@ -24,33 +25,33 @@ extern "C" {
 #define SUPINE_PRINTF(text, first)
 #endif
 
-/** What a function has to say about its work. Zero is success. */
+/** The result of a function; zero is success. */
 typedef enum supine_status {
   SUPINE_OK = 0,
   SUPINE_ERROR_ARGUMENT,     /**< an argument is outside its documented range */
   SUPINE_ERROR_MEMORY,       /**< an allocation failed */
   SUPINE_ERROR_READ,         /**< a file is missing or cannot be read */
-  SUPINE_ERROR_FORMAT,       /**< a file's content breaks its format */
-  SUPINE_ERROR_MESH,         /**< a mesh cannot carry the computation */
-  SUPINE_ERROR_OPEN_SURFACE, /**< a volume was asked of a surface that encloses none */
-  SUPINE_ERROR_UNSUPPORTED,  /**< the feature is not in this build */
+  SUPINE_ERROR_FORMAT,       /**< the content of a file violates its format */
+  SUPINE_ERROR_MESH,         /**< a mesh is unfit for the computation */
+  SUPINE_ERROR_OPEN_SURFACE, /**< a volume was asked for, but the surface is open */
+  SUPINE_ERROR_UNSUPPORTED,  /**< this build, processor or file lacks the feature */
   SUPINE_ERROR_WRITE,        /**< an output cannot be written */
   SUPINE_ERROR_NUMERICAL,    /**< a computation did not converge or left its range */
   SUPINE_ERROR_INTERRUPTED,  /**< the caller's progress function asked to stop */
   SUPINE_STATUS_COUNT        /**< sentinel: the number of codes above */
 } supine_status;
 
-/** A sentence for a status; never NULL, also for values outside the enumeration. */
+/** Return a phrase for a status; never NULL, also for values outside the enumeration. */
 SUPINE_API const char *supine_status_string(supine_status status);
 
-/** Where a function that fails leaves the detail: which file, which vertex, which remedy.
- * Owned by the caller, passed last, and optional: NULL means that the detail is not wanted. */
+/** The detail of a failure: which file, which vertex, which remedy. The caller owns it and passes
+ * it as the last argument, or NULL if it does not want the detail. */
 typedef struct supine_error {
   supine_status status;
   char message[512]; /**< one line, NUL-terminated, no trailing newline */
 } supine_error;
 
-/** Fills `error` (when not NULL) from a printf format, cut to fit, and returns `status`. */
+/** Fill in `error`, unless it is NULL, by a printf format, cut to fit; return `status`. */
 SUPINE_API supine_status supine_error_set(supine_error *error, supine_status status,
                                           const char *format, ...) SUPINE_PRINTF(3, 4);
 

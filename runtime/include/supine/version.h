@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Which version this is. Before 1.0 a new minor version may change the interface, and the shared
- * library's name says which minor version it is; a new patch never does. */
+ * The version. Before 1.0 a new minor version may change the interface, and the name of the shared
+ * library contains the minor version; a new patch never changes the interface. */
 #ifndef SUPINE_VERSION_H
 #define SUPINE_VERSION_H
 
@@ -11,12 +11,12 @@
 extern "C" {
 #endif
 
-/** @{ Of these headers. */
+/** @{ The version of these headers. */
 #define SUPINE_VERSION "0.3.0"
 #define SUPINE_VERSION_NUMBER 300 /**< 10000 major + 100 minor + patch */
 /** @} */
 
-/** Of the library that is linked or loaded, as SUPINE_VERSION; never NULL. */
+/** Return the version of the library that is linked or loaded, as SUPINE_VERSION; never NULL. */
 SUPINE_API const char *supine_version(void);
 
 #ifdef __cplusplus

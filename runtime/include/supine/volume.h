@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * What lungs hold at given weights, as polynomials of the gains, in mL.
+ * The volume of a lung at given weights, as a polynomial of its gains, in mL.
  *
- * Thread-safe, without allocation. */
+ * Every function is thread-safe and allocates nothing. */
 #ifndef SUPINE_VOLUME_H
 #define SUPINE_VOLUME_H
 
@@ -14,55 +14,63 @@
 extern "C" {
 #endif
 
-/** What a lung gains beyond its reference, as a polynomial of its three gains at given weights:
+/** The volume of a lung beyond its reference, as a polynomial of its gains (x, y, z) at given
+ * weights:
  *
  *     V - F = of . (x, y, z, yz, xz, xy, xyz) */
 typedef struct supine_volume_form {
   double of[7];
 } supine_volume_form;
 
-/** Add the form of K weights to `form`. A determinant takes one x, one y and one z, so that
+/** Add the polynomial at K weights to `form`. A volume is a sum of determinants, and each product
+ * in one takes one x, one y and one z, so that
  *
  *     of[j]     += sum_k L_jk w_k             j = x, y, z
- *     of[3 + j] += sum_kl Q_jkl w_k w_l       of the two axes besides j
+ *     of[3 + j] += sum_kl Q_jkl w_k w_l       the product of the two axes besides j
  *     of[6]     += sum_klm T_klm w_k w_l w_m
  *
- * @param axes  3; or 1: the forms of one gain for all axes, in the places of x, yz and xyz
- * @param linear [axes, K], quadratic [axes, K, K], third [K, K, K] */
+ * @param count      K
+ * @param axes       3; or 1 with one gain for all axes, whose forms go to x, yz and xyz
+ * @param linear     L [axes, K], mL
+ * @param quadratic  Q [axes, K, K], mL
+ * @param third      T [K, K, K], mL
+ * @param weights    w [K] */
 SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *linear,
                                        const double *quadratic, const double *third,
                                        const double *weights, supine_volume_form *form);
 
-/** The volume gained at three gains. */
+/** Compute V - F, mL, at three gains. */
 SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
 
-/** The volume gained where the gains are `scale` times `ratio`: c[0] s + c[1] s^2 + c[2] s^3. */
+/** Compute V - F for gains of s times `ratio`, as a cubic: c[0] s + c[1] s^2 + c[2] s^3. */
 SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
                                          double cubic[3]);
 
-/** The volume gained at a scale. */
+/** Compute the cubic at s = `scale`. */
 SUPINE_API double supine_volume_at(const double cubic[3], double scale);
 
-/** The scale at which the volume is gained, the one that is reached from 0 without the volume
- * turning back.
+/** Find the scale at which the cubic is `volume`, on the way from 0 where it is monotone.
  * @retval SUPINE_ERROR_NUMERICAL  there is none: the surface folds before, or nothing moves */
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                              supine_error *error);
 
-/** The path of the gains from full inflation, sigma 0, to rest, sigma 1, and beyond both, relative
- * to those at rest:
+/** Compute the gains relative to those at rest, on the path from full inflation (sigma 0) to rest
+ * (sigma 1) and beyond both:
  *
- *     A_j = sigma + 2 bend_j e(sigma)
- *     e = (sigma^3 - sigma) / 2  for sigma <= 1;  (sigma - 1) / sigma^6  for sigma > 1
+ *     ratio_j = sigma + 2 bend_j e(sigma)
+ *     e = (sigma^3 - sigma) / 2  for sigma <= 1,   1 - 1 / sigma  for sigma > 1
  *
- * A quiet breath is mostly the diaphragm's, z, one near full inflation the rib cage's
- * (Verschakelen 1995, n 120). Below rest the bend fades, as it would turn triangles over. A bend of
- * 0 is a straight line. */
+ * The diaphragm (z) does most of a quiet breath, the rib cage (x, y) most of a breath near full
+ * inflation (Verschakelen 1995, n 120). Below rest the bend fades: it would turn triangles over. A
+ * bend of 0 is a straight line.
+ * @param ratio  [3], written */
 SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ratio[3]);
 
-/** The gains at which a lung holds `volume` beyond its reference.
- * @param bend  of the path
- * @param rest  what the lung holds at rest beyond its reference; unused where the bend is 0
+/** Find the gains on the path at which a lung holds a volume.
+ * @param bend    [3] of the path
+ * @param rest    mL beyond the reference at rest; unused if the bend is 0
+ * @param volume  mL beyond the reference
+ * @param gains   [3], written
  * @retval SUPINE_ERROR_NUMERICAL  there are none: the surface folds before, or nothing moves */
 SUPINE_API supine_status supine_volume_form_gains(const supine_volume_form *form,
                                                   const double bend[3], double rest, double volume,
