@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * What an open basis holds, for the files of this folder. */
+ * An open basis, for the files of this folder. */
 #ifndef SUPINE_RUNTIME_INTERNAL_H
 #define SUPINE_RUNTIME_INTERNAL_H
 
@@ -11,9 +11,9 @@
 /** Harmonics of bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
-/** Tiles and positions of one orientation, or positions of a batch, that are larger than these pass
- * through the caches rather than stay there; but not a range of so few vertices, which its caller
- * reads at once. */
+/** Store past the caches if the tiles and positions of one frame, or the positions of a batch, have
+ * more bytes than this, unless a range has at most STREAM_RANGE vertices, which its caller reads at
+ * once. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
 /** Room for a lung's name. */
@@ -23,24 +23,25 @@ struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
   supine_safetensors *file;
-  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< what info.lung_names points to */
+  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< info.lung_names points here */
   const char *name_of[SUPINE_LUNGS_MAX];
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
-  supine_tiles lit;   /**< the normals' modes; bytes NULL where there are none */
-  supine_tiles tiles; /**< the same for the evaluator, see tiles.h */
+  supine_tiles lit;   /**< modes of the normals; bytes is NULL without them */
+  supine_tiles tiles; /**< positions, see tiles.h */
   const supine_kernels *kernels;
-  bool stream; /**< positions outgrow the cache: store past it */
+  bool stream; /**< store past the cache, which positions outgrow */
   supine_prefetch prefetch;
-  /** Of mode k: what one unit of its packed coefficients stands for. */
+  /** Value of one unit of mode k's packed coefficients, times that of the directions. */
   double mode_scale[SUPINE_MODES_MAX];
   /** Bounds of mode k on the error of packing and on the displacement, mm at weight and gain 1. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
-  double reference_volume[SUPINE_LUNGS_MAX]; /**< what info.reference_volume points to */
-  const double *resting; /**< [G, 9] mL beyond the reference, or [9] for all lungs; or NULL */
-  bool rest_by_lung;     /**< which of both; all lungs share one scale where it is [9] */
-  double upright_gain;   /**< of the reference volume that full inflation holds more upright */
-  double scan_volume;    /**< mL of the scan beyond the reference */
+  double reference_volume[SUPINE_LUNGS_MAX]; /**< mL; info.reference_volume points here */
+  const double *resting; /**< harmonics of the volume at rest, mL beyond the reference: [G, 9], or
+                            [9] for all lungs together; or NULL */
+  bool rest_by_lung;     /**< `resting` is [G, 9]; else all lungs have one gain */
+  double upright_gain;   /**< full inflation upright beyond supine, over the reference volume */
+  double scan_volume;    /**< of the scan beyond the reference, mL */
   double scan_gravity[3];
   const uint32_t *rigid; /**< [rigid_count, 2], see rigid.h */
   size_t rigid_count;
@@ -48,52 +49,51 @@ struct supine_basis {
   double rest_size;  /**< bound on the distance of a rest position from 0, mm */
 };
 
-/** Packs the tensors into tiles of that storage (not AUTO), in place of those before.
+/** Pack the tensors into tiles of a storage, not AUTO; tiles packed before are freed.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
 
-/** Packs the normals' modes into tiles.
+/** Pack the modes of the normals into tiles.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
-/** Three modes of a vertex's normal along one axis: compact.h, word of supine_tiles_normal_words.
- */
+/** Return word `word`, of supine_tiles_normal_words, of one coordinate of a vertex's normal. */
 uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size_t axis,
                                   size_t word);
 
-/** Monomials of the gains and K weights in one component of a normal, along axis c:
+/** Count the monomials of the K weights and the gains in one coordinate of a normal,
  *
- *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)      a, b: the gains of the next two axes,
- * cyclically
+ *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)
  *
- * Where all gains are equal (files of versions 1 and 2), b w_k is a w_k and one component serves
- * all. */
+ * where a and b are the gains of the next two axes, cyclically. With one gain for all axes (files
+ * of versions 1 and 2) a w_k and b w_k are the same. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
 }
 
-/** Evaluates vertices begin <= i < end, all of one lung, into a target for them. */
+/** Evaluate vertices begin <= i < end, all of one lung, into a target for them. */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
 
-/** Make the rigid parts among vertices begin <= i < end of a target rigid, see rigid.h. */
+/** Replace the positions of rigid parts among vertices begin <= i < end of a target, see rigid.h.
+ */
 void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target);
 
-/** A target `count` vertices further on. */
+/** Return a target moved on by `count` vertices. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
-/** supine_basis_info.storage_error of the tiles as they are. */
+/** Compute supine_basis_info.storage_error of the present tiles. */
 double supine_basis_storage_error(const supine_basis *basis);
 
-/** Fill in what the kernels multiply by: weights times the units of the packed coefficients, then
- * the three gains of a lung.
- * @param folded  [K + 3] */
+/** Compute the factors of the kernels: weights times the units of the packed coefficients, then the
+ * three gains of a lung.
+ * @param folded  [K + 3], written */
 void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded);
 
-/** Fill in the one gain at which the lungs together hold `volume` mL beyond the reference.
- * @param pose  has its weights
+/** Fill in one gain for all lungs and axes, at which they hold `volume` mL beyond the reference.
+ * @param pose  with its weights
  * @retval SUPINE_ERROR_NUMERICAL */
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);
 

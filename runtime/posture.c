@@ -22,17 +22,9 @@ static const struct {
 
 enum { POSTURES = sizeof postures / sizeof *postures };
 
-static bool same(const char *a, const char *b) {
-  while (*a != '\0' && supine_words_lower(*a) == supine_words_lower(*b)) {
-    ++a;
-    ++b;
-  }
-  return *a == *b;
-}
-
 supine_status supine_posture_gravity(const char *name, double gravity[3]) {
   for (size_t i = 0; i < POSTURES; ++i) {
-    if (same(name, postures[i].name)) {
+    if (supine_words_same(name, postures[i].name)) {
       memcpy(gravity, postures[i].gravity, sizeof postures[i].gravity);
       return SUPINE_OK;
     }

@@ -20,20 +20,11 @@ _Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT, "a name
 
 enum { PIECE = 64 }; /* longest posture or volume, with its NUL */
 
-/* Does `text` say `word`, in upper or lower case? */
-static bool says(const char *text, const char *word) {
-  while (*text != '\0' && supine_words_lower(*text) == supine_words_lower(*word)) {
-    ++text;
-    ++word;
-  }
-  return *text == *word;
-}
-
 /* Read a number, with "mL" after it or not. */
 static bool read_number(const char *text, double *value, bool *has_unit) {
   char *end = NULL;
   *value = strtod(text, &end);
-  *has_unit = says(end, "mL");
+  *has_unit = supine_words_same(end, "mL");
   return end != text && (*has_unit || *end == '\0') && isfinite(*value);
 }
 
@@ -44,7 +35,7 @@ static supine_status read_volume(const char *text, supine_volume *volume, supine
     const size_t length = strlen(kinds[kind]);
     char front[PIECE];
     (void)snprintf(front, sizeof front, "%.*s", (int)length, text);
-    if (!says(front, kinds[kind])) {
+    if (!supine_words_same(front, kinds[kind])) {
       continue;
     }
     const char *offset = text + length;

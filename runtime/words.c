@@ -4,8 +4,16 @@
 
 #include "runtime/words.h"
 
-int supine_words_lower(char c) {
+static int lower(char c) {
   return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
+}
+
+bool supine_words_same(const char *a, const char *b) {
+  while (*a != '\0' && lower(*a) == lower(*b)) {
+    ++a;
+    ++b;
+  }
+  return *a == *b;
 }
 
 size_t supine_words_distance(const char *text, const char *word) {
@@ -18,7 +26,7 @@ size_t supine_words_distance(const char *text, const char *word) {
   for (const char *c = text; *c != '\0'; ++c) { /* row by row over the text */
     size_t diagonal = row[0]++;
     for (size_t j = 1; j <= length; ++j) {
-      const int differ = supine_words_lower(*c) != supine_words_lower(word[j - 1]);
+      const int differ = lower(*c) != lower(word[j - 1]);
       const size_t replaced = diagonal + (differ ? 1 : 0);
       const size_t shifted = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
       diagonal = row[j];

@@ -3,16 +3,17 @@
 #ifndef SUPINE_WORDS_H
 #define SUPINE_WORDS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
-/* Longest word that a distance is taken to. */
+/* Compare in upper or lower case (ASCII, in every locale). */
+bool supine_words_same(const char *a, const char *b);
+
+/* Longest word of a distance; the rest of it does not count. */
 enum { SUPINE_WORD_MAX = 63 };
 
-/* ASCII alone, whatever the locale. */
-int supine_words_lower(char c);
-
-/* Fewest insertions, deletions and replacements of a character that turn `text`, of any length,
- * into `word` (Levenshtein 1966), cases alike. */
+/* Count the fewest insertions, deletions and replacements of a character that turn `text`, of any
+ * length, into `word` (Levenshtein 1966), in upper or lower case. */
 size_t supine_words_distance(const char *text, const char *word);
 
 #endif

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Numbers in fewer bits: two or three numbers in a word of 32 bits; three in two words.
- * Plain C, one at a time.
+ * Numbers of fewer bits: two or three in a word of 32 bits, or three in two words.
  *
- * A number that shares a word stands in its upper bits and is read as the whole word, a signed
- * integer, so that reading costs one conversion: what stands below is noise that is known when the
- * number is chosen, and it is chosen so that both together come nearest. */
+ * A number is shifted to the upper bits of its word and read as the whole word, a signed integer,
+ * so that reading costs one shift and one conversion. The bits below it belong to other numbers:
+ * they are known when it is packed, and the value is chosen so that the whole word comes nearest.
+ */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
 
@@ -26,19 +26,19 @@ static inline float bits_float(uint32_t bits) {
   return value;
 }
 
-/** The integer that `word` stands for. */
+/** Return a word as a signed integer. */
 static inline int32_t word_integer(uint32_t word) {
   int32_t value = 0;
   memcpy(&value, &word, sizeof value);
   return value;
 }
 
-/** rint of what is far below 2^51, in instructions that every processor has. */
+/** Round to the nearest integer, far below 2^51, in instructions that every processor has. */
 static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
 
-/** The word nearest to `value` with the given lowest `bits`, which are all that is set in `low`. */
+/** Return the word nearest to `value` whose lowest `bits` bits are those of `low`. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
@@ -47,12 +47,12 @@ static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
-/** Two numbers in a word, in units of 2^-31 of their limits: the first in the lower half. */
+/** Pack two numbers of -2^31 to 2^31 into a word, the first into the lower half. */
 static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** @{ The numbers of a pair. */
+/** @{ Return a number of such a word. */
 static inline float pair_first(uint32_t word) {
   return (float)word_integer(word << 16);
 }
@@ -62,39 +62,39 @@ static inline float pair_second(uint32_t word) {
 }
 /** @} */
 
-/** Three numbers in a word, likewise: 11, 11 and 10 bits from the uppermost. */
+/** Pack three numbers likewise: into 11, 11 and 10 bits, from the uppermost. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 22) >> 22;
   const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;
   return word_nearest(first, lower, 21);
 }
 
-/** Number 0, 1 or 2 of a triple. */
+/** Return number 0, 1 or 2 of such a word. */
 static inline float triple_number(uint32_t word, size_t number) {
   return (float)word_integer(word << 11 * number);
 }
 
-/** Three modes of a normal in a word, likewise: 13, 10 and 9 bits from the uppermost, as the first
- * modes are the large ones. */
+/** Pack three modes of a normal likewise: into 13, 10 and 9 bits, as the first modes are the
+ * largest. */
 static inline uint32_t normal_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 23) >> 23;
   const uint32_t lower = word_nearest(second, low << 13, 22) >> 13;
   return word_nearest(first, lower, 19);
 }
 
-/** What one unit of such a word stands for, of a file's 16 bits: the largest of those, 32767, comes
- * to the largest that 9 bits in the upper end of a word can hold, 255 x 2^23. */
+/** Return the unit of such a word in counts of the file's 16 bits: the largest count, 32767,
+ * becomes the largest value of the 9 upper bits of a word, 255 x 2^23. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }
 
-/** Number 0, 1 or 2 of those. */
+/** Return number 0, 1 or 2 of such a word. */
 static inline float normal_number(uint32_t word, size_t number) {
   return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
 }
 
-/** Three numbers in two words, in units of 2^-31 of their limit: the first and second in the upper
- * 21 bits of a word each, the third in what is left of both. None becomes 0 (see fixed_scale). */
+/** Pack three numbers of -2^31 to 2^31 into two words: the first and second into the upper 21 bits
+ * of a word each, the third into the 22 bits left. None becomes 0 (see fixed_scale). */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;
@@ -105,15 +105,15 @@ static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   }
 }
 
-/** The three numbers. */
+/** Unpack the three numbers. */
 static inline void fixed_widen(const uint32_t *words, float *numbers) {
   numbers[0] = (float)word_integer(words[0]);
   numbers[1] = (float)word_integer(words[1]);
   numbers[2] = (float)word_integer(words[0] << 21 | (words[1] << 10 & 0x1FFC00U));
 }
 
-/** A number other than 0 times the power of two whose exponent, in its place in a float's bits, is
- * `unit`. */
+/** Multiply a number other than 0 by the power of two whose exponent is `unit`, in its place in a
+ * float's bits. */
 static inline float fixed_scale(float number, uint32_t unit) {
   return bits_float(float_bits(number) + unit);
 }

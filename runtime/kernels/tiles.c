@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The choice of the code that reads tiles. */
+/* Choose the kernels for this processor. */
 #include "runtime/kernels/tiles.h"
 
 #if defined(__x86_64__)
@@ -7,7 +7,6 @@
 #endif
 
 #if defined(__x86_64__)
-/* Asked of the processor and of the system, which must save the registers. */
 static bool has_avx2(void) {
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
 }
