@@ -42,10 +42,11 @@ static supine_status no_memory(const char *path, supine_error *error) {
 /* Describe the content of VTP files; the fields point to the first frame. */
 static void fill_save(breath_output *made) {
   const breath_content *content = &made->content;
-  const supine_tensor *lung = supine_basis_tensor(content->basis, "lung");
-  made->fields[0] = (supine_mesh_field){"gravity_LPS", 3, content->course->gravity};
-  made->fields[1] = (supine_mesh_field){"volume_mL", content->course->lungs, content->volumes};
-  made->fields[2] = (supine_mesh_field){"TimeValue", 1, content->course->time};
+  const supine_tensor *lung = supine_basis_tensor(content->frames->basis, "lung");
+  made->fields[0] = (supine_mesh_field){"gravity_LPS", 3, content->frames->gravity};
+  made->fields[1] =
+      (supine_mesh_field){"volume_mL", content->frames->lungs, content->frames->volumes};
+  made->fields[2] = (supine_mesh_field){"TimeValue", 1, content->frames->time};
   made->save = *content->frame;
   made->save.rest = content->origin;
   (void)snprintf(made->comment, sizeof made->comment,
@@ -62,7 +63,7 @@ static void fill_save(breath_output *made) {
 
 static supine_status open_vtp(breath_output *made, supine_error *error) {
   const size_t count = 3 * made->content.rest->vertex_count;
-  const breath_course *course = made->content.course;
+  const breath_frames *frames = made->content.frames;
   made->mesh = *made->content.rest;
   made->mesh.vertices = malloc(count * sizeof *made->mesh.vertices);
   made->normals = malloc(count * sizeof *made->normals);
@@ -73,8 +74,8 @@ static supine_status open_vtp(breath_output *made, supine_error *error) {
   fill_save(made);
   if (supine_text_ends_in_any_case(made->path, ".vtp")) {
     made->save.field_count = FIELDS - 1; /* the file holds the time of each frame */
-    return supine_mesh_series_open(made->path, &made->mesh, &made->save, course->count,
-                                   course->time, &made->series, error);
+    return supine_mesh_series_open(made->path, &made->mesh, &made->save, frames->count,
+                                   frames->time, &made->series, error);
   }
   char *folder = strndup(made->path, strlen(made->path) - strlen(".pvd"));
   if (folder == NULL) {
@@ -95,16 +96,16 @@ static supine_status open_vtp(breath_output *made, supine_error *error) {
 
 static supine_status open_tensors(breath_output *made, supine_error *error) {
   const size_t frame = 3 * made->content.rest->vertex_count;
-  const size_t frames = made->content.course->count;
-  if (frame <= SIZE_MAX / sizeof(float) / frames) {
-    made->positions = malloc(frames * frame * sizeof *made->positions);
+  const size_t count = made->content.frames->count;
+  if (frame <= SIZE_MAX / sizeof(float) / count) {
+    made->positions = malloc(count * frame * sizeof *made->positions);
   }
   if (made->positions == NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_MEMORY,
         "%s: no memory for %zu frames of %zu vertices (%.1f GB): take fewer, or "
         "write a .vtp file",
-        made->path, frames, frame / 3, 4e-9 * (double)frame * (double)frames);
+        made->path, count, frame / 3, 4e-9 * (double)frame * (double)count);
   }
   return SUPINE_OK;
 }
@@ -158,14 +159,14 @@ void supine_command_breath_output_close(breath_output *output) {
 }
 
 static supine_status add_file(breath_output *output, size_t frame, supine_error *error) {
-  const breath_course *course = output->content.course;
+  const breath_frames *frames = output->content.frames;
   char *path = frame_path(output->folder, frame);
   if (path == NULL) {
     return no_memory(output->path, error);
   }
-  output->fields[0].values = course->gravity + 3 * frame;
-  output->fields[1].values = output->content.volumes + course->lungs * frame;
-  output->fields[2].values = course->time + frame;
+  output->fields[0].values = frames->gravity + 3 * frame;
+  output->fields[1].values = frames->volumes + frames->lungs * frame;
+  output->fields[2].values = frames->time + frame;
   const supine_status status = supine_mesh_save(path, &output->mesh, &output->save, error);
   free(path);
   return status;
@@ -182,7 +183,7 @@ supine_status supine_command_breath_output_add(breath_output *output, const floa
   for (size_t i = 0; i < count; ++i) {
     output->mesh.vertices[i] = (double)xyz[i];
   }
-  supine_normals(output->content.basis, xyz, output->normals);
+  supine_normals(output->content.frames->basis, xyz, output->normals);
   return output->series != NULL ? supine_mesh_series_add(output->series, error)
                                 : add_file(output, frame, error);
 }
@@ -199,10 +200,10 @@ static supine_status write_index(breath_output *output, supine_error *error) {
               "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
               "<Collection>\n",
               file.file);
-  for (size_t t = 0; t < output->content.course->count; ++t) {
+  for (size_t t = 0; t < output->content.frames->count; ++t) {
     char *path = frame_path(slash == NULL ? output->folder : slash + 1, t);
     (void)fprintf(file.file, "<DataSet timestep=\"%.9g\" part=\"0\" file=\"",
-                  output->content.course->time[t]);
+                  output->content.frames->time[t]);
     supine_template_escape(path != NULL ? path : "", file.file);
     (void)fputs("\"/>\n", file.file);
     free(path);
@@ -218,14 +219,14 @@ static supine_status write_index(breath_output *output, supine_error *error) {
 
 static supine_status commit_tensors(const breath_output *output, supine_error *error) {
   const breath_content *content = &output->content;
-  const size_t t = content->course->count;
+  const size_t t = content->frames->count;
   const size_t n = content->rest->vertex_count;
   const supine_tensor tensors[] = {
       {"positions", SUPINE_F32, 3, {t, n, 3}, output->positions},
       {"triangles", SUPINE_U32, 2, {content->rest->triangle_count, 3}, content->rest->triangles},
-      {"time", SUPINE_F64, 1, {t}, content->course->time},
-      {"volume", SUPINE_F64, 2, {t, content->course->lungs}, content->volumes},
-      {"gravity", SUPINE_F64, 2, {t, 3}, content->course->gravity}};
+      {"time", SUPINE_F64, 1, {t}, content->frames->time},
+      {"volume", SUPINE_F64, 2, {t, content->frames->lungs}, content->frames->volumes},
+      {"gravity", SUPINE_F64, 2, {t, 3}, content->frames->gravity}};
   const supine_metadata metadata[] = {{"format", "supine-breath"},
                                       {"version", "1"},
                                       {"units", "mm, s, mL (gas and tissue of each lung)"},

@@ -5,7 +5,7 @@
 
 #include "mesh/mesh.h"
 
-#include "program/breath/breath_course.h"
+#include "program/breath/breath_frames.h"
 
 #define SUPINE_BREATH_ENDINGS ".vtp, .pvd or .safetensors"
 
@@ -13,14 +13,12 @@ typedef struct breath_output breath_output;
 
 /* All of it must outlive the output. */
 typedef struct breath_content {
-  const supine_basis *basis;
   const supine_mesh *rest;               /* reference surface of the basis */
   const double *origin;                  /* [N, 3] from which displacement is measured, mm */
   const char *origin_name;               /* "the scan" */
   const supine_mesh_save_options *frame; /* axes and units of VTP files */
-  const breath_course *course;
-  const double *volumes; /* [T, G] gas and tissue, mL */
-  const char *made_by;   /* command line, for the metadata */
+  const breath_frames *frames;
+  const char *made_by; /* command line, for the metadata */
 } breath_content;
 
 /* Begin an output:

@@ -9,6 +9,7 @@
 #include "sh/base/text.h"
 
 #include "program/breath/breath_frames.h"
+#include "program/breath/pv.h"
 #include "program/breath_output.h"
 #include "program/drawing.h"
 #include "program/options/basis_input.h"
@@ -121,41 +122,37 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
 }
 
 /* Print the volumes, and the time that frames took. */
-static void report(const request *wanted, const breath_course *course, const breath_frames *frames,
-                   double *seconds) {
-  const double *volumes = supine_breath_frames_volumes(frames);
+static void report(const request *wanted, const breath_frames *frames, double *seconds) {
   double least = INFINITY;
   double peak = 0.0;
-  for (size_t t = 0; t < course->count; ++t) {
+  for (size_t t = 0; t < frames->count; ++t) {
     double sum = 0.0;
-    for (size_t lung = 0; lung < course->lungs; ++lung) {
-      sum += volumes[t * course->lungs + lung];
+    for (size_t lung = 0; lung < frames->lungs; ++lung) {
+      sum += frames->volumes[t * frames->lungs + lung];
     }
     least = fmin(least, sum);
     peak = fmax(peak, sum);
   }
   (void)printf("%s: %zu frames, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-               wanted->path, course->count, course->time[course->count - 1], wanted->fps, least,
+               wanted->path, frames->count, frames->time[frames->count - 1], wanted->fps, least,
                peak);
-  if (course->fixed) {
-    (void)printf("one posture: %zu of the frames by three additions a vertex\n",
-                 supine_breath_frames_stepped(frames));
+  if (frames->fixed) {
+    (void)printf("one posture: %zu of the frames by three additions a vertex\n", frames->stepped);
   }
   (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, of %.0f ms\n",
-               1e3 * gsl_stats_median(seconds, 1, course->count),
-               1e3 * gsl_stats_max(seconds, 1, course->count), 1e3 * budget);
+               1e3 * gsl_stats_median(seconds, 1, frames->count),
+               1e3 * gsl_stats_max(seconds, 1, frames->count), 1e3 * budget);
 }
 
 /* Compute and write all frames. */
-static supine_status play_frames(const breath_course *course, breath_frames *frames,
-                                 breath_output *output, float *xyz, double *seconds,
-                                 supine_error *error) {
+static supine_status play_frames(breath_frames *frames, breath_output *output, float *xyz,
+                                 double *seconds, supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
-  for (size_t t = 0; t < course->count && status == SUPINE_OK; ++t) {
+  for (size_t t = 0; t < frames->count && status == SUPINE_OK; ++t) {
     seconds[t] = supine_breath_frames_next(frames, xyz);
     status = supine_command_breath_output_add(output, xyz, error);
-    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)course->count)) {
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)frames->count)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
     }
@@ -165,23 +162,23 @@ static supine_status play_frames(const breath_course *course, breath_frames *fra
 }
 
 /* Check that the states at the ends of the breath are plausible. */
-static supine_status check_ends(const supine_basis *basis, const request *wanted,
-                                const breath_course *course, supine_error *error) {
+static supine_status check_ends(const request *wanted, const breath_frames *frames,
+                                supine_error *error) {
   size_t least = 0;
   size_t most = 0;
-  for (size_t t = 1; t < course->count; ++t) {
-    least = course->volume[t] < course->volume[least] ? t : least;
-    most = course->volume[t] > course->volume[most] ? t : most;
+  for (size_t t = 1; t < frames->count; ++t) {
+    least = frames->above[t] < frames->above[least] ? t : least;
+    most = frames->above[t] > frames->above[most] ? t : most;
   }
   const size_t ends[2] = {least, most};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     supine_pose pose;
     const supine_state state =
-        supine_breath_state(basis, course->gravity + 3 * ends[i], course->volume[ends[i]]);
-    status = supine_basis_pose(basis, &state, &pose, error);
+        supine_breath_state(frames->basis, frames->gravity + 3 * ends[i], frames->above[ends[i]]);
+    status = supine_basis_pose(frames->basis, &state, &pose, error);
     if (status == SUPINE_OK) {
-      status = supine_options_pose_check(basis, name, wanted->allow_folds, &pose, error);
+      status = supine_options_pose_check(frames->basis, name, wanted->allow_folds, &pose, error);
     }
   }
   return status;
@@ -194,8 +191,7 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   const supine_basis_info *info = supine_basis_get_info(basis);
   supine_pv pv = *supine_breath_normal();
   supine_mesh rest = {0};
-  breath_course course = {0};
-  breath_frames *frames = NULL;
+  breath_frames frames = {0};
   breath_output *output = NULL;
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   double *seconds = malloc(count * sizeof *seconds);
@@ -210,17 +206,14 @@ static supine_status play(const supine_basis *basis, const request *wanted,
     status = supine_breath_load(wanted->pv, &pv, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_breath_course_create(&pv, &wanted->breath, &wanted->turn, wanted->fps, count,
-                                         info->lung_count, &course, error);
+    status = supine_breath_frames_create(basis, &pv, &wanted->breath, &wanted->turn, wanted->fps,
+                                         count, &frames, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_reference(basis, &wanted->from, false, &from, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_breath_frames_create(basis, &course, &frames, error);
-  }
-  if (status == SUPINE_OK) {
-    status = check_ends(basis, wanted, &course, error);
+    status = check_ends(wanted, &frames, error);
   }
   if (status == SUPINE_OK) {
     origin = supine_options_basis_positions(basis, &from.pose);
@@ -228,30 +221,27 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
-    const breath_content content = {.basis = basis,
-                                    .rest = &rest,
+    const breath_content content = {.rest = &rest,
                                     .origin = origin,
                                     .origin_name = from.name,
                                     .frame = frame,
-                                    .course = &course,
-                                    .volumes = supine_breath_frames_volumes(frames),
+                                    .frames = &frames,
                                     .made_by = made_by};
     status = supine_command_breath_output_open(wanted->path, &content, &output, error);
   }
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  status = play_frames(&course, frames, output, xyz, seconds, error);
+  status = play_frames(&frames, output, xyz, seconds, error);
   if (status == SUPINE_OK) {
     status = supine_command_breath_output_commit(output, error);
   }
   if (status == SUPINE_OK) {
-    report(wanted, &course, frames, seconds);
+    report(wanted, &frames, seconds);
   }
 cleanup:
   supine_command_breath_output_close(output);
-  supine_breath_frames_destroy(frames);
-  supine_breath_course_free(&course);
+  supine_breath_frames_free(&frames);
   supine_mesh_free(&rest);
   free(origin);
   free(xyz);

@@ -6,7 +6,7 @@
 
 #include <supine/compare.h>
 
-#include "program/breath/breath_course.h"
+#include "program/breath/turn.h"
 #include "program/inside.h"
 #include "program/options/orientation.h"
 #include "program/options/state_options.h"

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "program/breath/pv.h"
 #include "program/inside.h"
 #include "program/observed.h"
 #include "program/options/basis_input.h"

@@ -16,7 +16,8 @@
 
 #include "command_helpers.h"
 #include "lungs_helpers.h"
-#include "program/breath/breath_course.h"
+#include "program/breath/pv.h"
+#include "program/breath/turn.h"
 
 #include "tests/poses.h"
 

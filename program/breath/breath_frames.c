@@ -12,27 +12,12 @@ enum { RUN_MAX = 128 };
 
 static const double tolerance = 0.01; /* largest error of a volume within a run, mL */
 
-typedef double lung_gains[SUPINE_LUNGS_MAX][3];
-
-struct breath_frames {
-  const supine_basis *basis;
-  const breath_course *course;
-  lung_gains *gains; /* [T] */
-  double *volumes;   /* [T, G] mL */
-  size_t *run;       /* [T] first frame of each frame's run */
-  float *step;       /* [N, 3] mm, of the present run */
-  size_t next;
-  size_t stepped;
-};
-
-void supine_breath_frames_destroy(breath_frames *frames) {
-  if (frames != NULL) {
-    free(frames->gains);
-    free(frames->volumes);
-    free(frames->run);
-    free(frames->step);
-    free(frames);
-  }
+void supine_breath_frames_free(breath_frames *frames) {
+  free(frames->time);
+  free(frames->gains);
+  free(frames->run);
+  free(frames->step);
+  *frames = (breath_frames){0};
 }
 
 supine_state supine_breath_state(const supine_basis *basis, const double gravity[3], double ml) {
@@ -44,31 +29,29 @@ supine_state supine_breath_state(const supine_basis *basis, const double gravity
 /* Compute the pose of a frame from its orientation and volume. */
 static supine_status pose_frame(const breath_frames *frames, size_t t, supine_pose *pose,
                                 supine_error *error) {
-  const breath_course *course = frames->course;
   const supine_state state =
-      supine_breath_state(frames->basis, course->gravity + 3 * t, course->volume[t]);
+      supine_breath_state(frames->basis, frames->gravity + 3 * t, frames->above[t]);
   return supine_basis_pose(frames->basis, &state, pose, error);
 }
 
 static supine_status find_gains(breath_frames *frames, supine_error *error) {
-  const breath_course *course = frames->course;
-  for (size_t t = 0; t < course->count; ++t) {
+  for (size_t t = 0; t < frames->count; ++t) {
     supine_pose pose;
     supine_error cause;
     const supine_status status = pose_frame(frames, t, &pose, &cause);
     if (status != SUPINE_OK) {
-      return supine_error_set(error, status, "at %.3f s: %s", course->time[t], cause.message);
+      return supine_error_set(error, status, "at %.3f s: %s", frames->time[t], cause.message);
     }
     memcpy(frames->gains[t], pose.gains, sizeof pose.gains);
-    supine_basis_volumes(frames->basis, &pose, frames->volumes + t * course->lungs);
+    supine_basis_volumes(frames->basis, &pose, frames->volumes + t * frames->lungs);
   }
   return SUPINE_OK;
 }
 
 /* gains = first + share (last - first) */
 static void mix_gains(const breath_frames *frames, size_t first, size_t last, double share,
-                      lung_gains gains) {
-  for (size_t i = 0; i < 3 * frames->course->lungs; ++i) {
+                      double (*gains)[3]) {
+  for (size_t i = 0; i < 3 * frames->lungs; ++i) {
     const double a = frames->gains[first][i / 3][i % 3];
     const double b = frames->gains[last][i / 3][i % 3];
     gains[i / 3][i % 3] = a + share * (b - a);
@@ -85,7 +68,7 @@ static void stepped_volumes(const breath_frames *frames, supine_pose *pose, size
 /* Return whether equal steps from frame `first` to `last` keep the volumes of the frames between.
  */
 static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t first, size_t last) {
-  const size_t lungs = frames->course->lungs;
+  const size_t lungs = frames->lungs;
   for (size_t t = first + 1; t < last; ++t) {
     double volumes[SUPINE_LUNGS_MAX];
     double off = 0.0;
@@ -103,19 +86,18 @@ static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t fir
 /* Find runs greedily, and replace the gains and volumes within a run by those of equal steps. There
  * are none with rigid parts, whose rotations are not equal steps. */
 static void find_runs(breath_frames *frames) {
-  const breath_course *course = frames->course;
   supine_pose pose;
-  for (size_t t = 0; t < course->count; ++t) {
+  for (size_t t = 0; t < frames->count; ++t) {
     frames->run[t] = t;
   }
-  if (!course->fixed || supine_basis_tensor(frames->basis, "rigid") != NULL ||
-      supine_basis_weights(frames->basis, course->gravity, pose.weights) != SUPINE_OK) {
+  if (!frames->fixed || supine_basis_tensor(frames->basis, "rigid") != NULL ||
+      supine_basis_weights(frames->basis, frames->gravity, pose.weights) != SUPINE_OK) {
     return;
   }
   size_t first = 0;
-  while (first < course->count) {
+  while (first < frames->count) {
     size_t last = first;
-    while (last + 1 < course->count && last - first < RUN_MAX &&
+    while (last + 1 < frames->count && last - first < RUN_MAX &&
            run_holds(frames, &pose, first, last + 1)) {
       ++last;
     }
@@ -124,7 +106,7 @@ static void find_runs(breath_frames *frames) {
     }
     for (size_t t = first + 1; t <= last; ++t) {
       frames->run[t] = first;
-      stepped_volumes(frames, &pose, first, last, t, frames->volumes + t * course->lungs);
+      stepped_volumes(frames, &pose, first, last, t, frames->volumes + t * frames->lungs);
       ++frames->stepped;
     }
     if (last > first) { /* keep the gains of the first frame, and the step in the second */
@@ -134,32 +116,40 @@ static void find_runs(breath_frames *frames) {
   }
 }
 
-supine_status supine_breath_frames_create(const supine_basis *basis, const breath_course *course,
-                                          breath_frames **frames, supine_error *error) {
-  const size_t count = course->count;
-  breath_frames *made = calloc(1, sizeof *made);
-  *frames = NULL;
-  if (made == NULL) {
+/* Eight parameters: the basis, the breath, the turn, the frames. */
+supine_status supine_breath_frames_create(const supine_basis *basis, const supine_pv *pv,
+                                          const supine_pv_breath *breath, const breath_turn *turn,
+                                          double rate, size_t count, breath_frames *frames,
+                                          supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  *frames = (breath_frames){.basis = basis,
+                            .count = count,
+                            .lungs = info->lung_count,
+                            .fixed = turn->seconds == 0.0,
+                            .time = malloc((5 + info->lung_count) * count * sizeof(double)),
+                            .gains = malloc(count * sizeof *frames->gains),
+                            .run = malloc(count * sizeof *frames->run),
+                            .step = malloc(3 * info->vertex_count * sizeof *frames->step)};
+  if (frames->time == NULL || frames->gains == NULL || frames->run == NULL ||
+      frames->step == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
   }
-  made->basis = basis;
-  made->course = course;
-  made->gains = calloc(count, sizeof *made->gains);
-  made->volumes = calloc(count * course->lungs, sizeof *made->volumes);
-  made->run = calloc(count, sizeof *made->run);
-  made->step = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *made->step);
-  if (made->gains == NULL || made->volumes == NULL || made->run == NULL || made->step == NULL) {
-    supine_breath_frames_destroy(made);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu frames", count);
+  frames->above = frames->time + count;
+  frames->gravity = frames->above + count;
+  frames->volumes = frames->gravity + 3 * count;
+  for (size_t t = 0; t < count; ++t) {
+    frames->time[t] = (double)t / rate;
+    supine_breath_turn_gravity(turn, frames->time[t], frames->gravity + 3 * t);
   }
-  const supine_status status = find_gains(made, error);
-  if (status != SUPINE_OK) {
-    supine_breath_frames_destroy(made);
-    return status;
+  supine_status status =
+      supine_breath_evaluate(pv, breath, count, frames->time, frames->above, NULL, error);
+  if (status == SUPINE_OK) {
+    status = find_gains(frames, error);
   }
-  find_runs(made);
-  *frames = made;
-  return SUPINE_OK;
+  if (status == SUPINE_OK) {
+    find_runs(frames);
+  }
+  return status;
 }
 
 /* Compute a frame from its orientation and volume, and the step of the run that it begins. */
@@ -167,8 +157,8 @@ static void place(breath_frames *frames, size_t t, float *xyz) {
   supine_pose pose;
   (void)pose_frame(frames, t, &pose, NULL); /* the pose was computed before, so this cannot fail */
   supine_deform(frames->basis, &pose, xyz);
-  if (t + 1 < frames->course->count && frames->run[t + 1] == t) { /* a run begins */
-    for (size_t i = 0; i < 3 * frames->course->lungs; ++i) {
+  if (t + 1 < frames->count && frames->run[t + 1] == t) { /* a run begins */
+    for (size_t i = 0; i < 3 * frames->lungs; ++i) {
       pose.gains[i / 3][i % 3] =
           frames->gains[t + 1][i / 3][i % 3] - frames->gains[t][i / 3][i % 3];
     }
@@ -186,12 +176,4 @@ double supine_breath_frames_next(breath_frames *frames, float *xyz) {
     supine_step(supine_basis_get_info(frames->basis)->vertex_count, frames->step, xyz);
   }
   return supine_clock_seconds() - begin;
-}
-
-const double *supine_breath_frames_volumes(const breath_frames *frames) {
-  return frames->volumes;
-}
-
-size_t supine_breath_frames_stepped(const breath_frames *frames) {
-  return frames->stepped;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Progress on a terminal, and an orderly end when the user interrupts. */
+/* Show progress on a terminal, and end orderly when the user interrupts. */
 #include <signal.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "sh/base/clock.h"
@@ -9,10 +10,17 @@
 #include "program/options/command.h"
 
 static volatile sig_atomic_t orderly, interrupted;
+static volatile time_t interrupted_at; /* s */
 
+/* Ask for an orderly end. A further signal ends the program at once, but not one that comes right
+ * after the first: timeout(1) sends each signal twice. */
 static void on_signal(int number) {
+  const time_t now = time(NULL);
   if (orderly != 0 && interrupted == 0) {
     interrupted = 1;
+    interrupted_at = now;
+  }
+  if (orderly != 0 && now - interrupted_at < 2) {
     return;
   }
   supine_output_abandon_all();

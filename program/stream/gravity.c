@@ -5,7 +5,7 @@
 
 #include "sh/base/vec3.h"
 
-#include "program/breath/breath_course.h"
+#include "program/breath/turn.h"
 #include "program/stream/gravity.h"
 
 /* Deviation from a rotation that is accepted silently: 32-bit floats give 1e-6, trackers' own
