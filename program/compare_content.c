@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How far named points move between postures, and where to. */
+/* How far, and in which direction, named points move between postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +22,7 @@ typedef struct comparison {
   double *errors; /* [postures, postures, names] expected, mm RMS; 0 where they are not known */
 } comparison;
 
-/* Means over each name's vertices in one state. */
+/* Compute the mean displacement of each name's vertices in one state. */
 static supine_status find_moves(const supine_basis *basis, const supine_state *state,
                                 const supine_command_names *names, float *step, double *moves,
                                 supine_error *error) {
@@ -50,7 +50,7 @@ static supine_status find_moves(const supine_basis *basis, const supine_state *s
   return SUPINE_OK;
 }
 
-/* Root mean squares of the expected errors of each name's vertices. */
+/* Compute the root mean square of the expected errors of each name's vertices. */
 static supine_status find_errors(const supine_basis *basis, const supine_state *to,
                                  const supine_state *from, const supine_command_names *names,
                                  double *errors, supine_error *error) {

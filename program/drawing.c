@@ -7,7 +7,7 @@
 #include "program/drawing.h"
 
 static const char name[] = "render";
-static const double seen_through = 0.35; /* opacity of lungs with something inside */
+static const double seen_through = 0.35; /* default opacity of the lungs with --inside */
 
 supine_status supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
                                         const supine_command_drawing *wanted,

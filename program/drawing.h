@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What still and moving pictures of 'supine render' share: what was asked for, states of the lungs,
- * and the picture around them. */
+/* What still and moving pictures of 'supine render' share: the options, the states drawn, and the
+ * picture around them. */
 #ifndef SUPINE_COMMAND_DRAWING_H
 #define SUPINE_COMMAND_DRAWING_H
 
@@ -12,7 +12,7 @@
 #include "program/options/state_options.h"
 #include "program/render/render.h"
 
-/* What the options say. */
+/* The options of 'supine render'. */
 typedef struct supine_command_drawing {
   const char *output;
   const char *postures;
@@ -39,25 +39,26 @@ typedef struct supine_command_drawn {
   supine_command_marks marks;
 } supine_command_drawn;
 
-/* Compute the pose for a direction of gravity of that name. Overwrites `value` [N]. */
+/* Compute the pose for a posture. Overwrites `value` [N]. */
 supine_status supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
                                         const supine_command_drawing *wanted,
                                         const supine_posture_item *item,
                                         supine_command_drawn *found, supine_error *error);
 
-/* What the colours show, and the words below the posture's name; `ends`, of the colours, grow: the
- * 95th percentile, the largest. */
+/* Compute the values to colour by and the line below the posture's name. Raise `ends` to the 95th
+ * percentile and the largest value. */
 void supine_command_drawn_value(const supine_basis *basis, const supine_compare *compare,
                                 const supine_pose *from, supine_command_drawn *shown,
                                 double ends[2]);
 
-/* The picture around panels that the caller sets; `label` [128] is the bar's words.
- * @param from  the name of the state that colours count from */
+/* Return the picture around panels that the caller sets.
+ * @param from   name of the state that displacements count from
+ * @param label  [128], text of the colour bar; written */
 supine_picture supine_command_drawing_picture(const supine_command_drawing *wanted,
                                               const char *from, const double ends[2], size_t panels,
                                               char *label);
 
-/* A panel of a state. */
+/* Return the panel of a state. */
 supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
                                         const supine_command_drawn *shown, const char *title,
                                         const double gravity[3]);

@@ -10,7 +10,7 @@
 
 enum { EXPORT_RESTING_TERMS = 9 }; /* Y_lm of bands 0 to 2 */
 
-/** An open basis, and what it shows, at hand. */
+/** An open basis and its tensors. */
 typedef struct export_source {
   supine_basis *basis;
   const supine_basis_info *info;
@@ -39,11 +39,11 @@ void supine_export_box(const export_source *source, double low[3], double high[3
 /** Compute the displacement of a vertex for a weight of 1 of a mode, mm. */
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
-/** How deep a breath is. */
+/** Depth of a breath. */
 typedef struct export_breath {
-  double volume;  /**< mL above rest: where the surface is closed */
-  double largest; /**< mm, the largest displacement when supine: where it is open */
-  double scale;   /**< the gain that gives it */
+  double volume;  /**< mL above rest, for a closed surface */
+  double largest; /**< largest displacement when supine, mm, for an open surface */
+  double scale;   /**< the gain that gives `largest` */
 } export_breath;
 
 /** Set a breath of `volume` mL; on an open surface one whose largest displacement, supine, is
@@ -63,7 +63,7 @@ supine_status supine_export_breath_pose(const export_source *source, const expor
 typedef struct export_parts {
   size_t count;       /**< names, > 0 */
   char *const *name;  /**< [count] */
-  const uint32_t *of; /**< [N] which each vertex goes by */
+  const uint32_t *of; /**< [N] index of each vertex' name */
 } export_parts;
 
 /** How to write glTF. */
@@ -99,7 +99,7 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
 /** Most modes that the page carries: four vertex attributes of four. */
 enum { EXPORT_PAGE_MODES_MAX = 16 };
 
-/** What a page shows beside the lungs. */
+/** Contents of a page besides the lungs. */
 typedef struct export_page {
   export_breath breath;
   const supine_pose *from; /**< displacements are measured from this pose */

@@ -14,18 +14,18 @@ const supine_asset *supine_template_asset(const supine_asset *assets, const char
   return NULL;
 }
 
-/* Data, inside out. */
+/* A value of the data, and those around it. */
 typedef struct scope {
   const json_t *value;
   const struct scope *outer;
 } scope;
 
-/* What stands between {{ and }}. */
+/* A tag: {{...}}. */
 typedef struct tag {
   char kind; /* '#', '/' or 0 */
   const char *name;
   size_t length;
-  const char *begin, *end; /* of the whole of it; end NULL: there is no other */
+  const char *begin, *end; /* of the tag with its braces; end NULL: no more tags */
 } tag;
 
 static tag next_tag(const char *at, const char *end) {
@@ -100,7 +100,7 @@ static void write_named(const supine_template *t, const tag *named, const scope 
   }
 }
 
-/* The section's end; NULL where it has none. */
+/* Find the tag that ends a section; its end is NULL if there is none. */
 static tag find_end(const char *at, const char *end) {
   size_t depth = 1;
   tag found = next_tag(at, end);

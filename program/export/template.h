@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * One small language for everything that is written as HTML:
+ * Templates of the page and the report:
  *
  *     {{name}}                a string or number of the data, escaped; or another asset, a .html
  *                             filled with the same data, anything else as it is
@@ -17,36 +17,35 @@
 
 #include <jansson.h>
 
-/** A file that the build puts into the program (supine_embed); its array ends with a name of NULL.
- */
+/** A file embedded in the program by supine_embed; an array of them ends with a NULL name. */
 typedef struct supine_asset {
   const char *name;  /**< "page.css" */
   const char *bytes; /**< ends with a 0 that `size` does not count */
   size_t size;
 } supine_asset;
 
-/** The asset of that name, `length` bytes long, or NULL. */
+/** Return the asset whose name is the first `length` bytes of `name`, or NULL. */
 const supine_asset *supine_template_asset(const supine_asset *assets, const char *name,
                                           size_t length);
 
-/** What fills a template. */
+/** Assets and data to fill a template with. */
 typedef struct supine_template {
   const supine_asset *assets;
   const json_t *data;
-  /** Writes what is too large to be data; NULL: there is no such thing. */
+  /** Called for names that are neither data nor assets: writes what is too large for JSON; or NULL.
+   */
   void (*write)(const void *context, const char *name, FILE *file);
   const void *context;
 } supine_template;
 
-/** Writes the asset `name`, filled. Names that nothing knows write nothing: supine_embed refuses
- * them when the program is built. Errors of writing are left to be found when the file is closed.
- */
+/** Write the asset `name` with its tags filled. Unknown names write nothing; supine_embed refuses
+ * them when the program is built. Write errors stay in the stream. */
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
 
 /** Return numbers as an array. */
 json_t *supine_template_numbers(const double *values, size_t count);
 
-/** Text with the characters that HTML reserves replaced: & < > ". */
+/** Write text with the reserved characters of HTML, & < > ", replaced. */
 void supine_template_escape(const char *text, FILE *file);
 
 #endif

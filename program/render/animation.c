@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Pictures after each other, as WebP. */
+/* Animations as WebP files. */
 #include <stdlib.h>
 
 #include <webp/encode.h>
@@ -7,7 +7,7 @@
 
 #include "program/render/render.h"
 
-/* Quality, of 100: letters stay sharp at a tenth of the lossless size. */
+/* WebP quality, 0 to 100: letters stay sharp, at a third of the lossless size. */
 static const float quality = 90.0F;
 enum { EFFORT = 2, SIDE_MAX = 16383 };
 
@@ -29,7 +29,8 @@ supine_status supine_render_animation_open(size_t width, size_t height,
   }
   supine_animation *made = calloc(1, sizeof *made);
   if (made != NULL && WebPAnimEncoderOptionsInit(&options) && WebPConfigInit(&made->config)) {
-    options.kmax = 1; /* key frames only: differences of lossy frames leave staircases of colour */
+    options.kmax =
+        1; /* key frames only: differences between lossy frames add up to visible steps of colour */
     made->config.quality = quality;
     made->config.method = EFFORT;
     made->width = width;

@@ -31,7 +31,7 @@ static const double paths[SUPINE_COLOURS_COUNT][KNOTS][3] = {
 static double colours[SUPINE_COLOURS_COUNT][COLOURS][3]; /* written once, by make_colours */
 static pthread_once_t made = PTHREAD_ONCE_INIT;
 
-/* Linear sRGB of an OKLab colour. */
+/* Convert an OKLab colour to linear sRGB. */
 static void linear_rgb(const double lab[3], double rgb[3]) {
   const double l = pow(lab[0] + 0.3963377774 * lab[1] + 0.2158037573 * lab[2], 3);
   const double m = pow(lab[0] - 0.1055613458 * lab[1] - 0.0638541728 * lab[2], 3);
@@ -46,7 +46,7 @@ static double encode(double x) {
   return clipped <= 0.0031308 ? 12.92 * clipped : 1.055 * pow(clipped, 1 / 2.4) - 0.055;
 }
 
-/* The path at t, 0 to 1: Catmull-Rom between the knots. */
+/* Compute the colour of a path at 0 <= t <= 1: Catmull-Rom interpolation between the knots. */
 static void path_at(const double path[KNOTS][3], double t, double lab[3]) {
   const double at = t * (KNOTS - 1);
   const int k = (int)fmin(floor(at), KNOTS - 2);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* One drawing of the lungs: projected, the nearest triangle of each sample found, then lit. */
+/* Draw the lungs: project the vertices, find the nearest triangle of each sample, light it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,8 +10,8 @@
 /* Each pixel is the mean of 2 x 2 samples. */
 enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GRAIN = 16 };
 
-static const double distance_in_radii = 5.0; /* of the viewer */
-static const double depth_in_radii = 3.0;    /* drawn, in front of the centre and behind */
+static const double distance_in_radii = 5.0; /* from the viewer to the centre of the lungs */
+static const double depth_in_radii = 3.0;    /* depth range on either side of the centre */
 static const double margin = 1.03;
 static const float gamma_exponent = 2.2F;
 
@@ -25,9 +25,9 @@ typedef struct corner {
 
 struct supine_renderer {
   const supine_basis *basis;
-  const supine_basis_info *info; /* of it */
-  float *scratch;                /* [N, 6]: positions, normals */
-  corner *corners;               /* [N] */
+  const supine_basis_info *info;
+  float *scratch;  /* [N, 6]: positions, normals */
+  corner *corners; /* [N] */
 };
 
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
@@ -55,11 +55,11 @@ void supine_render_destroy(supine_renderer *renderer) {
   }
 }
 
-/* A viewer in front of the middle of the resting lungs, whatever their state. */
+/* A viewer in front of the centre of the reference surface, whatever the state drawn. */
 typedef struct camera {
   double axes[3][3];
   double centre[3];
-  double radius, away; /* mm: of the lungs, and how far the viewer is */
+  double radius, away; /* of the lungs, and from the viewer to the centre, mm */
 } camera;
 
 static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
@@ -108,7 +108,7 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   }
 }
 
-/* The extent in the middle, filling the picture: its middle, and what a mm is of half a side. */
+/* Fit the extent into the picture: find its centre, mm, and the scale in half sides per mm. */
 static void find_frame(supine_renderer *r, const supine_scene *scene, double frame[4]) {
   double extent[4] = SUPINE_EXTENT_NONE;
   if (scene->extent != NULL) {
@@ -126,7 +126,7 @@ static void find_frame(supine_renderer *r, const supine_scene *scene, double fra
   frame[3] = 1 / tall;
 }
 
-/* Where a point that the viewer sees at p lies in a picture of that size, the first row on top. */
+/* Project a point in the viewer's axes to a picture of `size` pixels, the first row on top. */
 static void project(const camera *c, const double frame[4], const double p[3], const double size[2],
                     double at[2]) {
   for (int side = 0; side < 2; ++side) {
@@ -153,8 +153,8 @@ typedef struct canvas {
   const supine_renderer *renderer;
   const supine_scene *scene;
   size_t width, height;             /* samples */
-  uint32_t *nearest;                /* [height, width] triangle; NOTHING: none */
-  float *nearness;                  /* [height, width] of it */
+  uint32_t *nearest;                /* [height, width] triangle nearest to the viewer, or NOTHING */
+  float *nearness;                  /* [height, width] its nearness */
   float colours[SHADES + 1][3];     /* of the map, linear */
   unsigned char encode[SHADES + 1]; /* linear to sRGB, 0 to 255 */
   uint32_t *pixels;
@@ -189,8 +189,8 @@ static void find_corners(const canvas *c) {
   }
 }
 
-/* A triangle of the drawing: its corners, and twice its area in samples; below 0: seen from
- * behind. */
+/* A projected triangle: its corners, and twice its area in samples, negative when seen from behind.
+ */
 typedef struct face {
   const corner *at[3];
   float area;
@@ -285,14 +285,14 @@ static float contour(const face *f, float x, float y, float value, float spacing
              : (1.0F - smoothstep(0.5F, 1.7F, away)) * (1.0F - smoothstep(0.3F, 0.8F, width));
 }
 
-/* The share of light from a direction, which need not be of length 1. */
+/* Compute the diffuse light from a direction of any length on a surface of unit normal n. */
 static float lambert(const float n[3], const float from[3]) {
   float to[3] = {from[0], from[1], from[2]};
   normalise(to);
   return fmaxf(0.0F, dot(n, to));
 }
 
-/* The colour of a triangle at a sample, 0 to 255, times how much it covers, which is last. */
+/* Compute the premultiplied colour of a triangle at a sample, 0 to 255, with its coverage last. */
 static void shade(const canvas *c, size_t triangle, float x, float y, unsigned char rgba[4]) {
   static const float key[3] = {-0.55F, 0.75F, 0.8F};
   static const float fill[3] = {0.9F, -0.1F, 0.5F};
@@ -340,8 +340,7 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
   }
 }
 
-/* The mean of a pixel's samples. Nothing drawn is 0 in colour and alpha alike, so that the means
- * are premultiplied. */
+/* Return the mean of a pixel's samples, premultiplied; samples without a triangle are 0. */
 static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
   enum { COUNT = OVERSAMPLE * OVERSAMPLE };
   uint32_t sum[4] = {COUNT / 2, COUNT / 2, COUNT / 2, COUNT / 2};

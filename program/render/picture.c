@@ -27,7 +27,7 @@
   EACH(cairo_, text_extents) EACH(cairo_, text_path)
 /* clang-format on */
 
-/* cairo, which brings the X11 libraries. */
+/* Loaded at the first use, because cairo depends on the X11 libraries. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
@@ -54,13 +54,13 @@ static const theme themes[2] = {
 };
 static const double accent[3] = {0.91, 0.33, 0.17}; /* gravity */
 
-/* Where things go, in pixels. */
+/* Layout of the picture, pixels. */
 typedef struct layout {
   double font;
   double margin;
   double top; /* below the heading */
   double cell_width, cell_height;
-  double strip; /* a cell's head, above its lungs */
+  double strip; /* height of the head of a cell, above its lungs */
   double bar;   /* height of the foot with the bar of colours */
 } layout;
 
@@ -85,7 +85,7 @@ static double text_width(cairo_t *cr, const char *text) {
   return extents.x_advance;
 }
 
-/* Text whose left end, middle or right end (align 0, 0.5, 1) is at x. */
+/* Draw text with its left end, middle or right end (align 0, 0.5, 1) at x. */
 static void text(cairo_t *cr, double x, double y, double align, const char *words) {
   cairo.move_to(cr, x - align * text_width(cr, words), y);
   cairo.show_text(cr, words);
@@ -120,7 +120,8 @@ static void ground(cairo_t *cr, const supine_picture *picture, const theme *look
   cairo.pattern_destroy(fade);
 }
 
-/* An arrow from the centre of the ball; towards or away from the viewer: a dot or a cross. */
+/* Draw gravity as an arrow from the centre of the ball; towards the viewer as a dot, away as a
+ * cross. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
   cairo.new_path(cr);
@@ -194,8 +195,8 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   gravity_arrow(cr, x, y, radius * 0.66, seen);
 }
 
-/* Move a name down, below every earlier one that it would lie on. `box` is the left end, the line
- * and the width of each, `count` of them placed. */
+/* Move a name down until it overlaps none of the `count` placed before it. `box` holds the left
+ * end, the baseline and the width of each name. */
 static void place_name(double (*box)[3], size_t count, double line) {
   double *own = box[count];
   for (size_t i = 0; i < count; ++i) {
@@ -207,8 +208,8 @@ static void place_name(double (*box)[3], size_t count, double line) {
   }
 }
 
-/* Discs and specks at what is inside, then the names, so that none is covered. Eight parameters:
- * where, what, and in which colours. */
+/* Draw discs and specks at the marks, then the names over them. Eight parameters: where, what, and
+ * in which colours. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y,
                                 const theme *look) {
@@ -275,8 +276,8 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
   return status;
 }
 
-/* Thirteen parameters: a panel, the view of it, and its place in the picture, which cell() has
- * just worked out. */
+/* Draw the lungs of a panel. Thirteen parameters: the panel, its view, and its place in the
+ * picture, computed by cell(). */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -307,7 +308,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   return status;
 }
 
-/* Nine parameters: the picture, and which part of it. */
+/* Draw one posture from one view. Nine parameters: the picture, and which part of it. */
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
@@ -399,7 +400,7 @@ static layout make_layout(const supine_picture *picture) {
   return at;
 }
 
-/* Widens an extent to what one view of a picture shows. */
+/* Widen an extent to what one view of a picture shows. */
 static void widen(supine_renderer *renderer, const supine_picture *picture, size_t row,
                   double extent[4]) {
   for (size_t column = 0; column < picture->panel_count; ++column) {
@@ -460,7 +461,7 @@ static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_erro
                                                             cairo.status_to_string(written));
 }
 
-/* The picture on a surface, which the caller destroys; its pixels are cairo's or the caller's. */
+/* Draw the picture on a surface of the caller's. */
 static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
                              const supine_picture *picture, supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Pictures of deformed lungs, composed by cairo. Where cairo is not installed, pictures answer
- * SUPINE_ERROR_UNSUPPORTED. */
+ * Pictures of deformed lungs, composed by cairo. Where cairo is not installed, functions that draw
+ * return SUPINE_ERROR_UNSUPPORTED. */
 #ifndef SUPINE_RENDER_H
 #define SUPINE_RENDER_H
 
@@ -14,7 +14,7 @@
 #include <supine/runtime.h>
 #include <supine/status.h>
 
-/** Where the viewer is. */
+/** Side from which the lungs are seen. */
 typedef enum supine_view {
   SUPINE_VIEW_ANTERIOR = 0, /**< in front; the patient's left is on the right */
   SUPINE_VIEW_POSTERIOR,
@@ -26,32 +26,33 @@ typedef enum supine_view {
   SUPINE_VIEW_COUNT
 } supine_view;
 
-/** Name of a view, or NULL beyond the last. */
+/** Return the name of a view, or NULL beyond the last. */
 const char *supine_render_view_name(supine_view view);
 
-/** Rows of the rotation from body axes to the viewer's: right, up, towards the viewer. */
+/** Compute the rotation from body axes to the viewer's; its rows are right, up, towards the viewer.
+ */
 void supine_render_view_axes(supine_view view, double axes[3][3]);
 
-/** Maps of colours: what is shown of one state, and of a state against another. */
+/** Colour maps: for the displacement in one state, and for the difference between two. */
 typedef enum supine_colours {
   SUPINE_COLOURS_DISPLACEMENT = 0, /**< violet over teal to yellow */
   SUPINE_COLOURS_DIFFERENCE,       /**< blue over red to cream */
   SUPINE_COLOURS_COUNT
 } supine_colours;
 
-/** A colour of a map, sRGB 0 to 1, for 0 <= t <= 1: lightness in OKLab [Ottosson2020] rises all the
- * way, in steps that look equal, so that grey copies keep the order. The same in pictures, report
- * and page. */
+/** Compute a colour of a map, sRGB 0 to 1, for 0 <= t <= 1. Lightness in OKLab [Ottosson2020] rises
+ * in perceptually equal steps, so that grey copies keep the order. Pictures, report and page use
+ * the same maps. */
 void supine_render_colour(supine_colours map, double t, double rgb[3]);
 
-/** The space to draw one basis in. For one thread at a time. */
+/** Buffers to draw one basis; one thread at a time may use them. */
 typedef struct supine_renderer supine_renderer;
 
 /** @param basis  must outlive the renderer
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
                                    supine_error *error);
-/** Releases it; NULL is legal. */
+/** Destroy it; NULL is legal. */
 void supine_render_destroy(supine_renderer *renderer);
 
 /** One drawing: the lungs in one state from one side. */
@@ -63,20 +64,20 @@ typedef struct supine_scene {
   supine_colours colours;
   supine_view view;
   bool dark;            /**< lit for a dark page */
-  bool shell;           /**< seen through: grey, its outline dark, without colours */
+  bool shell;           /**< draw a grey, transparent shell with a dark outline, without colours */
   size_t width, height; /**< pixels */
-  const double *extent; /**< [4] of supine_render_extent, or NULL: this scene's own */
+  const double *extent; /**< [4] by supine_render_extent; NULL: that of this scene */
 } supine_scene;
 
 /** Extent to begin supine_render_extent with. */
 #define SUPINE_EXTENT_NONE                                                                         \
   { INFINITY, -INFINITY, INFINITY, -INFINITY }
 
-/** Widens an extent (least and greatest x, then y, on the picture plane, mm) to what a scene shows,
+/** Widen an extent (least and greatest x, then y, on the picture plane, mm) to what a scene shows,
  * so that several states can be drawn to one scale. The scenes must share the view. */
 void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
-/** Draws on a transparent ground. Uses all cores.
+/** Draw on a transparent ground, with all cores.
  * @param pixels  [height, width] premultiplied ARGB as cairo has it, top row first; written
  * @retval SUPINE_ERROR_ARGUMENT  0 or more than 16384 pixels a side
  * @retval SUPINE_ERROR_MEMORY */
@@ -91,7 +92,7 @@ supine_status supine_render_png(supine_renderer *renderer, const supine_scene *s
 typedef struct supine_mark {
   float xyz[3];      /**< mm, where it is */
   float value;       /**< mm, what its colour shows */
-  bool point;        /**< a disc; else a speck, of which many make a surface */
+  bool point;        /**< drawn as a disc; else as a speck: the vertices of a mesh */
   const char *label; /**< written beside it, or NULL */
 } supine_mark;
 
@@ -100,7 +101,7 @@ typedef struct supine_marks {
   const supine_mark *mark;
 } supine_marks;
 
-/** Where marks come to lie on the drawing of a scene: pixels [count, 2] from its left and upper
+/** Compute where marks lie on the drawing of a scene: pixels [count, 2] from its left and upper
  * edge. */
 void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
                            const supine_marks *marks, double (*pixel)[2]);
@@ -126,7 +127,7 @@ typedef struct supine_picture {
   const char *heading; /**< or NULL */
   const char *bar_label;
   double largest;            /**< mm at the end of the colours */
-  double transparency;       /**< of the lungs: 0 whole, 1 unseen */
+  double transparency;       /**< of the lungs, 0 to 1 */
   const double (*extent)[4]; /**< [view_count] supine_render_picture_extent; NULL: its own */
   supine_colours colours;
   bool beyond; /**< some values are larger: the bar ends in a point */
@@ -134,31 +135,32 @@ typedef struct supine_picture {
   size_t width, height; /**< pixels */
 } supine_picture;
 
-/** A round number of which 4 to 10 make up `value`: the ticks of a bar of colours. */
+/** Return the distance of the ticks on a colour bar: a round number that fits 4 to 10 times into
+ * `value`. */
 double supine_render_bar_step(double value);
-/** The end of a bar whose values reach `value` in the main: rounded up to a tick. */
+/** Return the end of a colour bar: `value`, below which most values lie, rounded up to a tick. */
 double supine_render_bar_end(double value);
 
-/** Widens an extent for each view, as supine_render_extent, to what a picture shows, so that
+/** Widen an extent for each view, as supine_render_extent, to what a picture shows, so that
  * several pictures can be drawn to one scale.
  * @param extent  [view_count] */
 void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
                                   double (*extent)[4]);
 
-/** Composes a picture.
+/** Compose a picture.
  * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; written
  * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels
  * @retval those of supine_render_draw */
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
-/** Composes a picture and writes it as PNG.
+/** Compose a picture and write it as PNG.
  * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels
  * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
 supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
                                           FILE *file, supine_error *error);
 
-/** Pictures after each other, for a WebP file that plays over and over. */
+/** An animation for a WebP file that repeats forever. */
 typedef struct supine_animation supine_animation;
 
 /** @retval SUPINE_ERROR_ARGUMENT     larger than WebP's 16383 pixels a side
@@ -166,12 +168,12 @@ typedef struct supine_animation supine_animation;
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_animation_open(size_t width, size_t height,
                                            supine_animation **animation, supine_error *error);
-/** Adds a picture of that size, which is seen for so long.
+/** Append a picture of that size, shown for some milliseconds.
  * @retval SUPINE_ERROR_MEMORY, and those of supine_render_picture_draw */
 supine_status supine_render_animation_add(supine_animation *animation, supine_renderer *renderer,
                                           const supine_picture *picture, int milliseconds,
                                           supine_error *error);
-/** Writes all of it.
+/** Write the animation.
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_render_animation_write(supine_animation *animation, FILE *file,
                                             supine_error *error);

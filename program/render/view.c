@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Where viewers stand, in body axes (LPS). */
+/* The views' rotations from body axes (LPS). */
 #include <string.h>
 
 #include "program/render/render.h"

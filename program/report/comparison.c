@@ -5,7 +5,7 @@
 
 #include "program/report/comparison.h"
 
-/* Compute the ventilation of a breath from the volume on. */
+/* Compute the ventilation of a breath that starts at the comparison's volume. */
 static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
                                  float *xyz[2], supine_compared_posture *posture,
                                  supine_error *error) {
@@ -81,7 +81,7 @@ static supine_status find_energy(supine_comparison *c, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* The expected error of one state counted from another; 0 where it is not known. */
+/* Compute the expected error of the displacement from one state to another; 0 where unknown. */
 static supine_status find_error(const supine_comparison *c, const supine_state *state,
                                 const supine_state *from, double *rms, supine_error *error) {
   supine_expected expected = {0};

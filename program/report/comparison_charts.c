@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Charts of the HTML report: where their lines and dots go, in profile.html and map.html.
- */
+/* Coordinates of the lines and dots of the report's charts, for profile.html and map.html. */
 #include <math.h>
 #include <string.h>
 
@@ -13,7 +12,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Values of a profile at a slab, %. */
+/* Returns the value of a profile at a slab, %. */
 typedef double slab_value(const supine_comparison *c, size_t posture, size_t slab);
 
 static double expansion(const supine_comparison *c, size_t posture, size_t slab) {
@@ -87,7 +86,7 @@ json_t *supine_report_profiles(const supine_comparison *c) {
                    profile(c, "share of the volume gained, %", true, share));
 }
 
-/* RMS distance from supine in mm, or NaN where the volume cannot be reached. */
+/* Compute the RMS distance from supine, mm, or NaN where the volume cannot be reached. */
 static double from_supine(const supine_comparison *c, const double g[3]) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const double *direction[2] = {supine, g};
@@ -170,7 +169,9 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    if (cosine > nearest + 1e-9) { /* among equal ones the first: names precede DICOM codes */
+    if (cosine >
+        nearest +
+            1e-9) { /* of equally near postures take the first: names come before DICOM codes */
       nearest = cosine;
       name = supine_posture_name(i);
     }

@@ -49,7 +49,7 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   }
 }
 
-/* A direction that the search found, and its RMS distance from another. */
+/* Print a direction that the search found, and its RMS distance from another. */
 static void extreme(FILE *file, const char *quantity, const char *part, const double g[3],
                     const char *other, double rms) {
   static const char *const axes[] = {"left", "posterior", "head"};
@@ -61,7 +61,7 @@ static void extreme(FILE *file, const char *quantity, const char *part, const do
   row(file, quantity, "all", other, "rms", rms, "mm");
 }
 
-/* The file's name goes with its vertices, quoted [RFC 4180]: names may hold anything. */
+/* Print the number of vertices with the name of the file, quoted as [RFC 4180] asks. */
 static void vertices_row(const supine_comparison *c, FILE *file) {
   (void)fputs("vertices,rest,,\"", file);
   for (const char *at = c->path; *at != '\0'; ++at) {

@@ -7,7 +7,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* What was measured of people, beside which a posture's row stands. */
+/* Published measurements, shown in the row of their posture. */
 static const struct {
   const char *posture, *words;
 } published[] = {
@@ -15,7 +15,7 @@ static const struct {
     {"left", "0 and +25 %"},
 };
 
-/* Volume change of each lung from the reference state, in % and mL. */
+/* Compute the change of each lung's volume from the reference state, in % and mL. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
   double held[SUPINE_LUNGS_MAX];
   supine_basis_volumes(c->basis, &c->reference.pose, held);

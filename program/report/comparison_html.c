@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A comparison as one HTML file that needs nothing else: what fills report.html. */
+/* The comparison as one self-contained HTML file: the data of report.html. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -44,7 +44,7 @@ static json_t *percent(double share) {
   return fabs(100.0 * share) < 0.005 ? json_string("0 %") : json_sprintf("%.2f %%", 100.0 * share);
 }
 
-/* Today, or what SOURCE_DATE_EPOCH says, so that a report can be made again byte for byte. */
+/* Return today's date, or that of SOURCE_DATE_EPOCH, for reports that are equal byte for byte. */
 static json_t *date(void) {
   const char *epoch = getenv("SOURCE_DATE_EPOCH");
   const time_t now = epoch != NULL ? (time_t)strtoll(epoch, NULL, 10) : time(NULL);
@@ -60,7 +60,7 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
   (void)json_array_append_new(list, json_pack("{s:s, s:o}", "name", name, "value", value));
 }
 
-/* The command that makes this report again, cut where it is longer than `size`. */
+/* Print the command that makes this report again, cut to `size`. */
 static void write_command(const supine_comparison *c, const char *file, char *command,
                           size_t size) {
   FILE *to = fmemopen(command, size, "w");

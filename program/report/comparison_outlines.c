@@ -5,8 +5,9 @@
 
 #include "program/report/comparison_parts.h"
 
-/* A slice across `axis` at a share of the body's extent; `right` and `down` span its picture, seen
- * from the feet or from the front, so that the patient's left is on the right. */
+/* A slice across `axis` at a share of the lungs' extent. Its picture has x to the right and `down`,
+ * times `sign`, downwards: seen from the feet or from the front, the patient's left on the right.
+ */
 typedef struct slice {
   const char *name;
   size_t axis;
@@ -32,7 +33,7 @@ static double trace(const supine_basis_info *info, const slice *s, double at, co
                     FILE *path) {
   double twice = 0;
   for (size_t t = 0; t < info->triangle_count; ++t) {
-    double up[2] = {NAN, NAN}; /* where the boundary enters the side above the plane */
+    double up[2] = {NAN, NAN}; /* where the triangle's boundary crosses the plane upwards */
     double down[2] = {0, 0};
     for (size_t i = 0; i < 3; ++i) {
       const float *a = xyz + 3 * (size_t)info->triangles[3 * t + i];

@@ -38,7 +38,8 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
   return made;
 }
 
-/* Gravity relative to the viewer: an arrow at `along` degrees, `towards` the viewer, or `away`. */
+/* Describe gravity relative to the viewer: an arrow at `along` degrees, `towards` the viewer, or
+ * `away`. */
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};
@@ -48,7 +49,7 @@ static void set_gravity(const double g[3], json_t *shot) {
       seen[row] += axes[row][axis] * g[axis];
     }
   }
-  if (hypot(seen[0], seen[1]) > 0.35) { /* turned so that it points down */
+  if (hypot(seen[0], seen[1]) > 0.35) { /* turn the picture so that gravity points down */
     (void)json_object_set_new(
         shot, "turn", json_sprintf("%.1f", 90 + atan2(seen[1], seen[0]) * 180.0 / acos(-1.0)));
     (void)json_object_set_new(shot, "along",

@@ -19,7 +19,7 @@ static void print_statistics(const supine_distance_statistics *d, FILE *file) {
   (void)fprintf(file, "%9.3f %9.3f %9.3f %9.3f", d->mean, d->rms, d->p95, d->max);
 }
 
-/* The column of expected errors, where they are known. */
+/* Print the heading of the column of expected errors, if they are known. */
 static void print_error_head(const supine_comparison *c, FILE *file) {
   if (supine_report_has_errors(c)) {
     (void)fprintf(file, " %9s", "error");

@@ -2,7 +2,7 @@
 // The basis in the page, and what the run-time library computes once a frame: weights from gravity,
 // the lungs' gains from a volume.
 
-/** Bytes of a base64 text. */
+/** Decode base64. */
 function fromBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
   const padding = text.endsWith('==') ? 2 : text.endsWith('=') ? 1 : 0;
@@ -62,7 +62,7 @@ function takeNormals(vertices, words) {
   return packed;
 }
 
-/** RGBA bytes of colours written as hexadecimal digits. */
+/** Convert colours in hexadecimal digits to RGBA bytes. */
 function readColours(text) {
   const bytes = new Uint8Array((text.length / 6) * 4).fill(255);
   for (let i = 0; i < text.length; i += 2) bytes[4 * Math.floor(i / 6) + (i % 6) / 2] = parseInt(text.slice(i, i + 2), 16);
@@ -102,7 +102,7 @@ function readBasis() {
   return basis;
 }
 
-/** What the recurrence below divides by and begins with, by band; made once. */
+/** Return the factors of the recurrence below for a band, computed once. */
 const recurrences = new Map();
 function recurrenceOf(band) {
   if (!recurrences.has(band)) {
@@ -144,7 +144,7 @@ function harmonics(band, [x, y, z]) {
   return values;
 }
 
-/** Weights of the modes for gravity along a unit vector. */
+/** Compute the weights of the modes for gravity along a unit vector. */
 function weightsFor(basis, gravity) {
   const y = harmonics(basis.band, gravity);
   return Float64Array.from({ length: basis.modes }, (_, k) => {
@@ -154,7 +154,7 @@ function weightsFor(basis, gravity) {
   });
 }
 
-/** What lung `lung` gains at weights w, mL, as a polynomial of its three gains:
+/** Return the mL that lung `lung` gains at weights w, as a polynomial of its three gains:
  * f . (x, y, z, yz, xz, xy, xyz). Files whose gains are equal have one axis. */
 function lungForm(basis, lung, w) {
   const k = basis.modes;
@@ -178,7 +178,7 @@ const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
 const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
 
-/** The nearest s on one side of 0 where the volume turns back; infinite where it never does. */
+/** Return the extremum of the volume nearest to s = 0 on one side, or infinity. */
 function cubicTurn(c, side) {
   const discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant < 0) return side * Infinity;
@@ -262,7 +262,7 @@ function volumesFor(basis, gravity) {
   return { rest, full: basis.references.map((ml) => (Number(basis.metadata.full_upright_gain) || 0) * up * ml) };
 }
 
-/** All lungs' resting volume for gravity along a unit vector, mL relative to the basis' surface. */
+/** Return the resting volume of all lungs for gravity along a unit vector, mL beyond the basis' surface. */
 const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
 
 /** Share a total out among the lungs: each fills on the straight line between its rest and its full
@@ -329,14 +329,14 @@ function uniformsOf(basis, moment) {
   return { weights, gains: Float32Array.from(moment.gains), turns };
 }
 
-/** The lung of a vertex. */
+/** Return the lung of a vertex. */
 function lungOf({ lungBegin }, vertex) {
   let lung = 0;
   while (vertex >= lungBegin[lung + 1]) ++lung;
   return lung;
 }
 
-/** Where a vertex is. */
+/** Compute the position of a vertex, mm. */
 function placeOf(basis, { weights, gains }, vertex) {
   const lung = lungOf(basis, vertex);
   let amount = 0;
@@ -344,7 +344,7 @@ function placeOf(basis, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => basis.rest[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
 }
 
-/** Where every vertex is: xyz of each, mm. */
+/** Compute the positions of all vertices, xyz, mm. */
 function placesOf({ rest, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
   const places = new Float32Array(rest.length);
   for (let lung = 0; lung < lungs; ++lung) {
@@ -357,7 +357,7 @@ function placesOf({ rest, direction, coefficients, modes, lungBegin, lungs }, { 
   return places;
 }
 
-/** A few thousand triangles, for the range of the colours: the places of their corners. */
+/** Compute the positions of the corners of a few thousand triangles, for the range of the colours. */
 function samplePlaces(basis, moment) {
   const stride = 3 * Math.max(1, Math.ceil(basis.corners.length / 3 / 3000));
   const places = [];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What colours mean: the same rule for ranges and ticks as in pictures and reports.
+// Colours, their ranges and ticks, by the same rule as in pictures and reports.
 
-/** A round number of which 4 to 10 make up `value`. */
+/** Return a round number that fits 4 to 10 times into `value`. */
 function tickStep(value) {
   if (!(value > 0)) return 0.2;
   const power = 10 ** Math.floor(Math.log10(value / 4));
@@ -9,13 +9,13 @@ function tickStep(value) {
   return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
 }
 
-/** The end of a range whose values reach `value` in the main: rounded up to a tick. */
+/** Return the end of a range: `value`, below which most values lie, rounded up to a tick. */
 function rangeEnd(value) {
   const step = tickStep(value);
   return value > 0 ? step * Math.ceil(value / step - 1e-9) : 5 * step;
 }
 
-/** What can be shown: the shader's measure, where it is measured from, colours, words. */
+/** Quantities to colour by: the shader's measure, colour map and unit. */
 const KINDS = {
   displacement: { measure: 0, map: 'displacement', unit: 'mm' },
   difference: { measure: 0, map: 'difference', unit: 'mm' },
@@ -23,7 +23,7 @@ const KINDS = {
   height: { measure: 2, map: 'displacement', unit: 'mm' },
 };
 
-/** RGBA bytes of a map that diverges about its middle: blue below, orange above. */
+/** Return the RGBA bytes of a diverging map: blue below its middle, orange above. */
 function divergingMap() {
   const stops = [[19, 66, 138], [113, 161, 214], [243, 242, 238], [230, 147, 92], [140, 45, 4]];
   return Uint8Array.from({ length: 1024 }, (_, i) => {
@@ -33,7 +33,7 @@ function divergingMap() {
   });
 }
 
-/** A CSS gradient of a map. */
+/** Return a CSS gradient of a map. */
 function gradient(bytes) {
   const stops = Array.from({ length: 33 }, (_, i) => {
     const at = 4 * Math.round((i * 255) / 32);

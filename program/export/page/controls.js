@@ -7,7 +7,7 @@ const $ = (id) => document.getElementById(id);
  * two pinch(ratio, dx, dy, x, y); tap(event) for one that went nowhere. */
 function onDrag(element, drag, pinch, tap) {
   const pointers = new Map();
-  let far = 0; // how far the pointers have gone since the first came down
+  let far = 0; // CSS pixels that the pointers have moved since the first came down
   const spread = () => {
     const [a, b] = [...pointers.values()];
     return { size: Math.hypot(a.x - b.x, a.y - b.y), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
@@ -40,20 +40,20 @@ function onDrag(element, drag, pinch, tap) {
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** Shows how far a slider is. */
+/** Show the position of a slider. */
 function fill(slider) {
   slider.style.setProperty('--filled', `${(100 * (slider.value - slider.min)) / (slider.max - slider.min)}%`);
 }
 
-/** Sets a text where it is another. */
+/** Set a text if it has changed. */
 function write(id, text) {
   const element = $(id);
-  if (element.written === text) return; // asking the page itself takes longer
+  if (element.written === text) return; // reading it from the page is slower
   element.written = text;
   element.textContent = text;
 }
 
-/** Sets a slider, the number beside it, and what it says. */
+/** Set a slider, the number beside it, and its text. */
 function setSlider(id, value, text, digits = 0) {
   const slider = $(id);
   if (slider.written === text) return;
@@ -75,7 +75,7 @@ function onSlider(id, act) {
   $(id).addEventListener('input', () => take($(id)));
   for (const [type, then] of [['change', take], ['blur', () => {}]]) {
     $(`${id}-number`).addEventListener(type, () => {
-      $(id).written = ''; // what was typed may be none, or beyond the ends
+      $(id).written = ''; // the typed text may be no number, or out of range
       then($(`${id}-number`));
     });
   }
@@ -99,7 +99,7 @@ function makePostureButtons(choose) {
   });
 }
 
-/** The colour bar and its ticks; its ends are pointed where values lie beyond. */
+/** Show the colour bar and its ticks, with pointed ends where values lie beyond the range. */
 function drawLegend(kind, range, title, colours) {
   $('colours').style.background = gradient(colours);
   $('colours').classList.toggle('beyond', range.beyond);
@@ -121,7 +121,7 @@ function drawLegend(kind, range, title, colours) {
   write('range-unit', KINDS[kind].unit);
 }
 
-/** A place in the patient in words: L 97 P 12 H -45. */
+/** Return a position in the patient as text: L 97 P 12 H -45. */
 function placeText([x, y, z]) {
   const part = (v, plus, minus) => `${v >= 0 ? plus : minus} ${Math.abs(v).toFixed(0)}`;
   return `${part(x, 'L', 'R')}  ${part(y, 'P', 'A')}  ${part(z, 'H', 'F')} mm`;

@@ -40,7 +40,7 @@ function lightsOf(context, tones) {
   return fresh;
 }
 
-/** Draws the figure, turned by q into the eye's axes (x right, y up, z to the viewer). */
+/** Draw the figure, turned by q into the eye's axes (x right, y up, z to the viewer). */
 function drawFigure(context, q, x, y, scale, tones) {
   const [ex, ey, ez] = AXES.map((axis) => rotate(q, axis));
   const light = lightsOf(context, tones);
@@ -69,7 +69,7 @@ function drawFigure(context, q, x, y, scale, tones) {
   context.restore();
 }
 
-/** How large a canvas is, CSS pixels: measured when that changes, as asking lays the page out. */
+/** Return the size of a canvas, CSS pixels, measured only when it changes, because reading it lays the page out. */
 const sizes = new WeakMap();
 const measured = new ResizeObserver((entries) => entries.forEach(({ target }) => sizes.delete(target)));
 function sizeOf(canvas) {
@@ -80,7 +80,7 @@ function sizeOf(canvas) {
   return sizes.get(canvas);
 }
 
-/** Sizes a canvas for the screen's pixels and returns its context, in CSS pixels, cleared. */
+/** Size a canvas for the screen's pixels and return its context, in CSS pixels, cleared. */
 function freshContext(canvas) {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   const { width, height } = sizeOf(canvas);
@@ -129,8 +129,8 @@ function glyphsOf() {
 }
 
 /** The ball: the patient inside, gravity as an arrow. `toEye` turns the patient's axes to the eye's. */
-let drawn = [];   // what it shows
-let glass = null; // its light, made once a size and theme
+let drawn = [];   // what the ball shows now
+let glass = null; // the ball's shading, made once for a size and theme
 function drawBall(canvas, toEye, gravity) {
   const { width: size } = sizeOf(canvas);
   const now = [size, window.devicePixelRatio, theme.tones, ...toEye, ...gravity];
@@ -208,7 +208,7 @@ function drawBall(canvas, toEye, gravity) {
   }
 }
 
-/** How far down the figure reaches, turned by q: a table's height. */
+/** Return the lowest point of the figure turned by q: the height of its table. */
 function lowestPart(q) {
   const up = rotate(inverse(q), [0, 1, 0]);
   return Math.min(...BODY.map((part) => dot(up, part.at) - Math.hypot(...part.size.map((s, i) => s * up[i]))));

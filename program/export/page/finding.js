@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// What a moment means, in words: what each lung gains or loses, and how far the surface moves.
+// Findings in words: what each lung gains or loses, and how far the surface moves.
 
 const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.abs(value)}`;
 
-/** What was measured of lungs at rest, % of what they hold supine: mean and standard deviation. */
+/** Published changes of volume at rest, % of supine: mean and standard deviation. */
 const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
 
-/** mL that each lung holds. */
+/** Return the mL that each lung holds. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
-/** Each vertex' part of the surface: a third of the triangles around it. */
+/** Compute the area of each vertex: a third of the triangles around it. */
 function areasOf({ rest, corners, vertices }) {
   const areas = new Float32Array(vertices);
   for (let t = 0; t < corners.length; t += 3) {
@@ -65,7 +65,7 @@ function lungWords(basis, held, before) {
     .map(({ name, ml, percent }) => `the ${name} ${Math.abs(percent) < 2 ? 'keeps its volume' : `${ml < 0 ? 'loses' : 'gains'} ${Math.abs(ml)} mL`} (${signed(percent)} %)`);
 }
 
-/** Two sentences about a moment that is `volume` ("500 mL above rest", or empty) in a posture. */
+/** Return two sentences about a moment in a posture, at `volume` ("500 mL above rest", or empty). */
 function findingOf(basis, moment, gravity, volume, stride) {
   const { from } = basis;
   const { mean, p95, largest } = moveBetween(basis, moment, from, stride);

@@ -2,9 +2,9 @@
 // What is inside the lungs: named points and meshes, which move by the weights and gains of their lung
 // along displacements of their own, [vertex][axis][mode].
 
-const BALL_RADIUS = 4; // mm, of a point
+const BALL_RADIUS = 4; // mm, of the ball drawn at a point
 
-/** Takes it out of the page, points before meshes, so that each kind is drawn at once. */
+/** Take the content out of the page, points before meshes, so that each kind is one draw call. */
 function takeInside({ inside, modes: k, placeUnit, middle }) {
   const { vertices: n } = inside;
   inside.modes = k;
@@ -31,7 +31,7 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
   inside.normals = normalsOf(inside);
 }
 
-/** Unit normals of a surface as it lies in the file. */
+/** Compute the unit normals of the reference surface. */
 function normalsOf({ rest, vertices, corners }) {
   const normals = new Float32Array(3 * vertices);
   const at = (v) => [...rest.subarray(4 * v, 4 * v + 3)];
@@ -47,7 +47,7 @@ function normalsOf({ rest, vertices, corners }) {
   return normals;
 }
 
-/** Where the field puts a vertex inside. */
+/** Compute the position of a vertex by its own displacement field. */
 function fieldPlace({ rest, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
@@ -85,7 +85,7 @@ function insidePlaces(inside, moment, part) {
   return from.map((p) => rotation.map((row, axis) => after[axis] + row.reduce((sum, x, k) => sum + x * (p[k] - before[k]), 0)));
 }
 
-/** Where a vertex inside is. */
+/** Compute the position of a vertex. */
 function insidePlace(inside, moment, vertex) {
   return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
 }
@@ -104,7 +104,7 @@ function insidePart(inside, part, now, from) {
   return { place, move };
 }
 
-/** The vertex of a part nearest a place. */
+/** Return the vertex of a part nearest to a position. */
 function insideNearest(inside, part, moment, place) {
   let [best, least] = [inside.members[part][0], Infinity];
   insidePlaces(inside, moment, part).forEach((at, j) => {
@@ -114,7 +114,7 @@ function insideNearest(inside, part, moment, place) {
   return best;
 }
 
-/** Beyond this many rows a table is searched rather than read. */
+/** Largest number of rows shown; longer tables are searched by name. */
 const ROWS_SHOWN = 200;
 
 /** The table of what is inside: a button for each part, which keeps its name in the picture; where it
@@ -129,7 +129,7 @@ class InsideTable {
     this.list();
   }
 
-  /** Rows for the parts whose names hold what is searched for. */
+  /** Show the rows of the parts whose names contain the search text. */
   list() {
     const words = $('inside-find').value.trim().toLowerCase();
     const found = this.inside.names.flatMap((name, part) => (name.toLowerCase().includes(words) ? [part] : []));
@@ -156,7 +156,7 @@ class InsideTable {
     return { part, row, button, place, move };
   }
 
-  /** Keeps a part's name in the picture, or lets it go. */
+  /** Toggle a part's name in the picture. */
   keep(part) {
     const { state } = this;
     state.named = state.named.includes(part) ? state.named.filter((p) => p !== part) : [...state.named, part];
@@ -184,7 +184,7 @@ class InsideTable {
   }
 }
 
-/** Names over the picture, beside their points. */
+/** Labels over the picture, beside their points. */
 class InsideNames {
   constructor(parent) {
     Object.assign(this, { parent, plates: [] });

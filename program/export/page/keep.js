@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What can be taken away: a link that holds the view, and the picture as a PNG.
+// A link that holds the view, and the picture as a PNG.
 
 const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
 
-/** The view as the text of a link: only what differs from the first view. */
+/** Return the view as the text of a link: only what differs from the first view. */
 function linkOf(state) {
   const { camera } = state;
   const all = {
@@ -19,7 +19,7 @@ function linkOf(state) {
   return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== '')).toString().replaceAll('%3A', ':').replaceAll('%2B', '%2b');
 }
 
-/** Takes up what linkOf wrote; what makes no sense is passed over. */
+/** Set the view from the text of a link; ignore invalid values. */
 function takeLink(text, state) {
   const link = new URLSearchParams(text.replace(/^#/, ''));
   const numbers = (name, separator = ':') => (link.get(name) ?? '').split(separator).filter((x) => x !== '').map(Number);
@@ -52,7 +52,7 @@ function takeLink(text, state) {
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
 }
 
-/** The picture with its words, as a PNG to keep. `draw` draws it first, so that it can be read. */
+/** Save the picture with its text as a PNG. `draw` is called first, so that its pixels can be read. */
 function savePicture(canvas, draw, title, lines, range, colours, labels) {
   draw();
   const ratio = canvas.width / canvas.clientWidth;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What is written over the picture: the ends of the body's axes, and probes.
+// Text over the picture: the ends of the body's axes, and probes.
 
-/** Where a point of the body is on a pane, CSS pixels; null behind the viewer. */
+/** Project a point of the body to a pane, CSS pixels; null behind the viewer. */
 function project(pane, [x, y, z], ratio) {
   const m = pane.toEye;
   const eye = [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
@@ -19,7 +19,7 @@ const placed = (element, at, shown) => {
   if (shown) element.style.transform = where;
 };
 
-const LETTER_RADIUS = 12; // CSS pixels, with a little air
+const LETTER_RADIUS = 12; // CSS pixels, with some space around
 const ARROW_RADIUS = 13;  // of gravity's arrow, at its head
 
 /** Out of a plate that it would overlap, the shortest way up, down, right or left that stays in the
@@ -33,7 +33,7 @@ function offPlate(at, plate, box) {
   return ways.reduce((best, way) => (far(way) < far(best) ? way : best), ways[0] ?? at);
 }
 
-/** Beside an arrow that it would overlap. */
+/** Move a letter beside an arrow that it would overlap. */
 function offArrow(at, [from, to], box) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   const along = Math.max(0, Math.min(1, ((at.x - from.x) * dx + (at.y - from.y) * dy) / Math.max(dx * dx + dy * dy, 1e-9)));
@@ -86,7 +86,7 @@ class Letters {
   }
 }
 
-/** The vertex nearest a place. */
+/** Return the vertex nearest to a position. */
 function nearestVertex(basis, xyz, place) {
   let best = -1;
   let least = Infinity;

@@ -71,7 +71,7 @@ class Outlines {
     this.across = [[0, 1], [0, 1]]; // where each picture's second axis points, of length 1
   }
 
-  /** Where a plane is, in words. */
+  /** Return the position of a plane as text. */
   placeWords(i) {
     const { state: { slices, body } } = this;
     return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm below the apices` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from the front`;

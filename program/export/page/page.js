@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The page: state in, picture out, and the controls between.
+// The page: connects the state, the picture and the controls.
 
-const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside', 'inside']; // what is shown or not
+const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside', 'inside']; // options that a link lists under `show`
 const VIEW_ANGLE = 0.5; // radians, of the camera from top to bottom
 const KIND_TEXT = {
   displacement: 'How far each place is from where it is FROM.',
@@ -10,7 +10,7 @@ const KIND_TEXT = {
   height: 'How high each place is above the lowest one, along gravity.',
 };
 
-/** The box and the ball around places. */
+/** Compute the bounding box and sphere of positions. */
 function boundsOf(places) {
   const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
   for (const place of places) {
@@ -21,7 +21,7 @@ function boundsOf(places) {
   return { centre, low, high, half: low.map((x, i) => (high[i] - x) / 2), radius: radius || 1 };
 }
 
-/** The rotation that takes the arrow's -z to a direction. */
+/** Return the rotation that turns -z to a direction. */
 function arrowTurn(direction) {
   const axis = cross([0, 0, -1], direction);
   const w = 1 - direction[2];
@@ -29,7 +29,7 @@ function arrowTurn(direction) {
 }
 
 const colourReader = document.createElement('canvas').getContext('2d');
-/** Parts of a colour, 0 to 1, whose name may be the system's. */
+/** Return red, green and blue, 0 to 1, of a CSS colour, which may be a system colour. */
 const rgb = (name) => {
   colourReader.fillStyle = name;
   return [1, 3, 5].map((i) => parseInt(colourReader.fillStyle.slice(i, i + 2), 16) / 255);
@@ -46,14 +46,14 @@ function start() {
   const { inside } = basis;
   const fromWhere = basis.from.name.replace(/^the /, 'in the '); // "supine at rest", "in the scan"
   const restOrScan = basis.resting ? 'rest' : 'scan';
-  const look = () => { unseen = true; }; // the picture is to be drawn again
+  const look = () => { unseen = true; }; // draw the picture again in the next frame
   const tangent = Math.tan(VIEW_ANGLE / 2);
-  let stale = true;     // vertices are not where the state says
-  let unseen = true;    // the picture is not what the state says
-  let pointer = null;   // where on the canvas, CSS pixels
-  let asked = true;     // what is there has been asked, for this picture
-  let wanted = null;    // {at, then}: a click's own question, and what is done with its answer
-  let question = null;  // {pane, then} that the graphics card has been asked
+  let stale = true;     // the vertices must be moved to the state
+  let unseen = true;    // the picture must be drawn again
+  let pointer = null;   // position on the canvas, CSS pixels
+  let asked = true;     // the value under the pointer has been requested for this picture
+  let wanted = null;    // {at, then}: position of a click, and the callback for the result
+  let question = null;  // {pane, then} of the request that the graphics card is working on
   let before = null;    // time of the last frame, when frames follow each other
   let streak = 0;       // frames that have followed each other
   let frameTime = NaN;  // ms, smoothed
@@ -151,7 +151,7 @@ function start() {
     return [makePane('pinned', state.pinned, state.pinnedQ, [0, 0, half, h]), makePane('now', state.moment, state.q, [half, 0, w - half, h])];
   }
 
-  /** The pane at a place of the canvas (CSS pixels), and where in it, from -1 to 1 each way. */
+  /** Return the pane at a position on the canvas (CSS pixels), and the position in it, -1 to 1 each way. */
   function paneAt({ x, y }) {
     const [px, py] = [x * ratio(), canvas.height - y * ratio()];
     const pane = panes.find(({ box }) => px >= box[0] && px < box[0] + box[2]) ?? panes[0];
@@ -275,7 +275,7 @@ function start() {
     }));
   }
 
-  /** What is at a place of the canvas, when the graphics card has said it. */
+  /** Request what is at a position on the canvas. */
   function ask(at, then) {
     pointer = at;
     wanted = { at, then };
@@ -300,7 +300,7 @@ function start() {
   const outlines = new Outlines($('outlines'), basis, state, () => { told = null; look(); });
   $('holds-section').hidden = !basis.hasVolume;
 
-  /** Write on each card what its posture does at a volume; `most` is what a lung holds at most in them. */
+  /** Write the changes in each posture at a volume on its card; `most` is the largest volume of a lung. */
   let answered = { depth: null };
   function answerCards() {
     if (answered.depth === state.depth) return;
@@ -312,11 +312,11 @@ function start() {
     }
   }
 
-  /** How high each lung's middle lies, mm. */
+  /** Return the height of each lung's middle, mm. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
-  let told = null; // the moment that the sentences are about, and how many vertices they tell of
-  /** Write what the moment means, of all vertices or, while it changes, of some thousand. */
+  let told = null; // the moment that the sentences describe, and the number of vertices they use
+  /** Write the finding: from all vertices or, while the moment changes, from some thousand. */
   function tellFinding(stride) {
     if (told?.moment === state.moment && told.stride <= stride) return;
     told = { moment: state.moment, stride };
@@ -341,7 +341,7 @@ function start() {
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // as "rest + 500 mL"
 
   const last = {};
-  /** Acts where a value is another than the last time: asking the page takes longer than remembering. */
+  /** Act if a value has changed; the last one is kept, because reading it from the page is slower. */
   const changed = (what, value, act) => {
     if (last[what] === value) return;
     last[what] = value;
@@ -409,7 +409,7 @@ function start() {
     for (const { icon, posture } of buttons) drawIcon(icon, tilted(posture.q, posture.tilt));
   }
 
-  /** Vertices move, and the picture with them. */
+  /** Mark the vertices and the picture as out of date. */
   const touch = () => { stale = unseen = true; };
 
   function frame(now) {
@@ -484,7 +484,7 @@ function start() {
   }
 
   let inHeadset = false;
-  /** What a headset shows of a frame at a time, ms. */
+  /** Return the pane that a headset shows at a time, ms. */
   function headsetFrame(now) {
     if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
       state.compute();
@@ -519,7 +519,7 @@ function start() {
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
     look();
   };
-  /** What is at a place of the canvas stays there, as far as it is as deep as the pivot. */
+  /** Zoom so that what is at a position on the canvas, at the depth of the pivot, stays there. */
   const zoom = (ratioOfSizes, at) => {
     const { width, height } = boxSize();
     const aspect = width / height;
@@ -611,7 +611,7 @@ function start() {
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
-  $('posture-name').addEventListener('blur', () => { last.posture = null; look(); }); // what was typed may be none
+  $('posture-name').addEventListener('blur', () => { last.posture = null; look(); }); // the typed text may be no posture
   const play = () => {
     state.playing = !state.playing;
     remeasure();
@@ -771,13 +771,13 @@ function start() {
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
     /** Weights, gains and volumes. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
-    /** All of a frame but the graphics card's part. */
+    /** Run the script of a frame, without the graphics card's part. */
     frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, state.body, ratio(), plates()); showState(); },
     findingOf, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }
 
-/** What draws on a canvas: the graphics card, or where there is none the script. */
+/** Return what draws on a canvas: WebGL 2 or, where it is missing, the poster. */
 function pictureOn(canvas, basis) {
   try {
     return new Picture(canvas, basis);
@@ -787,7 +787,7 @@ function pictureOn(canvas, basis) {
   }
 }
 
-/** What the basis is, in the program's own words. */
+/** List the facts about the basis. */
 function showFacts(basis) {
   const { metadata } = basis;
   const facts = [

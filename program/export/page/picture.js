@@ -31,7 +31,7 @@ class Picture {
     this.gpuTime = NaN;
   }
 
-  /** supine.glsl for this basis. */
+  /** Return supine.glsl for this basis. */
   sized() {
     const { basis } = this;
     return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, basis.words)}`, source('supine.glsl')];
@@ -125,7 +125,7 @@ class Picture {
     this.fewInputs = inputs(few(rest, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
   }
 
-  /** What is inside: its own displacements, a ball, and what its meshes need. */
+  /** Make the buffers of the content: displacements, a ball, and meshes. */
   makeInside() {
     const { gl, basis: { inside, modes: k } } = this;
     this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.insideLibrary());
@@ -160,11 +160,11 @@ class Picture {
     return made;
   }
 
-  /** Where the surface is in a state: positions, and normals with areas, four floats each. */
+  /** Make the buffers of the deformed surface: positions, and normals with areas, four floats each. */
   makeOutputs() {
     const { gl, basis } = this;
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // normals of which nothing is shown
+    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // for normals that are not used
     this.edges = null;
     this.states = {};
     this.arrays = {};
@@ -188,7 +188,7 @@ class Picture {
     return this.arrays[key];
   }
 
-  /** Each edge of the triangles once, as pairs of vertices; where each lung's begin. */
+  /** List each edge of the triangles once, as pairs of vertices, lung by lung. */
   makeEdges() {
     const { gl, basis } = this;
     const { corners } = basis;
@@ -208,7 +208,7 @@ class Picture {
     this.edges = { buffer: this.buffer(pairs.subarray(0, count), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), begin: [...begin, count] };
   }
 
-  /** One pixel that holds floats' bits. */
+  /** Make the pixel that picking draws to; it holds the bits of floats. */
   makePick() {
     const { gl } = this;
     this.picking = null;
@@ -230,7 +230,7 @@ class Picture {
     return made;
   }
 
-  /** An arrow of length 1 along -z, from the origin. */
+  /** Make an arrow of length 1 along -z, from the origin. */
   makeArrow() {
     const places = [];
     const normals = [];
@@ -253,7 +253,7 @@ class Picture {
     return { ...made, array: this.array([[made.places, 3, 12, 0], [made.normals, 3, 12, 0]]) };
   }
 
-  /** A box from -1 to 1 each way. */
+  /** Make a box from -1 to 1 each way. */
   makeTable() {
     const [places, normals] = [[], []];
     for (let axis = 0; axis < 3; ++axis) {
@@ -268,7 +268,7 @@ class Picture {
     return this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]);
   }
 
-  /** Every vertex of `array` into buffers: positions, normals. */
+  /** Compute positions and normals of every vertex of `array` into buffers. */
   capture(moment, array, targets, count, moving = this.moving) {
     const { gl } = this;
     gl.useProgram(moving.program);
@@ -276,7 +276,7 @@ class Picture {
     gl.uniform4fv(moving.at.supine_weights, weights);
     gl.uniform3fv(moving.at.supine_gains, gains);
     if (moving.at.supine_normal_weights) gl.uniform3fv(moving.at.supine_normal_weights, turns);
-    gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written may have no second use
+    gl.bindBuffer(gl.ARRAY_BUFFER, null); // WebGL refuses to write a buffer that is bound elsewhere
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
     targets.forEach((target, i) => gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, i, target));
@@ -290,7 +290,7 @@ class Picture {
     gl.bindVertexArray(null);
   }
 
-  /** Moves a state's surface, and what is inside. */
+  /** Deform the surface and the content of a state. */
   deform(name, moment) {
     const { moved, turned, few, inside } = this.state(name);
     this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
@@ -298,7 +298,7 @@ class Picture {
     if (inside) this.captureInside(moment, inside);
   }
 
-  /** Moves what is inside by its field, then its rigid parts, of which each vertex needs all others. */
+  /** Deform the content by its field; then move rigid parts, each of whose vertices depends on all others. */
   captureInside(moment, target) {
     const { gl, basis: { inside } } = this;
     this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
@@ -307,7 +307,7 @@ class Picture {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** uniformsOf a moment, once for all that it moves. */
+  /** Return uniformsOf a moment, computed once. */
   uniforms(moment) {
     if (this.uniformsMoment !== moment) {
       this.uniformsMoment = moment;
@@ -316,7 +316,7 @@ class Picture {
     return this.uniformsNow;
   }
 
-  /** What the graphics card makes of a moment: positions, mm LPS, and unit normals, xyz of each vertex. */
+  /** Read back the positions, mm LPS, and unit normals of a moment, xyz of each vertex. */
   read(moment) {
     const { gl, basis } = this;
     const targets = [0, 1].map(() => this.buffer(16 * basis.vertices, gl.DYNAMIC_READ));
@@ -324,7 +324,7 @@ class Picture {
     return targets.map((target) => this.take(target, basis.vertices));
   }
 
-  /** The same of what is inside: positions. */
+  /** Read back the positions of the content. */
   readInside(moment) {
     const { gl, basis: { inside } } = this;
     const target = this.buffer(16 * inside.vertices, gl.DYNAMIC_READ);
@@ -332,7 +332,7 @@ class Picture {
     return this.take(target, inside.vertices);
   }
 
-  /** The first three of each four floats of a buffer, which goes. */
+  /** Read the first three of each four floats of a buffer, and delete it. */
   take(target, count) {
     const { gl } = this;
     const four = new Float32Array(4 * count);
@@ -342,7 +342,7 @@ class Picture {
     return new Float32Array(3 * count).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
   }
 
-  /** Sets a program up for a pane of the picture. */
+  /** Set a program up for a pane of the picture. */
   usePane(program, pane, lens) {
     const { gl } = this;
     gl.useProgram(program.program);
@@ -360,7 +360,7 @@ class Picture {
     gl.drawElements(mode, begin[lung + 1] - begin[lung], gl.UNSIGNED_INT, 4 * begin[lung]);
   }
 
-  /** The surface: lungs that are whole, then those that are seen through, nearest side only. */
+  /** Draw the surface: opaque lungs, then transparent ones, only their nearest side. */
   drawLungs(pane) {
     const { gl, surface } = this;
     const lungs = pane.opacity.map((opacity, lung) => ({ opacity, lung })).filter((l) => l.opacity > 0).sort((a, b) => b.opacity - a.opacity);
@@ -370,7 +370,7 @@ class Picture {
     set('spacing', pane.contours ? pane.range.step : 0);
     set('dark', pane.dark ? 1 : 0);
     set('flatly', 0);
-    /** What displacements count from: a shell behind the lungs, then an outline over them. */
+    /** Draw the reference surface: a shell behind the lungs, then an outline over them. */
     const ghost = (how) => {
       if (!pane.ghost) return;
       gl.bindVertexArray(this.shown('from', 'from'));
@@ -408,7 +408,7 @@ class Picture {
     ghost(2);
   }
 
-  /** What is inside, balls of `radius` mm and meshes, by a program that usePane has set up. */
+  /** Draw the content, balls of `radius` mm and meshes, by a program that usePane has set up. */
   drawInside(program, pane, radius) {
     const { gl, basis: { inside } } = this;
     const [now, from] = [this.state(pane.state).inside, this.state(pane.origin).inside];
@@ -430,7 +430,7 @@ class Picture {
     }
   }
 
-  /** The same in the colours of the lungs; what has no such value, in grey. */
+  /** Draw the content in the colours of the lungs, or in grey if the quantity is not defined there. */
   drawContent(pane) {
     const { gl, content } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
@@ -442,7 +442,7 @@ class Picture {
     this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // seen on small screens too
   }
 
-  /** A few arrows from where the surface was to where it is. */
+  /** Draw some arrows from the reference surface to the deformed one. */
   drawArrows(pane) {
     const { gl, solid } = this;
     const key = `arrows ${pane.state} ${pane.origin}`;
@@ -459,7 +459,7 @@ class Picture {
     }
   }
 
-  /** Gravity, seen through the lungs where they hide it. */
+  /** Draw the arrow of gravity, faded where the lungs hide it. */
   drawGravity(pane) {
     const { gl, solid } = this;
     this.usePane(solid, pane);
@@ -475,7 +475,7 @@ class Picture {
     }
   }
 
-  /** What the patient lies on. */
+  /** Draw the table. */
   drawTable(pane) {
     const { gl, solid } = this;
     this.usePane(solid, pane);
@@ -487,7 +487,7 @@ class Picture {
     gl.drawArrays(gl.TRIANGLES, 0, 36);
   }
 
-  /** Draws panes on the canvas, or where else. */
+  /** Draw panes on the canvas or another framebuffer. */
   draw(panes, framebuffer = null) {
     const { gl } = this;
     this.beginTiming();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The surface painted without a graphics card, farthest triangles first: what Picture does where there is
-// no WebGL 2, without light on it, lines, arrows, what is inside and what is pointed at.
+// Paint the surface without WebGL 2, farthest triangles first; without shading, lines, arrows, content and
+// picking, which Picture has.
 
 class Poster {
   constructor(canvas, basis) {

@@ -66,7 +66,7 @@ class State {
   constructor(basis) {
     this.basis = basis;
     this.standing = { q: POSTURES[2].q, tilt: 0 }; // the posture, and the tilt on top of it
-    this.q = POSTURES[2].q;                        // as shown, on its way there
+    this.q = POSTURES[2].q;                        // the rotation shown, on its way to `standing`
     this.turning = null;
     this.unit = basis.hasVolume ? 'mL' : 'mm';
     this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
@@ -105,7 +105,7 @@ class State {
     return tilted(this.standing.q, this.standing.tilt);
   }
 
-  /** Takes up a posture, over a moment unless motion is unwanted. */
+  /** Go to a posture, animated unless the user prefers reduced motion. */
   settle(q, tilt, seconds) {
     this.standing = { q, tilt };
     const still = seconds === 0 || matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -113,12 +113,12 @@ class State {
     if (still) this.q = this.goal;
   }
 
-  /** Turns the patient about an axis of the room. */
+  /** Turn the patient about an axis of the room. */
   roll(axis, angle) {
     this.settle(compose(turn(axis, angle), this.q), 0, 0);
   }
 
-  /** Moves on by `seconds`; true when something has moved. */
+  /** Advance by `seconds`; return whether something has moved. */
   advance(seconds) {
     const goal = this.room ? 1 : 0;
     const moves = this.playing || this.turning !== null || this.roomBlend !== goal;
@@ -143,7 +143,7 @@ class State {
     return this.kind === 'difference' || this.beside;
   }
 
-  /** Weights for now; false, and the old ones stay, where the surface would fold. */
+  /** Compute the moment; return false and keep the old one if the surface would fold. */
   compute() {
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (moment.folds) return false;

@@ -3,7 +3,7 @@
 layout(location = 0) in vec3 moved;
 layout(location = 1) in vec4 turned; // normal; area around, beside that of the basis' own surface
 layout(location = 2) in vec3 origin; // what the colour measures from: rest, or the reference posture
-layout(location = 3) in vec4 before; // as `turned`, there
+layout(location = 3) in vec4 before; // as `turned`, in that state
 uniform mat4 toEye;
 uniform mat4 projection;
 uniform vec4 lens;    // part of the picture that is drawn: centre, magnification

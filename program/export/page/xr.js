@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The lungs in a headset, at their own size, where the browser has WebXR.
 
-const XR_AWAY = 0.7; // metres, in front of the viewer's first place
+const XR_AWAY = 0.7; // metres in front of the viewer's first position
 
-/** a b of 4 x 4 matrices by columns. */
+/** Multiply 4 x 4 matrices, by columns. */
 const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
   let sum = 0;
   for (let k = 0; k < 4; ++k) sum += a[4 * k + (i % 4)] * b[4 * Math.floor(i / 4) + k];
