@@ -7,10 +7,9 @@
 #include "sh/base/text.h"
 
 #include "precompute/inside/surface.h"
-#include "precompute/lungs/gate.h"
 #include "precompute/patient/gain.h"
 #include "precompute/patient/surfaces.h"
-#include "program/options/command.h"
+#include "program/model_options.h"
 #include "program/options/surface_options.h"
 
 static const char name[] = "fit";
@@ -19,10 +18,10 @@ static const char name[] = "fit";
 typedef struct request {
   const char *path, *name;
   supine_landmark_options landmarks;
-  bool has_law, has_midline, has_gain, expandability, json;
+  bool has_law, has_gain, expandability, json;
   int law;
-  double midline, gain, reach;
-  supine_mesh_load_options load;
+  double gain, reach;
+  supine_source_options source; /* of all surfaces */
 
   supine_state rest, state;
   size_t count; /* number of `further`; all states where no --other was named */
@@ -109,8 +108,9 @@ static const supine_option table[] = {
      .read = read_further, .alias = "third",
      .wants = "(at most 8) a state, as prone:rest, a colon and a file"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
-     FILLS(midline), SUPINE_SAYS_GIVEN(request, has_midline), .wants = "an x in mm", .more = true},
-    {.table = supine_options_surface_frame, FILLS(load)},
+     FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline), .wants = "an x in mm",
+     .more = true},
+    {.table = supine_options_surface_frame, FILLS(source.load)},
     {"reach", 0, "MM",
      "for surfaces: length over which forces spread, as in 'supine precompute --reach'",
      FILLS(reach), .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0",
@@ -300,41 +300,6 @@ static void print_text(const supine_patient_record *record, const request *wante
                100.0 * report->explained_fitted);
 }
 
-/* Load "left.ply,right.ply" as one model. */
-static supine_status load_lungs(const request *wanted, const char *operand, supine_lungs *lungs,
-                                supine_error *error) {
-  enum { FILES_MAX = 2 };
-  supine_mesh meshes[FILES_MAX] = {0};
-  supine_mesh_report report = {0};
-  size_t count = 0;
-  char *names = strdup(operand);
-  char *rest = names;
-  supine_status status = names == NULL
-                             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a name")
-                             : SUPINE_OK;
-  for (char *path; status == SUPINE_OK && (path = strsep(&rest, ",")) != NULL;) {
-    status = count == FILES_MAX
-                 ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                    "'%s': more than two lungs: give one or two", operand)
-                 : supine_mesh_load(path, &wanted->load, &meshes[count++], &report, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_findings findings = {""};
-    const supine_lungs_source source = {.name = operand,
-                                        .axes = report.axes,
-                                        .axes_given = wanted->load.axes != SUPINE_AXES_AUTO,
-                                        .units_given = wanted->load.millimetres_per_unit != 0.0,
-                                        .midline = wanted->has_midline ? &wanted->midline : NULL};
-    status = supine_lungs_gate(meshes, count, &source, lungs, NULL, &findings, error);
-    supine_options_say_findings(name, &findings);
-  }
-  for (size_t i = 0; i < FILES_MAX; ++i) {
-    supine_mesh_free(&meshes[i]);
-  }
-  free(names);
-  return status;
-}
-
 static void evidence_free(evidence *of) {
   supine_lungs_free(&of->lungs[0]);
   supine_lungs_free(&of->lungs[1]);
@@ -380,10 +345,12 @@ static supine_status load_evidence(const request *wanted, evidence *of, supine_e
     }
   }
   if (status == SUPINE_OK && wanted->rest_path != NULL) {
-    status = load_lungs(wanted, wanted->rest_path, &of->lungs[0], error);
+    status =
+        supine_command_load_lungs(name, wanted->rest_path, &wanted->source, &of->lungs[0], error);
   }
   if (status == SUPINE_OK && wanted->state_path != NULL) {
-    status = load_lungs(wanted, wanted->state_path, &of->lungs[1], error);
+    status =
+        supine_command_load_lungs(name, wanted->state_path, &wanted->source, &of->lungs[1], error);
   }
   if (status == SUPINE_OK && wanted->rest_path != NULL && of->pairs.count > 0) {
     status = find_sides(&of->lungs[0], &of->pairs, error);
@@ -455,7 +422,7 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
                             pairs->count);
   }
   record->patient.frame = supine_patient_frame_of_points(
-      pairs->count, pairs->from, wanted->has_midline ? &wanted->midline : NULL);
+      pairs->count, pairs->from, wanted->source.has_midline ? &wanted->source.midline : NULL);
   supine_patient_rows_of_pairs(&record->patient.frame, pairs, rows);
   const supine_status status =
       supine_patient_fit(options, rows, 0, pairs->count, &record->patient, &record->report, error);
@@ -482,7 +449,7 @@ static supine_status load_further(const request *wanted, const evidence *of,
     supine_patient_pairs *pairs = &work->pairs[k];
     memcpy(work->other[k].gravity, wanted->further[k].gravity, sizeof work->other[k].gravity);
     if (!is_landmarks(path)) {
-      status = load_lungs(wanted, path, &work->lungs[k], error);
+      status = supine_command_load_lungs(name, path, &wanted->source, &work->lungs[k], error);
       work->other[k].surface = &work->lungs[k].mesh;
       continue;
     }

@@ -337,6 +337,33 @@ supine_status supine_command_model_load(supine_model_options *options, const cha
   return status;
 }
 
+supine_status supine_command_load_lungs(const char *command, const char *operand,
+                                        const supine_source_options *options, supine_lungs *lungs,
+                                        supine_error *error) {
+  enum { FILES_MAX = 2 };
+  char *paths[FILES_MAX + 1];
+  size_t count = 0;
+  supine_source source = {.is_map = false};
+  supine_findings findings = {""};
+  char *names = strdup(operand);
+  char *left = names;
+  if (names == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a name");
+  }
+  while (left != NULL && count <= FILES_MAX) {
+    paths[count++] = strsep(&left, ",");
+  }
+  const supine_status status =
+      count > FILES_MAX
+          ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                             "'%s': more than two lungs: give one or two", operand)
+          : supine_precompute_source_load(options, paths, count, &source, &findings, error);
+  supine_options_say_findings(command, &findings);
+  *lungs = source.lungs;
+  free(names);
+  return status;
+}
+
 void supine_command_model_options_free(supine_model_options *options) {
   supine_patient_field_free(&options->field);
   supine_precompute_source_free(&options->made_from);

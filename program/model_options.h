@@ -33,6 +33,12 @@ void supine_command_model_options_begin(supine_model_options *options);
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
                                         char **paths, size_t count, bool keep, supine_error *error);
 
+/* Load surfaces, "left.ply,right.ply", or a label map as one pair of lungs; print the findings.
+ * @param lungs  zeroed */
+supine_status supine_command_load_lungs(const char *command, const char *operand,
+                                        const supine_source_options *options, supine_lungs *lungs,
+                                        supine_error *error);
+
 /* Release what supine_command_model_load allocated. */
 void supine_command_model_options_free(supine_model_options *options);
 

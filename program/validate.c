@@ -20,7 +20,7 @@ typedef struct request {
   supine_command_state from, state[SUPINE_COMMAND_STATES_MAX];
   size_t count;
   supine_orientation orientation;
-  supine_mesh_load_options load;
+  supine_source_options source;
   supine_volume_options volume;
   double scale;
   bool has_scale, json;
@@ -74,7 +74,7 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
      .wants = "a number", .rivals = "breath"},
-    {.table = supine_options_surface_frame, FILLS(load)},
+    {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
      "where the error sits: .png, a picture of every state; .ply or .vtp, the predicted surface of "
      "the first with the way to the state's surface as its displacement (mm)",
@@ -255,7 +255,7 @@ static supine_status validate(const request *wanted, supine_command_subject *s,
   supine_status status = supine_command_subject_begin(s, error);
   for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
     status =
-        supine_command_validate_state(s, i, &wanted->load, i == 0 ? wanted->landmarks.path : NULL,
+        supine_command_validate_state(s, i, &wanted->source, i == 0 ? wanted->landmarks.path : NULL,
                                       wanted->landmarks.reverse, error);
     (void)supine_options_progress_step(&progress, (double)(i + 1) / (double)s->count);
   }

@@ -5,8 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/lungs/gate.h"
-#include "program/options/surface_options.h"
+#include "program/model_options.h"
 #include "program/validation.h"
 
 #include "precompute/inside/biharmonic.h"
@@ -327,55 +326,31 @@ static supine_status validate_points(supine_command_subject *s, size_t which, co
   return status;
 }
 
-/* The lungs of a state as one surface. */
-static supine_status load_state(const char *path, const supine_mesh_load_options *load,
-                                supine_mesh *mesh, supine_error *error) {
-  supine_mesh_report report;
-  supine_mesh read = {0};
-  supine_lungs lungs = {0};
-  supine_findings findings = {""};
-  supine_status status = supine_mesh_load(path, load, &read, &report, error);
-  if (status == SUPINE_OK) {
-    const supine_lungs_source source = {.name = path,
-                                        .axes = report.axes,
-                                        .axes_given = load->axes != SUPINE_AXES_AUTO,
-                                        .units_given = load->millimetres_per_unit != 0.0};
-    status = supine_lungs_gate(&read, 1, &source, &lungs, NULL, &findings, error);
-    supine_options_say_findings("validate", &findings);
-  }
-  *mesh = lungs.mesh;
-  lungs.mesh = (supine_mesh){0};
-  supine_lungs_free(&lungs);
-  supine_mesh_free(&read);
-  return status;
-}
-
 supine_status supine_command_validate_state(supine_command_subject *subject, size_t i,
-                                            const supine_mesh_load_options *load,
+                                            const supine_source_options *source,
                                             const char *landmarks, bool reverse,
                                             supine_error *error) {
   supine_command_subject *s = subject;
   const supine_command_state *state = &s->state[i];
   supine_command_outcome *outcome = &s->outcome[i];
-  supine_mesh mesh = {0};
-  supine_status status = SUPINE_OK;
-  if (state->path != NULL) {
-    status = load_state(state->path, load, &mesh, error);
-  }
+  supine_lungs lungs = {0};
+  supine_status status = state->path == NULL ? SUPINE_OK
+                                             : supine_command_load_lungs("validate", state->path,
+                                                                         source, &lungs, error);
   if (status == SUPINE_OK) {
-    status = predict_surface(s, state, &mesh, outcome, error);
+    status = predict_surface(s, state, &lungs.mesh, outcome, error);
   }
   if (status == SUPINE_OK && landmarks != NULL) {
     status = validate_points(s, i, landmarks, reverse, error);
   }
   if (status == SUPINE_OK && state->path != NULL) { /* add the fitted motion to the prediction */
-    status = supine_patient_validate_surface(&s->rest, s->moved, outcome->predicted, &mesh,
+    status = supine_patient_validate_surface(&s->rest, s->moved, outcome->predicted, &lungs.mesh,
                                              outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;
   }
   if (status == SUPINE_OK && state->path != NULL && s->count > 1) {
-    status = find_best(s, &mesh, outcome, error);
+    status = find_best(s, &lungs.mesh, outcome, error);
   }
-  supine_mesh_free(&mesh);
+  supine_lungs_free(&lungs);
   return status;
 }

@@ -6,6 +6,7 @@
 
 #include "precompute/patient/rows.h"
 #include "precompute/patient/validate.h"
+#include "precompute/source.h"
 #include "program/options/orientation.h"
 #include "program/options/state_options.h"
 
@@ -64,7 +65,7 @@ supine_status supine_command_subject_begin(supine_command_subject *subject, supi
  * @param reverse  of the landmarks
  * @retval those of loading and comparing */
 supine_status supine_command_validate_state(supine_command_subject *subject, size_t i,
-                                            const supine_mesh_load_options *load,
+                                            const supine_source_options *source,
                                             const char *landmarks, bool reverse,
                                             supine_error *error);
 
