@@ -51,7 +51,7 @@ static supine_patient_pairs scatter(size_t count, unsigned long seed) {
 /* Compute where a law moves a point; the side by the midline. */
 static void displace(const supine_patient *patient, const double point[3], double u[3]) {
   const supine_patient_place place = supine_patient_find(&patient->frame, point, 0.0);
-  supine_patient_displacement(patient, &place, u);
+  supine_patient_displacement(patient, &place, 1.0, u);
 }
 
 /* Moves points by a law, and each coordinate by noise. */
@@ -188,7 +188,7 @@ static void test_find_side_given_overrides_midline(void **state) {
   const supine_patient_place place = supine_patient_find(&patient.frame, point, 1.0);
   assert_true(place.side == 1.0 && place.box[0] < 0.0);
   double u[3];
-  supine_patient_displacement(&patient, &place, u);
+  supine_patient_displacement(&patient, &place, 1.0, u);
   assert_true(u[0] == 0.0); /* not past the plane that stays */
   supine_patient_pairs_free(&pairs);
 }

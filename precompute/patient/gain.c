@@ -28,6 +28,7 @@ typedef struct state {
   double *u;                 /* [count, 3] from full inflation to rest in the fitted posture, mm */
   double *heights;           /* [count, 2] spread, in the fitted posture and in this one */
   double unknowns[UNKNOWNS]; /* s, t */
+  double weight;             /* sum over the rows */
 } state;
 
 typedef struct problem {
@@ -50,17 +51,15 @@ static double ratio_at(const state *s, size_t i, const supine_force_law *law) {
   return then != 0.0 ? (fixed + law->gain * s->heights[2 * i + 1]) / then : 0.0;
 }
 
-/* Find the squared residual of a state at a gain, mm^2, with its best other unknowns. */
-static double squares_of(const problem *p, size_t which, double gain, double *unknowns,
-                         double *weight) {
-  const state *s = &p->states[which];
+/* Fit the other unknowns of a state at a gain; return its squared residual, mm^2. */
+static double fit_state(const problem *p, state *s, double gain) {
   const supine_force_law law =
       supine_patient_force(&p->record->patient.power, gain, p->record->state[1].gravity);
   const lapack_int n = p->moved ? UNKNOWNS : 1;
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
   double squares = 0.0;
-  *weight = 0.0;
+  s->weight = 0.0;
   for (size_t i = 0; i < s->count; ++i) {
     const double *axis = s->rows[i].axis;
     const double *u = s->u + 3 * i;
@@ -74,28 +73,26 @@ static double squares_of(const problem *p, size_t which, double gain, double *un
     cblas_dsyr(CblasColMajor, CblasUpper, n, w, row, 1, matrix, n);
     cblas_daxpy(n, w * value, row, 1, right, 1);
     squares += w * value * value;
-    *weight += w;
+    s->weight += w;
   }
-  memset(unknowns, 0, UNKNOWNS * sizeof *unknowns);
-  cblas_dcopy(n, right, 1, unknowns, 1);
-  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', n, 1, matrix, n, unknowns, n) != 0) {
-    memset(unknowns, 0, UNKNOWNS * sizeof *unknowns);
+  memset(s->unknowns, 0, sizeof s->unknowns);
+  cblas_dcopy(n, right, 1, s->unknowns, 1);
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', n, 1, matrix, n, s->unknowns, n) != 0) {
+    memset(s->unknowns, 0, sizeof s->unknowns);
   }
-  return fmax(0.0, squares - cblas_ddot(n, unknowns, 1, right, 1));
+  return fmax(0.0, squares - cblas_ddot(n, s->unknowns, 1, right, 1));
 }
 
-static double squares_at(const problem *p, double gain) {
+static double squares_at(problem *p, double gain) {
   double squares = 0.0;
   for (size_t k = 0; k < p->state_count; ++k) {
-    double unknowns[UNKNOWNS];
-    double weight;
-    squares += squares_of(p, k, gain, unknowns, &weight);
+    squares += fit_state(p, &p->states[k], gain);
   }
   return squares;
 }
 
 /* Minimise over the gain by golden section: `now / then` is all but linear in it. */
-static double search(const problem *p) {
+static double search(problem *p) {
   static const double golden = 0.6180339887498949;
   double low = 0.0;
   double high = gain_most;
@@ -199,7 +196,7 @@ static supine_status begin(const problem *p, state *s, const supine_lungs *rest,
       place = supine_patient_find(&patient->frame, rest->mesh.vertices + 3 * s->matching.vertex[i],
                                   place.side);
     }
-    supine_patient_displacement(patient, &place, s->u + 3 * i);
+    supine_patient_displacement(patient, &place, 1.0, s->u + 3 * i);
     for (size_t k = 0; k < 3; ++k) { /* to that from full inflation to rest */
       s->u[3 * i + k] /= p->gains[1][k] - p->gains[0][k];
     }
@@ -233,21 +230,10 @@ static supine_status match_surface(const problem *p, state *s, double gain, supi
 }
 
 void supine_patient_refer(const supine_patient *patient, size_t count, double *points) {
-  enum { STEPS = 30 };
   for (size_t i = 0; i < count; ++i) {
-    double at[3];
     double u[3];
-    double motion[3];
-    memcpy(at, points + 3 * i, sizeof at);
-    for (int step = 0; step < STEPS; ++step) {
-      const supine_patient_place place = supine_patient_find(&patient->frame, at, 0.0);
-      supine_patient_displacement(patient, &place, u);
-      supine_patient_motion(&patient->power, &place, motion);
-      for (size_t k = 0; k < 3; ++k) {
-        at[k] = points[3 * i + k] - u[k] - motion[k];
-      }
-    }
-    memcpy(points + 3 * i, at, sizeof at);
+    const double point[3] = {points[3 * i], points[3 * i + 1], points[3 * i + 2]};
+    supine_patient_settle(patient, point, 0.0, 1.0, points + 3 * i, u);
   }
 }
 
@@ -256,40 +242,32 @@ static supine_status settle(problem *p, supine_patient_gain *found, supine_error
   supine_status status = SUPINE_OK;
   double change = INFINITY;
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
+    double before[SUPINE_PATIENT_OTHERS_MAX];
     change = 0.0;
     for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
+      before[k] = p->states[k].unknowns[0];
       status = p->states[k].other->surface == NULL
                    ? SUPINE_OK
                    : match_surface(p, &p->states[k], found->gain, error);
     }
     found->gain = found->told ? search(p) : found->gain;
+    (void)squares_at(p, found->gain);
     for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
-      state *s = &p->states[k];
-      const double before = s->unknowns[0];
-      double weight;
-      (void)squares_of(p, k, found->gain, s->unknowns, &weight);
-      change = fmax(change, fabs(s->unknowns[0] - before));
+      change = fmax(change, fabs(p->states[k].unknowns[0] - before[k]));
     }
   }
   return status;
-}
-
-/* Find the RMS residual; a landmark has three components. */
-static double root_mean(const problem *p, size_t which, double gain) {
-  double unknowns[UNKNOWNS];
-  double weight;
-  const double squares = squares_of(p, which, gain, unknowns, &weight);
-  return sqrt(squares * (p->states[which].other->surface == NULL ? 3.0 : 1.0) / weight);
 }
 
 static void conclude(problem *p, supine_patient_gain *found) {
   double sum = 0.0;
   double square = 0.0;
   for (size_t k = 0; k < p->state_count; ++k) {
-    supine_patient_other *other = p->states[k].other;
-    other->scale = p->states[k].unknowns[0];
-    other->left = root_mean(p, k, found->gain);
-    other->left_without = root_mean(p, k, 0.0);
+    state *s = &p->states[k];
+    const double components = s->other->surface == NULL ? 3.0 : 1.0;
+    s->other->left_without = sqrt(fit_state(p, s, 0.0) * components / s->weight);
+    s->other->left = sqrt(fit_state(p, s, found->gain) * components / s->weight);
+    s->other->scale = s->unknowns[0];
   }
   for (p->without = 0; p->without < EIGHTHS && found->told; ++p->without) {
     const double gain = search(p);

@@ -203,7 +203,7 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
     const supine_patient_place *place = &m->rows[i].place;
     double u[3];
     double motion[3];
-    supine_patient_displacement(w->patient, place, u);
+    supine_patient_displacement(w->patient, place, 1.0, u);
     supine_patient_motion(&w->patient->power, place, motion);
     m->space[i] = 0.0;
     for (size_t a = 0; a < 3; ++a) {

@@ -10,9 +10,7 @@
 #include "precompute/physics/volume_forms.h"
 #include "sh/base/parallel.h"
 
-enum { GRAIN = 64, SETTLE_STEPS = 60 };
-
-static const double settled = 1e-4; /* change in a step that ends the iteration, mm */
+enum { GRAIN = 64 };
 
 /* Largest distance of the surface's box from the nearest state's, over its width, and difference
  * of their sizes. Boxes of landmarks are estimates and may differ more. */
@@ -94,24 +92,14 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   const work *w = context;
   const supine_patient *patient = &w->record->patient;
   for (size_t i = begin; i < end; ++i) {
+    const double side = supine_patient_side_of(&w->lungs, i);
+    const double spread = w->record->from_surface ? w->ratio[i] : 1.0;
     double *at = w->lungs.mesh.vertices + 3 * i;
-    double *u = w->moved + 3 * i;
-    double motion[3];
-    double change = INFINITY;
-    for (int step = 0; step < (w->settle ? SETTLE_STEPS : 1) && change >= settled; ++step) {
-      const supine_patient_place place =
-          supine_patient_find(&patient->frame, at, supine_patient_side_of(&w->lungs, i));
-      const double spread = w->record->from_surface ? w->ratio[i] : 1.0;
-      supine_patient_direction(&patient->power, &place,
-                               spread * supine_patient_force_at(&patient->power, &place), u);
-      supine_patient_correct(patient, &place, u);
-      supine_patient_motion(&patient->power, &place, motion);
-      change = 0.0;
-      for (size_t k = 0; k < 3 && w->settle; ++k) {
-        const double before = at[k];
-        at[k] = w->scan[3 * i + k] - u[k] - motion[k];
-        change += fabs(at[k] - before);
-      }
+    if (w->settle) {
+      supine_patient_settle(patient, w->scan + 3 * i, side, spread, at, w->moved + 3 * i);
+    } else {
+      const supine_patient_place place = supine_patient_find(&patient->frame, at, side);
+      supine_patient_displacement(patient, &place, spread, w->moved + 3 * i);
     }
   }
 }
@@ -288,45 +276,41 @@ void supine_patient_model(const supine_patient_field *field, supine_model *model
 
 /* --- the scan -------------------------------------------------------------------------------- */
 
-/* Find the largest difference between a surface's box and a state's, over the state's width. */
-static double box_distance(const supine_patient_record *record, size_t state,
-                           const supine_lungs *lungs) {
-  const supine_patient_frame *frame = &record->patient.frame;
-  double most = 0.0;
-  for (size_t k = 0; k < 3; ++k) {
-    const double low = state == 0 ? frame->minimum[k] : record->emptier[0][k];
-    const double high = state == 0 ? frame->maximum[k] : record->emptier[1][k];
-    most = fmax(most,
-                fmax(fabs(lungs->minimum[k] - low), fabs(lungs->maximum[k] - high)) / (high - low));
-  }
-  return most;
-}
-
 supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
                                          supine_error *error) {
   const supine_patient_frame *frame = &record->patient.frame;
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
-  *state = box_distance(record, 1, lungs) < box_distance(record, 0, lungs) ? 1 : 0;
+  const double *low[2] = {frame->minimum, record->emptier[0]};
+  const double *high[2] = {frame->maximum, record->emptier[1]};
+  double off[2] = {0.0, 0.0}; /* largest difference of the boxes over a state's width */
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(
         error, SUPINE_ERROR_MESH,
         "the patient's law was fitted to the %s lung alone: give that lung, or fit both",
         frame->only_side > 0 ? "left" : "right");
   }
-  for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
-    const double low = *state == 0 ? frame->minimum[k] : record->emptier[0][k];
-    const double high = *state == 0 ? frame->maximum[k] : record->emptier[1][k];
-    const double size = (lungs->maximum[k] - lungs->minimum[k]) / (high - low);
+  for (size_t i = 0; i < 6; ++i) {
+    const size_t s = i / 3;
+    const size_t k = i % 3;
     const double apart =
-        0.5 * fabs(lungs->maximum[k] + lungs->minimum[k] - high - low) / (high - low);
+        fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k]));
+    off[s] = fmax(off[s], apart / (high[s][k] - low[s][k]));
+  }
+  *state = off[1] < off[0] ? 1 : 0;
+  for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
+    const double from = low[*state][k];
+    const double to = high[*state][k];
+    const double size = (lungs->maximum[k] - lungs->minimum[k]) / (to - from);
+    const double apart =
+        0.5 * fabs(lungs->maximum[k] + lungs->minimum[k] - to - from) / (to - from);
     if (apart > apart_most[record->from_surface] || size > size_most[record->from_surface] ||
         size < 1.0 / size_most[record->from_surface]) {
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
           "the patient's law was fitted between %c = %.0f and %.0f mm, but the surface reaches "
           "from %.0f to %.0f: give both in one frame and unit, of one person",
-          "xyz"[k], low, high, lungs -> minimum[k], lungs -> maximum[k]);
+          "xyz"[k], from, to, lungs -> minimum[k], lungs -> maximum[k]);
     }
   }
   return SUPINE_OK;

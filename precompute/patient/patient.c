@@ -144,10 +144,29 @@ void supine_patient_correct(const supine_patient *patient, const supine_patient_
 }
 
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
-                                 double u[3]) {
-  supine_patient_direction(&patient->power, place, supine_patient_force_at(&patient->power, place),
-                           u);
+                                 double spread, double u[3]) {
+  const supine_patient_power *power = &patient->power;
+  supine_patient_direction(power, place, spread * supine_patient_force_at(power, place), u);
   supine_patient_correct(patient, place, u);
+}
+
+void supine_patient_settle(const supine_patient *patient, const double point[3], double side,
+                           double spread, double at[3], double u[3]) {
+  enum { STEPS = 60 };
+  static const double settled = 1e-4; /* change in a step that ends the iteration, mm */
+  double change = INFINITY;
+  for (int step = 0; step < STEPS && change >= settled; ++step) {
+    const supine_patient_place place = supine_patient_find(&patient->frame, at, side);
+    double motion[3];
+    supine_patient_displacement(patient, &place, spread, u);
+    supine_patient_motion(&patient->power, &place, motion);
+    change = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      const double before = at[k];
+      at[k] = point[k] - u[k] - motion[k];
+      change += fabs(at[k] - before);
+    }
+  }
 }
 
 supine_force_law supine_patient_force(const supine_patient_power *power, double gain,

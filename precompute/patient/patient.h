@@ -133,9 +133,18 @@ double supine_patient_covariance(const supine_patient_centre *a, const supine_pa
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
                             double u[3]);
 
-/** Compute the displacement u at a place, mm, less the motion between the scans. */
+/** Compute the displacement u at a place, mm, less the motion between the scans.
+ * @param spread  factor on the law's force there */
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
-                                 double u[3]);
+                                 double spread, double u[3]);
+
+/** Find where a point of the emptier state was in the fuller one, by fixed-point iteration.
+ * @param side    of its lung; 0: by the midline
+ * @param spread  factor on the law's force there: spread force over (18)
+ * @param at      in: a first guess; out: its place, mm
+ * @param u       its displacement, mm */
+void supine_patient_settle(const supine_patient *patient, const double point[3], double side,
+                           double spread, double at[3], double u[3]);
 
 /** Compute the force of a patient's law, whose slopes turn with gravity by the share `gain`. In
  * the fitted posture the field does not depend on the gain. */
