@@ -7,8 +7,7 @@
 #include "sh/base/text.h"
 
 #include "precompute/inside/surface.h"
-#include "precompute/patient/gain.h"
-#include "precompute/patient/surfaces.h"
+#include "precompute/patient/patient_file.h"
 #include "program/model_options.h"
 #include "program/options/surface_options.h"
 
@@ -430,27 +429,29 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
-/* Fit the gravity-dependent share of the force to the further states. */
+/* Pairs and surfaces of the further states. */
 typedef struct further_work {
   supine_patient_pairs pairs[SUPINE_PATIENT_OTHERS_MAX];
   supine_lungs lungs[SUPINE_PATIENT_OTHERS_MAX];
-  supine_patient_other other[SUPINE_PATIENT_OTHERS_MAX];
 } further_work;
 
-/* Move landmarks of further states, which start in the first scan, to the fuller state where the
- * first is the emptier one. */
+/* Load further states into the record. Landmarks start in the first scan: move them to the fuller
+ * state where the first is the emptier one. */
 static supine_status load_further(const request *wanted, const evidence *of,
-                                  const supine_patient_record *record, further_work *work,
+                                  supine_patient_record *record, further_work *work,
                                   supine_error *error) {
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   supine_status status = SUPINE_OK;
   for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
     const char *path = wanted->further_path[k];
     supine_patient_pairs *pairs = &work->pairs[k];
-    memcpy(work->other[k].gravity, wanted->further[k].gravity, sizeof work->other[k].gravity);
-    if (!is_landmarks(path)) {
+    const bool landmarks = is_landmarks(path);
+    record->told[record->told_count++] =
+        (supine_patient_told){.state = wanted->further[k],
+                              .pairs = landmarks ? pairs : NULL,
+                              .surface = landmarks ? NULL : &work->lungs[k].mesh};
+    if (!landmarks) {
       status = supine_command_load_lungs(name, path, &wanted->source, &work->lungs[k], error);
-      work->other[k].surface = &work->lungs[k].mesh;
       continue;
     }
     status = supine_patient_pairs_load(path, wanted->landmarks.reverse, pairs, error);
@@ -460,47 +461,29 @@ static supine_status load_further(const request *wanted, const evidence *of,
     if (status == SUPINE_OK && of->swapped) {
       supine_patient_refer(&record->patient, pairs->count, pairs->from);
     }
-    work->other[k].pairs = pairs;
   }
   return status;
 }
 
+/* Fit the gravity-dependent share of the force to the further states. */
 static supine_status find_gain(const request *wanted, evidence *of, supine_patient_record *record,
                                supine_error *error) {
-  const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
-  further_work *work = calloc(1, sizeof *work);
-  supine_patient_gain gain = {0};
+  further_work work = {.pairs = {{.count = 0}}};
   supine_lungs *from = &of->lungs[0];
-  supine_status status =
-      work == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for further states")
-                   : load_further(wanted, of, record, work, error);
+  supine_status status = load_further(wanted, of, record, &work, error);
   if (from->mesh.vertex_count == 0) { /* the first scan alone, which is the emptier one */
     from = &of->lungs[1];
     supine_patient_refer(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_mesh_box(&from->mesh, from->minimum, from->maximum);
   }
   if (status == SUPINE_OK) {
-    status = supine_patient_gain_fit(record, from, record->reach, moved, work->other, wanted->count,
-                                     &gain, error);
+    status = supine_patient_gain_fit(
+        record, from, wanted->landmarks.translation || wanted->landmarks.rigid, error);
   }
-  if (status == SUPINE_OK) {
-    record->gain_told = gain.told;
-    record->gain_open = gain.open;
-    record->gain_error = gain.error;
-    record->force =
-        supine_patient_force(&record->patient.power, gain.gain, record->state[1].gravity);
-    record->told_count = wanted->count;
-    for (size_t k = 0; k < wanted->count; ++k) {
-      const supine_patient_other *other = &work->other[k];
-      record->told[k] =
-          (supine_patient_told){wanted->further[k], other->scale, other->left, other->left_without};
-    }
+  for (size_t k = 0; k < SUPINE_PATIENT_OTHERS_MAX; ++k) {
+    supine_patient_pairs_free(&work.pairs[k]);
+    supine_lungs_free(&work.lungs[k]);
   }
-  for (size_t k = 0; work != NULL && k < SUPINE_PATIENT_OTHERS_MAX; ++k) {
-    supine_patient_pairs_free(&work->pairs[k]);
-    supine_lungs_free(&work->lungs[k]);
-  }
-  free(work);
   return status;
 }
 

@@ -4,7 +4,7 @@
 #ifndef SUPINE_COMMAND_VALIDATION_H
 #define SUPINE_COMMAND_VALIDATION_H
 
-#include "precompute/patient/rows.h"
+#include "precompute/patient/krige.h"
 #include "precompute/patient/validate.h"
 #include "precompute/source.h"
 #include "program/options/orientation.h"

@@ -9,7 +9,6 @@
 #include <supine/volume.h>
 
 #include "precompute/patient/fit.h"
-#include "precompute/patient/gain.h"
 #include "precompute/patient/krige.h"
 #include "precompute/patient/patient_file.h"
 #include "precompute/patient/validate.h"
@@ -596,11 +595,12 @@ static void test_third_scan_tells_what_turns(void **state) {
   static const double gains[2] = {0.23, 0.71};
   supine_patient_pairs pairs = scatter(200, 55);
   const supine_patient patient = known(&pairs);
-  const supine_patient_record record = record_of(&patient);
+  supine_patient_record record = record_of(&patient);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  supine_patient_gain found;
+  supine_patient_told *other = &record.told[0];
   supine_error error;
-  supine_patient_other other = {.pairs = &pairs};
+  record.told_count = 1;
+  other->pairs = &pairs;
   gsl_rng_set(random, 19);
   for (size_t c = 0; c < 4; ++c) {
     const double *g = postures[c % 2];
@@ -622,24 +622,23 @@ static void test_third_scan_tells_what_turns(void **state) {
                               (moved ? 20.0 : 0.0) + gsl_ran_gaussian(random, 0.3);
       }
     }
-    memcpy(other.gravity, g, sizeof other.gravity);
-    assert_int_equal(supine_patient_gain_fit(&record, NULL, 10.0, moved, &other, 1, &found, &error),
-                     SUPINE_OK);
+    memcpy(other->state.gravity, g, sizeof other->state.gravity);
+    assert_int_equal(supine_patient_gain_fit(&record, NULL, moved, &error), SUPINE_OK);
     printf("gain %.2f found %.3f +- %.3f, scale %.3f, left %.2f mm, %.2f without\n", gain,
-           found.gain, found.error, other.scale, other.left, other.left_without);
-    assert_true(found.told);
-    assert_true(fabs(found.gain - gain) <= 3.0 * found.error);
-    assert_true(found.error < 0.1);
-    assert_true(fabs(other.scale - scale) < 0.03);
-    assert_true(other.left < 0.3 * sqrt(3.0) * 1.1 && other.left < other.left_without);
+           record.force.gain, record.gain_error, other->scale, other->left, other->left_without);
+    assert_true(record.gain_told);
+    assert_true(fabs(record.force.gain - gain) <= 3.0 * record.gain_error);
+    assert_true(record.gain_error < 0.1);
+    assert_true(fabs(other->scale - scale) < 0.03);
+    assert_true(other->left < 0.3 * sqrt(3.0) * 1.1 && other->left < other->left_without);
   }
   gsl_rng_free(random);
   /* The posture that was fitted tells nothing: the gain stays. */
-  memcpy(other.gravity, record.state[1].gravity, sizeof other.gravity);
-  assert_int_equal(supine_patient_gain_fit(&record, NULL, 10.0, false, &other, 1, &found, &error),
-                   SUPINE_OK);
-  assert_false(found.told);
-  assert_true(found.gain == record.force.gain);
+  const double kept = record.force.gain;
+  memcpy(other->state.gravity, record.state[1].gravity, sizeof other->state.gravity);
+  assert_int_equal(supine_patient_gain_fit(&record, NULL, false, &error), SUPINE_OK);
+  assert_false(record.gain_told);
+  assert_true(record.force.gain == kept);
   supine_patient_pairs_free(&pairs);
 }
 

@@ -11,8 +11,7 @@
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"
 #include "precompute/lungs/phantom.h"
-#include "precompute/patient/patient_file.h"
-#include "precompute/patient/surfaces.h"
+#include "precompute/patient/matching.h"
 #include "precompute/physics/solve.h"
 
 #include "patient_helpers.h"

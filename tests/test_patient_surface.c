@@ -9,7 +9,6 @@
 
 #include "precompute/patient/matching.h"
 #include "precompute/patient/patient_file.h"
-#include "precompute/patient/surfaces.h"
 #include "precompute/physics/solve.h"
 
 #include "patient_helpers.h"

@@ -8,7 +8,7 @@
 #include <gsl/gsl_statistics.h>
 #include <lapacke.h>
 
-#include "precompute/patient/applied.h"
+#include "precompute/patient/matching.h"
 
 #include "sh/base/vec3.h"
 

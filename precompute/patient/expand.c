@@ -9,7 +9,7 @@
 #include <gsl/gsl_statistics.h>
 #include <lapacke.h>
 
-#include "precompute/patient/expand.h"
+#include "precompute/patient/matching.h"
 
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"

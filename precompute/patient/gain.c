@@ -7,8 +7,6 @@
 #include <cblas.h>
 #include <lapacke.h>
 
-#include "precompute/patient/gain.h"
-
 #include "precompute/patient/matching.h"
 #include "sh/base/vec3.h"
 
@@ -21,7 +19,7 @@ enum { SEARCH_STEPS = 40, ROUNDS = 20, VERTICES_MAX = 2000, UNKNOWNS = 4, EIGHTH
 
 /* A further state as rows, axis . (s now / then u + t) = value. */
 typedef struct state {
-  supine_patient_other *other;
+  supine_patient_told *told;
   supine_patient_matching matching; /* of a state given as a surface */
   size_t count;
   supine_patient_row *rows;  /* [count]; block: the eighth of the lungs */
@@ -32,7 +30,7 @@ typedef struct state {
 } state;
 
 typedef struct problem {
-  const supine_patient_record *record;
+  supine_patient_record *record;
   bool moved;
   double gains[2][3]; /* share of the way of the fuller and the emptier state, by axis */
   state states[SUPINE_PATIENT_OTHERS_MAX];
@@ -123,7 +121,7 @@ static double height_at(const supine_patient_frame *frame, const supine_patient_
 static supine_status find_range(const problem *p, const state *s, const double gravity[3],
                                 double range[2], supine_error *error) {
   const supine_patient_frame *frame = &p->record->patient.frame;
-  if (s->other->surface != NULL) {
+  if (s->told->surface != NULL) {
     return supine_physics_height_range(s->matching.rest, false, 1, gravity, range, range + 1) ==
                    SUPINE_OK
                ? SUPINE_OK
@@ -140,13 +138,13 @@ static supine_status find_range(const problem *p, const state *s, const double g
 
 /* Make the rows of a state: three of each pair, whose force does not spread, or the vertices of
  * `rest` that take part. */
-static supine_status take_rows(const problem *p, state *s, const supine_lungs *rest, double reach,
+static supine_status take_rows(const problem *p, state *s, const supine_lungs *rest,
                                supine_error *error) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  const supine_patient_pairs *pairs = s->other->pairs;
+  const supine_patient_pairs *pairs = s->told->pairs;
   double *stiffness = NULL;
   supine_status status = SUPINE_OK;
-  model.reach = reach;
+  model.reach = p->record->reach;
   if (pairs != NULL) {
     s->count = 3 * pairs->count;
     s->rows = malloc(s->count * sizeof *s->rows);
@@ -155,7 +153,7 @@ static supine_status take_rows(const problem *p, state *s, const supine_lungs *r
     if (stiffness != NULL) {
       supine_patient_stiffness_of(&p->record->stiffness, rest, stiffness);
       model.stiffness = stiffness;
-      status = supine_patient_matching_create(rest, s->other->surface, &model, VERTICES_MAX, 0,
+      status = supine_patient_matching_create(rest, s->told->surface, &model, VERTICES_MAX, 0,
                                               &s->matching, error);
     }
     s->count = s->matching.count;
@@ -173,25 +171,25 @@ static supine_status take_rows(const problem *p, state *s, const supine_lungs *r
 }
 
 /* Set up a state: rows, fitted displacements and heights. */
-static supine_status begin(const problem *p, state *s, const supine_lungs *rest, double reach,
+static supine_status begin(const problem *p, state *s, const supine_lungs *rest,
                            supine_error *error) {
   const supine_patient *patient = &p->record->patient;
-  const double *g[2] = {p->record->state[1].gravity, s->other->gravity};
+  const double *g[2] = {p->record->state[1].gravity, s->told->state.gravity};
   double range[2][2];
-  supine_status status = take_rows(p, s, rest, reach, error);
+  supine_status status = take_rows(p, s, rest, error);
   for (int c = 0; c < 2 && status == SUPINE_OK; ++c) {
     status = find_range(p, s, g[c], range[c], error);
   }
   for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
     supine_patient_place place = s->rows[i].place;
     const supine_patient_frame *frame =
-        s->other->surface != NULL ? &s->matching.frame : &patient->frame;
+        s->told->surface != NULL ? &s->matching.frame : &patient->frame;
     for (size_t c = 0; c < 2; ++c) {
       s->heights[2 * i + c] = height_at(frame, &place, g[c], range[c]);
     }
     s->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
                        (place.box[2] > 0.5 ? 1U : 0U);
-    if (s->other->surface != NULL && !p->record->from_surface) {
+    if (s->told->surface != NULL && !p->record->from_surface) {
       /* the box of the landmarks is wider than the surface's */
       place = supine_patient_find(&patient->frame, rest->mesh.vertices + 3 * s->matching.vertex[i],
                                   place.side);
@@ -238,7 +236,7 @@ void supine_patient_refer(const supine_patient *patient, size_t count, double *p
 }
 
 /* Alternate between fitting gain and scales, and finding the nearest points. */
-static supine_status settle(problem *p, supine_patient_gain *found, supine_error *error) {
+static supine_status settle(problem *p, double *gain, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
@@ -246,12 +244,11 @@ static supine_status settle(problem *p, supine_patient_gain *found, supine_error
     change = 0.0;
     for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
       before[k] = p->states[k].unknowns[0];
-      status = p->states[k].other->surface == NULL
-                   ? SUPINE_OK
-                   : match_surface(p, &p->states[k], found->gain, error);
+      status = p->states[k].told->surface == NULL ? SUPINE_OK
+                                                  : match_surface(p, &p->states[k], *gain, error);
     }
-    found->gain = found->told ? search(p) : found->gain;
-    (void)squares_at(p, found->gain);
+    *gain = p->record->gain_told ? search(p) : *gain;
+    (void)squares_at(p, *gain);
     for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
       change = fmax(change, fabs(p->states[k].unknowns[0] - before[k]));
     }
@@ -259,49 +256,52 @@ static supine_status settle(problem *p, supine_patient_gain *found, supine_error
   return status;
 }
 
-static void conclude(problem *p, supine_patient_gain *found) {
+static void conclude(problem *p, double gain) {
   double sum = 0.0;
   double square = 0.0;
   for (size_t k = 0; k < p->state_count; ++k) {
     state *s = &p->states[k];
-    const double components = s->other->surface == NULL ? 3.0 : 1.0;
-    s->other->left_without = sqrt(fit_state(p, s, 0.0) * components / s->weight);
-    s->other->left = sqrt(fit_state(p, s, found->gain) * components / s->weight);
-    s->other->scale = s->unknowns[0];
+    const double components = s->told->surface == NULL ? 3.0 : 1.0;
+    s->told->left_without = sqrt(fit_state(p, s, 0.0) * components / s->weight);
+    s->told->left = sqrt(fit_state(p, s, gain) * components / s->weight);
+    s->told->scale = s->unknowns[0];
   }
-  for (p->without = 0; p->without < EIGHTHS && found->told; ++p->without) {
-    const double gain = search(p);
-    sum += gain;
-    square += gain * gain;
+  for (p->without = 0; p->without < EIGHTHS && p->record->gain_told; ++p->without) {
+    const double other = search(p);
+    sum += other;
+    square += other * other;
   }
-  found->error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
+  p->record->gain_error =
+      sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
 }
 
-/* The parameters are the inputs of one person: law, surfaces and landmarks. */
-supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
-                                      double reach, bool moved, supine_patient_other *others,
-                                      size_t count, supine_patient_gain *found,
-                                      supine_error *error) {
+supine_status supine_patient_gain_fit(supine_patient_record *record, const supine_lungs *rest,
+                                      bool moved, supine_error *error) {
   problem p = {.record = record, .moved = moved, .without = EIGHTHS};
+  const double *g = record->state[1].gravity;
+  double gain = record->force.gain;
   supine_status status = SUPINE_OK;
   supine_patient_path(record, p.gains);
-  *found = (supine_patient_gain){.gain = record->force.gain};
-  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
-    found->told =
-        found->told || supine_distance(others[k].gravity, record->state[1].gravity) >= same_posture;
-    p.states[p.state_count].other = &others[k];
-    status = begin(&p, &p.states[p.state_count++], rest, reach, error);
+  record->gain_told = false;
+  for (size_t k = 0; k < record->told_count && status == SUPINE_OK; ++k) {
+    state *s = &p.states[p.state_count++];
+    s->told = &record->told[k];
+    record->gain_told =
+        record->gain_told || supine_distance(s->told->state.gravity, g) >= same_posture;
+    status = begin(&p, s, rest, error);
   }
   if (status == SUPINE_OK) {
-    status = settle(&p, found, error);
+    status = settle(&p, &gain, error);
   }
   if (status == SUPINE_OK) {
-    conclude(&p, found);
-    found->open = found->told && (found->gain < at_bound || found->gain > gain_most - at_bound);
-    found->gain = found->open ? record->force.gain : found->gain;
+    conclude(&p, gain);
+    record->gain_open = record->gain_told && (gain < at_bound || gain > gain_most - at_bound);
+    if (!record->gain_open) {
+      record->force = supine_patient_force(&record->patient.power, gain, g);
+    }
   }
   for (size_t k = 0; k < p.state_count; ++k) {
-    if (p.states[k].other->surface == NULL) {
+    if (p.states[k].told->surface == NULL) {
       free(p.states[k].rows);
     }
     supine_patient_matching_free(&p.states[k].matching);

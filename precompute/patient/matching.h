@@ -5,7 +5,7 @@
 #define SUPINE_PATIENT_MATCHING_H
 
 #include "precompute/inside/surface.h"
-#include "precompute/patient/rows.h"
+#include "precompute/patient/patient_file.h"
 #include "precompute/physics/model.h"
 
 typedef struct supine_patient_matching {
@@ -65,5 +65,56 @@ void supine_patient_matching_find(supine_patient_matching *matching);
  * distances. Find the share of vertices with weight and the weighted RMS distance.
  * @param scale  least scale, mm; INFINITY: keep the weights */
 double supine_patient_matching_weigh(supine_patient_matching *matching, double scale, double *rms);
+
+/** Spread regions over the lungs' surface, some 45 mm apart, of a = 1. */
+void supine_patient_stiffness_spread(const supine_lungs *lungs,
+                                     supine_patient_stiffness *stiffness);
+
+/** Find the weights [count] of the regions at a vertex; they sum to 1. */
+void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
+                                     const supine_lungs *lungs, size_t vertex, double *shares);
+
+/** Find E [N] of every vertex, relative. */
+void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
+                                 const supine_lungs *lungs, double *e);
+
+/** Find the expandability from motion ([Santhanam2008] VI): a stiffness for each region of a lung,
+ * such that a known force moves it to the other surface.
+ *
+ * The motion depends only on the product a f of expandability and force, so f is fixed to the
+ * model's (18). The spread force F is then linear in the regions' values a_k, F =
+ * sum of a_k F_k, where F_k is the spread force of region k alone: one solve with a right-hand
+ * side for each region. The fit alternates between
+ *
+ *     least over a of  sum of w (along_i sum of a_k F_ik - target_i)^2 + roughness + (a_k - 1)^2
+ *
+ * which is linear least squares, and the law's directions and the motion between the scans
+ * (supine_patient_law_fit), until neither changes. Where the surfaces say little about a region,
+ * its neighbours determine it; the diagonal of the resolution matrix says how much the surfaces
+ * contribute.
+ *
+ * The result is kept only if it predicts held-out blocks of 40 mm better than uniform tissue
+ * does under the same force. The matching, without landmarks, ends at the rows of the law that is
+ * kept.
+ * @param options    of the paper's law; the gravity of the other state
+ * @param model      its force is held fixed
+ * @param patient    in: the law without; out: the law that is kept
+ * @param stiffness  no regions if it was not kept
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+supine_status supine_patient_expand(supine_patient_matching *matching,
+                                    const supine_patient_fit_options *options,
+                                    const supine_model *model, supine_patient *patient,
+                                    supine_patient_stiffness *stiffness,
+                                    supine_patient_expand_report *report, supine_error *error);
+
+/** Find the force at every vertex of the reference surface.
+ * @param matching  solved with the stiffness; afterwards it holds every vertex
+ * @param patient   the law fitted to the matching; its correction is not used
+ * @param gravity   of the other state
+ * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine (18)
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_patient_applied_find(supine_patient_matching *matching,
+                                          const supine_patient *patient, const double gravity[3],
+                                          supine_patient_applied *applied, supine_error *error);
 
 #endif

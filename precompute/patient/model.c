@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/patient/patient_file.h"
+#include "precompute/patient/matching.h"
 
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"

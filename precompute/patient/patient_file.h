@@ -6,20 +6,79 @@
 
 #include <supine/state.h>
 
-#include "precompute/patient/applied.h"
-#include "precompute/patient/expand.h"
 #include "precompute/patient/fit.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/reference.h"
 
-enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
+enum {
+  SUPINE_PATIENT_TEXT = 48,
+  SUPINE_PATIENT_OTHERS_MAX = 8,
+  SUPINE_PATIENT_STATE_TEXT = 160,
+  SUPINE_PATIENT_MODES = 256 /**< most regions of both lungs */
+};
 
-/** Fit of a further state; not read. */
+/** A further state of the same lungs: its surface, or matched points of it and the fuller state. */
 typedef struct supine_patient_told {
   supine_state state;
-  double scale;              /**< 1 if it is as far from the fuller state as the emptier one */
-  double left, left_without; /**< RMS residual, mm, with the gain and without */
+  const supine_patient_pairs *pairs; /**< NULL if the state is a surface */
+  const supine_mesh *surface;        /**< used if pairs is NULL */
+  double scale;        /**< fitted: 1 where it is as far from full inflation as rest */
+  double left;         /**< RMS residual of the fit, mm; of a surface along its normals */
+  double left_without; /**< the same at a gain of 0, with all of the force fixed to the body */
 } supine_patient_told;
+
+/** A patient's expandability a = 1/E ([Santhanam2008] VI) as a weighted mean over a few
+ * regions of each lung, independent of the mesh:
+ *
+ *     a(p) = sum over k of w(|p - centre_k| / radius_k) a_k
+ *            / sum over k of w(|p - centre_k| / radius_k)
+ *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t)
+ *
+ * This is one region. */
+typedef struct supine_patient_mode {
+  int side;         /**< of its lung: 1 left, -1 right */
+  double value;     /**< a_k > 0 */
+  double centre[3]; /**< mm, in the reference surface */
+  double radius;    /**< mm, > 0 */
+  double seen;      /**< contribution of the surfaces, 0 to 1; the remainder comes from
+                     * neighbouring regions */
+} supine_patient_mode;
+
+/** The regions, those of the left lung first; none: even tissue. */
+typedef struct supine_patient_stiffness {
+  size_t count;
+  supine_patient_mode mode[SUPINE_PATIENT_MODES];
+} supine_patient_stiffness;
+
+/** Least diagonal of the resolution matrix at which a region counts as seen. */
+#define SUPINE_PATIENT_SEEN 0.5
+
+/** Fit and held-out error, without and with expandability. */
+typedef struct supine_patient_expand_report {
+  bool tried, kept;
+  double fitted[2];   /**< RMS distance between the surfaces along normals, mm, without and with */
+  double held_out[2]; /**< the same on held-out blocks */
+  double softest, stiffest; /**< range of E that holds nine tenths of the seen regions; the
+                             * geometric mean of all is 1 */
+  size_t regions, unseen;
+} supine_patient_expand_report;
+
+/** The force that a measured displacement shows ([Santhanam2008] IV-B.3), with no assumption about
+ * its form. With u the displacement to the other surface and d the fitted directions (15)-(17),
+ *
+ *     F_i = u_i . d_i / |d_i|^2
+ *     f = A F                    inverts the spreading operator (equilibrium.h)
+ *
+ * The inversion amplifies the roughness of u by (spreading length / edge length)^2, so f is
+ * averaged over blocks of 40 mm of surface: the operator conserves sums. */
+typedef struct supine_patient_applied {
+  size_t blocks;
+  double matched;     /**< share of the vertices with a compatible point on the other surface */
+  double correlation; /**< between force and height along gravity, over the blocks */
+  double slopes[3];   /**< c7 to c9 of (18) fitted to the force, 1 at the box's centre */
+  double left;        /**< RMS residual of (18), in units of the force at the box's centre */
+  double spread;      /**< RMS of the force about its mean, in the same unit */
+} supine_patient_applied;
 
 /** Result of the matching of surfaces. */
 typedef struct supine_patient_surface_report {
@@ -45,12 +104,12 @@ typedef struct supine_patient_record {
   double expected;                    /**< of held-out points, mm RMS */
   double band;                        /**< % of held-out points in the 95 % band */
   supine_patient_stiffness stiffness; /**< no regions: even tissue */
-  size_t told_count;                  /**< further states */
-  supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
-  bool gain_told;    /**< some further state was in another posture */
-  bool gain_open;    /**< the further states do not determine the gain */
-  double gain_error; /**< standard error of the gain */
   /* Not in a record that was read: */
+  size_t told_count; /**< further states */
+  supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
+  bool gain_told;    /**< some further state was in another posture, so the gain was fitted */
+  bool gain_open;    /**< the fit ended at a bound: the gain is undetermined and kept */
+  double gain_error; /**< standard error, by leaving out each eighth of the lungs (jackknife) */
   supine_patient_fit_report report; /**< written if it has blocks */
   supine_patient_surface_report surface;
   supine_patient_expand_report expand; /**< written if it was tried */
@@ -115,5 +174,57 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
  * @return not known where nothing tells how far it is from full inflation */
 supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
                                 const supine_resting *resting);
+
+/* --- from surfaces --------------------------------------------------------------------------- */
+
+/** Data and options of a fit to surfaces. */
+typedef struct supine_patient_surface_task {
+  const supine_lungs *rest;
+  const supine_mesh *state;  /**< the same lungs, mm, same frame */
+  const supine_model *model; /**< stiffness and spreading of the force; with expandability its
+                              * force is held fixed */
+  const supine_patient_pairs *landmarks; /**< optional, fitted as well; not with expandability */
+  supine_patient_fit_options options;
+  bool expandability; /**< fit it too (supine_patient_expand), with the paper's law, uncorrected */
+} supine_patient_surface_task;
+
+/** Fit a law to a surface in another state, of any meshing; write patient, reports, stiffness and
+ * applied force into the record.
+ *
+ * Each round moves every vertex of the reference surface by the present law. The nearest point
+ * of the other surface, if its normal is compatible, gives a row along that normal (point to
+ * plane, so that surfaces may slide), with a robust weight (Tukey's biweight). The law is then
+ * fitted to the rows. Rounds repeat until no vertex moves.
+ *
+ * A small distance between surfaces does not prove the motion of points: sliding along the
+ * surface is not observed.
+ * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too
+ *   few compatible points
+ * @retval those of supine_patient_fit */
+supine_status supine_patient_fit_surface(const supine_patient_surface_task *task,
+                                         supine_patient_record *record, supine_error *error);
+
+/* --- from scans in other postures ------------------------------------------------------------ */
+
+/** Move points [count, 3] of the emptier state to their places in the fuller one, where they came
+ * from. */
+void supine_patient_refer(const supine_patient *patient, size_t count, double *points);
+
+/** Find the gain from the record's further states, with the fitted field u of the law, scaled to
+ * the whole way from full inflation to rest (supine_patient_path):
+ *
+ *     u_j(p) = s_j f(g_j, p) / f(g, p) u(p) (+ t_j)      f of supine_patient_force at that gain,
+ *                                                        for a surface, the spread force
+ *
+ * minus the displacement of the fuller state from full inflation, if known. s_j and the
+ * translations t_j come from linear least squares, the gain from a search between 0 and 2; the
+ * nearest points of surfaces are found again each round.
+ * @param record  its force gets the gain, its further states their fits
+ * @param rest    the surface of the fuller state; NULL where no state is a surface
+ * @param moved   also fit a translation between the scans
+ * @retval SUPINE_ERROR_MESH    too few compatible points
+ * @retval SUPINE_ERROR_MEMORY, those of the solve */
+supine_status supine_patient_gain_fit(supine_patient_record *record, const supine_lungs *rest,
+                                      bool moved, supine_error *error);
 
 #endif

@@ -8,7 +8,7 @@
 #include <gsl/gsl_rng.h>
 #include <lapacke.h>
 
-#include "precompute/patient/rows.h"
+#include "precompute/patient/krige.h"
 
 #include "sh/base/vec3.h"
 

@@ -3,8 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "precompute/patient/patient.h"
-#include "precompute/patient/stiffness.h"
+#include "precompute/patient/matching.h"
 
 #include "sh/base/vec3.h"
 

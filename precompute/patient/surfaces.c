@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/patient/surfaces.h"
-
 #include "precompute/patient/matching.h"
 #include "precompute/patient/validate.h"
 
