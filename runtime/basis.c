@@ -572,3 +572,7 @@ const float *supine_basis_vertices(const supine_basis *basis) {
 const uint32_t *supine_basis_triangles(const supine_basis *basis) {
   return basis->info.triangles;
 }
+
+const char *supine_version(void) {
+  return SUPINE_VERSION;
+}

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Many orientations at once: a block of tiles is widened to floats once and stays in the cache
- * while every orientation reads it. */
+/* Evaluate many poses at once: a block of tiles is converted to floats once, and stays in the cache
+ * while every pose reads it. */
 #include <string.h>
 
 #include "runtime/internal.h"
 
 enum {
   BLOCK_TILES = 23,
-  BLOCK_BYTES = 32768,   /* of widened tiles, less than a first-level cache */
-  WEIGHT_NUMBERS = 4096, /* folded weights of a group of orientations */
-  GROUP = 256            /* most orientations of a group */
+  BLOCK_BYTES = 32768,   /* of tiles as floats, less than a first-level cache */
+  WEIGHT_NUMBERS = 4096, /* folded weights of a group of poses */
+  GROUP = 256            /* most poses of a group */
 };
 
 typedef struct block {
@@ -18,8 +18,9 @@ typedef struct block {
   float held[GROUP][16]; /* see supine_target */
 } block;
 
-/* Whole tiles of one lung; `positions` is orientation 0's first, `apart` numbers to the next. Nine
- * parameters: a range of tiles and where it goes, in the innermost call but one. */
+/* Evaluate whole tiles of one lung for a group of poses. `positions` belongs to pose 0, and those
+ * of the next pose are `apart` numbers on. Nine parameters: a range of tiles and its target, in the
+ * innermost call but one. */
 static void batch_tiles(const supine_basis *basis, size_t count, block *scratch, supine_tiles *wide,
                         size_t first, size_t tiles, float *positions, size_t apart, bool stream) {
   const size_t fit = BLOCK_BYTES / wide->stride;
@@ -58,8 +59,8 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const supine_p
     if (first >= last) {
       continue;
     }
-    /* Whole tiles in blocks; what is before and after them one orientation at a time, and all of
-     * it where one tile alone outgrows the block. */
+    /* Whole tiles are evaluated in blocks; vertices before and after them, or all if one tile
+     * outgrows the block, pose by pose. */
     size_t from = (first + TILE - 1) / TILE * TILE;
     size_t to = last / TILE * TILE;
     if (from >= to || wide.stride > BLOCK_BYTES) {

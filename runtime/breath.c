@@ -1,9 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* A breath: the course of pressure, and the volume that the limbs give it. */
+/* Compute a breath: the course of pressure, and the volume that the limbs give it. */
 #include <math.h>
 #include <stdbool.h>
 
 #include "runtime/limb.h"
+
+const supine_pv *supine_breath_normal(void) {
+  static const supine_pv normal = {
+      /* Fitted to a + b / (1 + exp(-(P - 10) / 6)), a and b such that it spans 0 to 6000 mL. */
+      {{{0.0, 30.0},
+        {0.0, 6000.0},
+        {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
+       /* c_1 = -k (P_high - P_low) / 2, k = ln 2 / 7.58 [Salazar1964] */
+       {{0.0, 30.0}, {0.0, 6000.0}, {-1.3716632861, 0.0, 0.0, 0.0, 0.0}}}};
+  return &normal;
+}
 
 supine_pv_breath supine_breath_default(void) {
   return (supine_pv_breath){.tidal = 500.0,
@@ -32,7 +43,7 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   return SUPINE_OK;
 }
 
-/* Where in its limb a moment is: 0 at rest, 1 at the peak; linear in time. */
+/* Return how far a moment is along its limb, linear in time: 0 at rest, 1 at the peak. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -110,8 +121,7 @@ static double between(double value, double low, double high) {
   return value < low ? low : value > high ? high : value;
 }
 
-/* One moment: from pressure to volume or, at constant flow, from volume to pressure (NULL: not
- * wanted). */
+/* Compute one moment: volume from pressure or, at constant flow, pressure from volume. */
 static supine_status follow(const supine_pv_breath *breath, const loop *cycle, double time,
                             double *volume, double *pressure, supine_error *error) {
   static const double pi = 3.14159265358979323846;

@@ -1,8 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* Deformed positions x_ij = p_ij + gain_j (w . c_i) d_ij, in runs of whole tiles of one lung. */
+/* Compute positions x_ij = p_ij + A_j (w . c_i) d_ij, in runs of whole tiles of one lung. */
 #include <string.h>
 
 #include "runtime/rigid.h"
+
+void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded) {
+  const size_t modes = basis->info.mode_count;
+  for (size_t k = 0; k < modes; ++k) {
+    folded[k] = (float)(pose->weights[k] * basis->mode_scale[k]);
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    folded[modes + axis] = (float)pose->gains[lung][axis];
+  }
+}
 
 supine_target supine_target_after(const supine_target *target, size_t count) {
   supine_target moved = *target;
@@ -14,7 +24,8 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
   return moved;
 }
 
-/* Vertices begin <= i < end, all in one tile: the tile is evaluated aside and the part copied. */
+/* Evaluate vertices begin <= i < end of one tile: the whole tile into a buffer, and copy the part.
+ */
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
@@ -124,4 +135,10 @@ void supine_deform_separate(const supine_basis *basis, const supine_pose *pose, 
 void supine_displace_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                            size_t end, float *xyz) {
   deform_lungs(basis, pose, begin, end, (supine_target){.x = xyz});
+}
+
+void supine_step(size_t count, const float *restrict step, float *restrict xyz) {
+  for (size_t i = 0; i < 3 * count; ++i) {
+    xyz[i] += step[i];
+  }
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What storage and rounding may cost, in mm. */
+/* Bound the error of storage and rounding, in mm. */
 #include <math.h>
 
 #include "runtime/internal.h"
@@ -24,7 +24,7 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   return 1.001 * (scale * stored + basis->rest_error + rounding);
 }
 
-/* The largest displacement of a pose. */
+/* Find the largest displacement of a pose, mm. */
 static double largest_displacement(const supine_basis *basis, const supine_pose *pose) {
   enum { BLOCK = 1024 };
   float xyz[3 * BLOCK];

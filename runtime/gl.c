@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Vertex attributes and uniforms for supine.glsl. */
+/* Fill vertex attributes and uniforms of supine.glsl. */
 #include <string.h>
 
 #include "runtime/internal.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Normals by the reduced product: a few modes of the normal field, weighted by a quadratic form. */
+/* Compute normals from a few modes of the normal field, whose weights are quadratic in those of the
+ * displacement. */
 #include <string.h>
 
 #include "runtime/internal.h"
@@ -7,7 +8,7 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache for a batch */
+enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache during a batch */
 
 uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size_t axis,
                                   size_t word) {
@@ -60,7 +61,7 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* sum over k <= l of form_kl w_k w_l, whose rows are shorter and shorter. */
+/* Sum form_kl w_k w_l over k <= l; row k of the form begins at l = k. */
 static double triangle(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
@@ -106,7 +107,7 @@ void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *p
   }
 }
 
-/* What the kernels multiply by, of one lung. */
+/* Compute the factors of the kernel for one lung. */
 static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, pose, v);
@@ -115,7 +116,7 @@ static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose
   }
 }
 
-/* Normals of vertices begin <= i < end, which may be of several lungs. */
+/* Compute the normals of vertices begin <= i < end, of any lungs. */
 static void light(const supine_basis *basis, const supine_pose *pose, size_t begin, size_t end,
                   bool stream, float *normals) {
   const supine_target target = {
@@ -163,7 +164,7 @@ supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
       3.0 * (double)(end - begin) * (double)count * sizeof *normals > STREAM_BATCH_BYTES;
   const size_t fit = BATCH_BYTES / basis->lit.stride;
   const size_t step = TILE * (fit > 0 ? fit : 1);
-  for (size_t at = begin; at < end;) { /* a block of tiles after the other, for every orientation */
+  for (size_t at = begin; at < end;) { /* a block of tiles after the other, for every pose */
     const size_t next = (at / step + 1) * step;
     const size_t last = next < end ? next : end;
     for (size_t j = 0; j < count; ++j) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From a state to weights and gains. */
+/* Compute weights and gains of a state. */
 #include <math.h>
 #include <string.h>
 
@@ -8,7 +8,25 @@
 
 #include "runtime/internal.h"
 
-static const double unknown_rest_breath = 500; /* mL above a scan of which nothing is known */
+static const double default_above_scan = 500; /* mL, if the basis knows no rest */
+
+supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
+                                   double *weights) {
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
+  const size_t count = supine_sh_count(basis->info.band);
+  const supine_status status = supine_sh_evaluate(basis->info.band, gravity, y);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  for (size_t k = 0; k < basis->info.mode_count; ++k) {
+    double sum = 0;
+    for (size_t i = 0; i < count; ++i) {
+      sum += basis->info.modes[k * count + i] * y[i];
+    }
+    weights[k] = sum;
+  }
+  return SUPINE_OK;
+}
 
 static void contract(const supine_basis *basis, size_t lung, const double *weights,
                      supine_volume_form *form) {
@@ -20,7 +38,7 @@ static void contract(const supine_basis *basis, size_t lung, const double *weigh
                          basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
-/* mL beyond the reference surface that each lung holds at rest, where the file has that by lung. */
+/* Compute a row of the volumes at rest, mL beyond the reference surface. */
 static double resting(const supine_basis *basis, size_t row, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
@@ -37,11 +55,11 @@ static double sum_of(const double *values, size_t count) {
   return sum;
 }
 
-/* What the lungs hold in one posture, mL beyond the reference surface. */
+/* Volumes in one posture, mL beyond the reference surface. */
 typedef struct volumes {
   size_t lungs;
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* by lung, where the file has that */
+  double rest[SUPINE_LUNGS_MAX]; /* 0 without rest by lung */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;
@@ -77,7 +95,7 @@ static supine_status refuse(const char *what, supine_error *error) {
                           what);
 }
 
-/* mL beyond the reference that all lungs together hold. */
+/* Find the volume of all lungs together, mL beyond the reference. */
 static supine_status total_of(const supine_basis *basis, const volumes *v,
                               const supine_volume *volume, double *total, supine_error *error) {
   switch (volume->kind) {
@@ -99,8 +117,8 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
   }
 }
 
-/* Share a total out among the lungs: each fills on the straight line between its rest and its full
- * volume, all at the same part of the way; below rest all shrink in proportion. */
+/* Share a total out among the lungs. Above rest all have gone the same part of the way from their
+ * own rest to their own full volume; below rest all shrink in proportion. */
 static void share_out(const supine_basis *basis, const volumes *v, double total, double *lung_ml) {
   const double *reference = basis->info.reference_volume;
   const double whole = sum_of(reference, v->lungs);
@@ -113,14 +131,14 @@ static void share_out(const supine_basis *basis, const volumes *v, double total,
   }
 }
 
-/* Gains of one lung that holds `ml` beyond the reference. */
+/* Find the gains of one lung that holds `ml` mL beyond the reference. */
 static supine_status lung_gains(const supine_basis *basis, const volumes *v, size_t lung, double ml,
                                 supine_pose *pose, supine_error *error) {
   return supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
                                   pose->gains[lung], error);
 }
 
-/* Gains where all lungs share one scale. */
+/* Find one gain for all lungs and axes. */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
                                   supine_error *error) {
   static const double straight[3] = {0, 0, 0};
@@ -152,8 +170,8 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   return status;
 }
 
-/* Gains lung by lung. What one lung holds at rest, when full or in the scan is what it holds when
- * all are in that state. */
+/* Find the gains of each lung by its own volume. The volume of one lung at rest, full inflation or
+ * in the scan is what it holds when all lungs are in that state. */
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
@@ -195,7 +213,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* A surface without volumes shows its reference and, of fields, what was given. */
+/* A surface without volumes has no state but its reference. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;
@@ -214,7 +232,7 @@ static supine_status open_gains(const supine_basis *basis, const supine_state *s
 supine_volume supine_basis_default_volume(const supine_basis *basis) {
   return basis->info.has_rest    ? (supine_volume){SUPINE_VOLUME_REST, 0}
          : basis->info.is_fields ? (supine_volume){SUPINE_VOLUME_DEFAULT, 0}
-                                 : (supine_volume){SUPINE_VOLUME_SCAN, unknown_rest_breath};
+                                 : (supine_volume){SUPINE_VOLUME_SCAN, default_above_scan};
 }
 
 supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Directions of gravity: by posture, by DICOM patient position, by orientation, by tilt. */
+/* Find the direction of gravity in a posture, an orientation or a tilt. */
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>

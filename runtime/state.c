@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Posture and volume as text. */
+/* Read and print states. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -18,9 +18,9 @@ static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                     [SUPINE_VOLUME_ABSOLUTE] = ""};
 _Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT, "a name for each kind");
 
-enum { PIECE = 64 }; /* longest posture or volume, with its NUL */
+enum { PIECE = 64 }; /* bytes of a posture or volume, with its NUL */
 
-/* Read a number, with "mL" after it or not. */
+/* Read a number, with or without the unit "mL". */
 static bool read_number(const char *text, double *value, bool *has_unit) {
   char *end = NULL;
   *value = strtod(text, &end);
@@ -54,7 +54,7 @@ static supine_status read_volume(const char *text, supine_volume *volume, supine
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
           "'%s': mL from what? rest%+g (from the end of a quiet expiration), full%+g (from full "
-          "inflation), scan%+g (from what the scan held), or %gmL (what a CT shows)",
+          "inflation), scan%+g (from the volume scanned), or %gmL (as measured in a CT)",
           text, value, -fabs(value), value, fabs(value));
     }
   }
@@ -112,7 +112,7 @@ supine_status supine_state_parse_volume(const char *text, supine_state *state,
   return status;
 }
 
-/* Read gravity "X:Y:Z" of any length but 0. */
+/* Read gravity "X:Y:Z" of any length but 0, and normalise it. */
 static bool read_gravity(const char *text, double gravity[3]) {
   double g[3];
   double largest = 0;
@@ -129,7 +129,7 @@ static bool read_gravity(const char *text, double gravity[3]) {
     return false;
   }
   for (int i = 0; i < 3; ++i) {
-    g[i] /= largest; /* so that no square overflows or vanishes */
+    g[i] /= largest; /* so that no square overflows or underflows */
   }
   const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   for (int i = 0; i < 3; ++i) {
@@ -138,7 +138,7 @@ static bool read_gravity(const char *text, double gravity[3]) {
   return true;
 }
 
-/* Read "supine+15". */
+/* Read a tilted posture, "supine+15". */
 static bool read_tilted(const char *text, double gravity[3]) {
   const size_t length = strcspn(text, "+-");
   char front[PIECE];
@@ -181,7 +181,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* a colon of no posture */
+  if (equals != NULL && colon != NULL && colon > equals) { /* it ends no posture */
     colon = NULL;
   }
   if (colon == NULL) {
@@ -207,7 +207,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   return status;
 }
 
-/* Text under construction, cut to its size. */
+/* A text being printed, cut to its size, and the length of the whole. */
 typedef struct writer {
   char *text;
   size_t size;
@@ -237,7 +237,7 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
       return;
     }
   }
-  if (g[0] == 0) { /* a tilt of the nearest of supine and prone */
+  if (g[0] == 0) { /* tilted from supine or prone, whichever is nearer */
     const double degrees = atan2(g[2], fabs(g[1])) * (180 / 3.14159265358979323846);
     add(out, "%s%+.9g", g[1] >= 0 ? "supine" : "prone", g[1] >= 0 ? degrees : -degrees);
     return;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Volume against gains, and its inverse. */
+/* Compute volumes from gains, and gains from volumes. */
 #include <math.h>
 #include <stdbool.h>
 
@@ -13,7 +13,7 @@ static double dot(size_t count, const double *a, const double *b) {
   return sum;
 }
 
-/* w' form w, form [K, K]. */
+/* Compute w^T form w, form [K, K]. */
 static double square(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -42,7 +42,7 @@ static double cubic_slope(const double c[3], double s) {
   return c[0] + s * (2 * c[1] + s * 3 * c[2]);
 }
 
-/* The nearest s on one side of 0 where the slope is 0; infinite where there is none. */
+/* Find the nearest s on one side of 0 at which the slope is 0; infinite if there is none. */
 static double cubic_turn(const double c[3], double side) {
   double roots[2] = {INFINITY, INFINITY};
   const double discriminant = c[1] * c[1] - 3 * c[0] * c[2];
@@ -62,8 +62,8 @@ static double cubic_turn(const double c[3], double side) {
   return nearest * side;
 }
 
-/* Newton's steps, or bisection where they leave [low, high], between which the volume's difference
- * changes sign and the cubic is monotone. */
+/* Solve cubic(s) = volume between low and high, where it is monotone, by Newton's steps, or by
+ * bisection if a step leaves the bracket. */
 static double cubic_solve(const double c[3], double volume, double low, double high) {
   const bool rising = supine_volume_at(c, high) > supine_volume_at(c, low);
   double s = volume / c[0];
@@ -161,7 +161,7 @@ static double volume_on_path(const supine_volume_form *form, const double bend[3
   return supine_volume_form_at(form, gains);
 }
 
-/* Steps along the path until the volume is passed, then halves the last step. */
+/* Step along the path until the volume is passed, then halve the last step. */
 static supine_status follow_path(const supine_volume_form *form, const double bend[3], double scale,
                                  double rest, double volume, double gains[3], supine_error *error) {
   const double step = volume / rest > 0 ? 1.0 / 16 : -1.0 / 16;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Words as users type them. */
+/* Compare words that users type. */
 #include <string.h>
 
 #include "runtime/words.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Words as users type them. */
+/* Compare words that users type. */
 #ifndef SUPINE_WORDS_H
 #define SUPINE_WORDS_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Gram matrices of a basis, and the distances that they give. */
+/* Compute Gram matrices of a basis, and distances from them. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -26,7 +26,7 @@ static double twice_area(const supine_basis *basis, const uint32_t *corner) {
   return supine_length(product);
 }
 
-/* a_i: a third of the triangles around i, over the area of all. */
+/* Compute a_i: a third of the area of vertex i's triangles, over the area of all. */
 static supine_status share_area(supine_compare *compare, supine_error *error) {
   const supine_basis *basis = compare->basis;
   const size_t n = basis->info.vertex_count;
@@ -54,7 +54,7 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
                                 "the surface has no area: nothing to average over");
 }
 
-/* gram += weight c c^T, upper triangle. */
+/* Add weight c c^T to the upper triangle of `gram`. */
 static void add_row(const float *c, double weight, size_t count, double *gram) {
   double row[SUPINE_MODES_MAX];
   for (size_t k = 0; k < count; ++k) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Distances vertex by vertex, and their statistics. */
+/* Compute the distance of every vertex, and statistics of distances. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -16,7 +16,7 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* |u_i| of the field with weights q [3, K]. */
+/* Compute |u_i| of the field with weights q [3, K]. */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];
@@ -45,9 +45,9 @@ void supine_compare_distances(const supine_compare *compare, const supine_pose *
   }
 }
 
-/* The smallest distance that `target` of the area does not exceed. Bit patterns of floats that are
- * not negative sort as the floats do: three rounds, each sharing out the area over 2^11 patterns,
- * settle the upper, middle and lower bits. */
+/* Find the smallest distance that at least `target` of the area does not exceed. The bits of floats
+ * that are not negative sort as the floats do: three histograms of the area, over 2^11 values each,
+ * determine the upper, middle and lower bits. */
 static double percentile(const supine_compare *compare, const float *distance, double target) {
   enum { ROUNDS = 3, BITS = 11, BINS = 1 << BITS };
   const size_t n = compare->basis->info.vertex_count;
@@ -64,7 +64,8 @@ static double percentile(const supine_compare *compare, const float *distance, d
       }
     }
     uint32_t at = 0;
-    uint32_t last = 0; /* where rounding leaves the target just beyond everything */
+    uint32_t last =
+        0; /* the last that is not empty, in case rounding leaves the target beyond it */
     for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
       below += bin[at];
       last = bin[at] > 0 ? at : last;

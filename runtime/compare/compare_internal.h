@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * What a comparison holds, for the files compare*.c. */
+ * A comparison, for the files of this folder. */
 #ifndef SUPINE_RUNTIME_COMPARE_INTERNAL_H
 #define SUPINE_RUNTIME_COMPARE_INTERNAL_H
 
@@ -11,15 +11,15 @@
 struct supine_compare {
   const supine_basis *basis;
   double area;  /**< mm^2 */
-  float *share; /**< [N] a_i: each vertex's share of the area */
-  double *gram; /**< [G, 3, K, K] of each axis, mm^2 */
-  double *sum;  /**< [K, K] all of them together */
+  float *share; /**< [N] a_i, the fraction of the area that a vertex stands for */
+  double *gram; /**< [G, 3, K, K] Gram matrices of lungs and axes, mm^2 */
+  double *sum;  /**< [K, K] the sum of all */
 };
 
-/** Squared RMS distance of the displacement q [G, 3, K] = gains x weights from 0, mm^2. */
+/** Compute the mean square of the displacement with q [G, 3, K] = gains x weights, mm^2. */
 double supine_compare_square(const supine_compare *compare, const double *q);
 
-/** q [G, 3, K] of a pose; less that of `from` where it is not NULL. */
+/** Compute q [G, 3, K] of a pose, minus that of `from` unless it is NULL. */
 void supine_compare_state(const supine_compare *compare, const supine_pose *pose,
                           const supine_pose *from, double *q);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The directions of gravity that differ most, over the whole sphere. */
+/* Search the sphere for the directions of gravity that differ most. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,7 @@ typedef struct search {
   const supine_state *from; /* its volume */
   double rms;               /* mm, or 0 */
   size_t count;             /* 3 G K */
-  size_t reached;           /* directions that reach the volume */
+  size_t reached;           /* number of directions that reach the volume */
   double (*direction)[3];   /* [reached] */
   double *state;            /* [reached, 3 G K] q = gains x weights */
   double *product;          /* [reached, 3 G K] G q */
@@ -51,7 +51,8 @@ static supine_status state_of(const search *s, const double direction[3], double
   return status;
 }
 
-/* Squared distance between two states, by their difference: exact where they are near. */
+/* Compute the squared distance of two states from their difference, which is exact if they are
+ * near. */
 static double apart(const search *s, const double *a, const double *b) {
   double q[STATE_MAX];
   for (size_t k = 0; k < s->count; ++k) {
@@ -60,7 +61,7 @@ static double apart(const search *s, const double *a, const double *b) {
   return supine_compare_square(s->compare, q);
 }
 
-/* product = G q, matrix by matrix. */
+/* Compute the product G q, matrix by matrix. */
 static void multiply(const search *s, const double *q, double *product) {
   const size_t modes = s->compare->basis->info.mode_count;
   for (size_t row = 0; row < s->count; ++row) {
@@ -72,7 +73,7 @@ static void multiply(const search *s, const double *q, double *product) {
   }
 }
 
-/* States of the spiral's directions, and of `from` last. */
+/* Compute the states of the spiral's directions, and of `from` last. */
 static supine_status sample(search *s, const double from[3], size_t directions,
                             supine_error *error) {
   supine_status status = SUPINE_OK;
@@ -103,7 +104,7 @@ static supine_status sample(search *s, const double from[3], size_t directions,
                                             "no other direction reaches this volume");
 }
 
-/* |q_i - q_j|^2 in the Gram metric. */
+/* Compute |q_i - q_j|^2 in the Gram metric. */
 static double sampled_apart(const search *s, size_t i, size_t j) {
   const double *product = s->product + i * s->count;
   const double *q = s->state + j * s->count;
@@ -114,7 +115,7 @@ static double sampled_apart(const search *s, size_t i, size_t j) {
   return s->square[i] - 2 * both + s->square[j];
 }
 
-/* Turns `direction` by `step` radians along axis `move` / 2 of its tangent plane. */
+/* Turn `direction` by `step` radians along axis `move` / 2 of its tangent plane. */
 static void turned(const double direction[3], int move, double step, double result[3]) {
   const int thin = fabs(direction[0]) < 0.6 ? 0 : (fabs(direction[1]) < 0.6 ? 1 : 2);
   double across[3] = {0, 0, 0};
@@ -134,7 +135,8 @@ static void turned(const double direction[3], int move, double step, double resu
   normalise(result);
 }
 
-/* Moves `movable` of two directions (the first, or both) while that takes their states apart. */
+/* Move the first `movable` of two directions while that increases the distance of their states, mm.
+ */
 static double refine(const search *s, double direction[2][3], int movable, double step) {
   double q[2][STATE_MAX];
   (void)state_of(s, direction[0], q[0], NULL); /* both reached the volume before */

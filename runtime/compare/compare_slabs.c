@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Ventilation by height: what the tissue between two heights gains. */
+/* Compute ventilation by height: the volume that the tissue between two heights gains. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -47,7 +47,7 @@ static void add_cross(const double *a, const double *b, double factor, double *s
   }
 }
 
-/* Orthonormal axes with the third along gravity. */
+/* Choose orthonormal axes with the third along gravity; false if it has no direction. */
 static bool make_axes(const double gravity[3], double axis[3][3]) {
   const double largest = fmax(fabs(gravity[0]), fmax(fabs(gravity[1]), fabs(gravity[2])));
   if (!(largest > 0) || !isfinite(gravity[0]) || !isfinite(gravity[1]) || !isfinite(gravity[2])) {
@@ -130,7 +130,7 @@ static void add_segment(const double p[3], const double q[3], double u, outline 
   line->yu += length * y * u;
 }
 
-/* Cuts a triangle at a level that parts its corners. */
+/* Cut a triangle at a level between its corners. */
 static void cut(const triangle *t, double level, part *sum, outline *line) {
   int lone = 0; /* the corner that is alone on its side */
   int before = 0;
@@ -165,7 +165,7 @@ static void cut(const triangle *t, double level, part *sum, outline *line) {
   add_segment(end[0], end[1], down / 2, line);
 }
 
-/* How many inner levels are at or above a height: its slab. */
+/* Find the slab of a height. */
 static size_t slab_of(const cutter *c, double t) {
   size_t slab = 0;
   while (slab + 1 < c->count && c->level[slab + 1] <= t) {
@@ -189,8 +189,8 @@ static void add_triangle(cutter *c, const triangle *t, part *whole) {
   add_piece(t, full, &whole[last + 1]);
 }
 
-/* Area of a cut times the mean of u.g over it: the plane fitted along its outline, at its
- * centroid. */
+/* Compute the area of a cut times the mean of u.g over it, which is the value at its centroid of
+ * the plane fitted along its outline. */
 static double cut_flux(const part *before, const outline *line) {
   const double area = -before->area;
   if (!(line->length > 0) || area == 0) {

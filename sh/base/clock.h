@@ -3,7 +3,13 @@
 #ifndef SUPINE_CLOCK_H
 #define SUPINE_CLOCK_H
 
-/** Seconds since some moment in the past; monotonic. */
-double supine_clock_seconds(void);
+#include <time.h>
+
+/** Return the seconds since some moment in the past; monotonic. */
+static inline double supine_clock_seconds(void) {
+  struct timespec time;
+  (void)clock_gettime(CLOCK_MONOTONIC, &time);
+  return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
 
 #endif
