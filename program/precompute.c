@@ -218,30 +218,17 @@ static void begin(void *chosen) {
 
 /* Refuse constants of the law beside a patient model. Call before loading, which sets constants
  * that were not given. */
-static supine_status check_patient(const request *wanted, supine_error *error) {
-  const supine_model_choice *choice = &wanted->model.choice;
+static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
   const supine_model *model = &choice->model;
-  const struct {
-    bool given;
-    const char *option;
-  } brought[] = {{choice->law != SUPINE_LAW_COUNT, "law"},
-                 {!isnan(model->force.base), "base"},
-                 {!isnan(model->force.gain), "gain"},
-                 {!isnan(model->force.box[0]), "box-force"},
-                 {!isnan(model->direction.c[0]), "constants"},
-                 {model->direction.model != SUPINE_DIRECTION_BOX, "direction"},
-                 {!isnan(model->reach), "reach"}};
-  for (size_t i = 0; i < sizeof brought / sizeof *brought; ++i) {
-    if (brought[i].given) {
-      return supine_error_set(
-          error, SUPINE_ERROR_ARGUMENT, "--patient has its own law and force: leave --%s out%s",
-          brought[i].option,
-          strcmp(brought[i].option, "gain") == 0 || strcmp(brought[i].option, "reach") == 0
-              ? ", or give it to 'supine fit'"
-              : "");
-    }
-  }
-  return SUPINE_OK;
+  const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
+                     !isnan(model->force.gain) || !isnan(model->force.box[0]) ||
+                     !isnan(model->direction.c[0]) || !isnan(model->reach) ||
+                     model->direction.model != SUPINE_DIRECTION_BOX;
+  return given ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                  "--patient has its own law and force: leave --law, --base, "
+                                  "--gain, --box-force, --constants, --direction and --reach out, "
+                                  "or give --gain and --reach to 'supine fit'")
+               : SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
@@ -256,7 +243,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             wanted->path);
   }
   supine_status status = fields ? check_fields(wanted->fields, wanted->path, error)
-                         : wanted->patient != NULL ? check_patient(wanted, error)
+                         : wanted->patient != NULL ? check_patient(&wanted->model.choice, error)
                                                    : SUPINE_OK;
   if (status == SUPINE_OK && wanted->patient != NULL) {
     status = take_patient(wanted, &record, &text, error);

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Poses in files, volumes in words, latencies in counts. */
-#include "precompute/writer.h"
 #include "program/stream/breathing.h"
 #include "program/stream/latency.h"
 #include "program/stream/poses.h"
-#include "tests/poses.h"
 #include "tests/runtime_fixture.h"
 #include "tests/test.h"
 
@@ -156,83 +154,6 @@ static void test_volumes_in_words(void **state) {
   fixture_destroy(made);
 }
 
-/* mL beyond the reference surface that the lungs hold at `time`. */
-static double beyond_at(const supine_stream_volume *volume, const supine_basis *basis,
-                        const double gravity[3], double time) {
-  double beyond = 0.0;
-  const supine_state at = supine_stream_volume_at(volume, basis, gravity, time);
-  assert_memory_equal(at.gravity, gravity, sizeof at.gravity);
-  assert_int_equal(posed_volume(basis, at.gravity, at.volume, &beyond), SUPINE_OK);
-  return beyond;
-}
-
-/* A basis that knows of a rest: it depends on the posture, and breaths are on top of it. */
-static void test_volumes_follow_the_postures_rest(void **state) {
-  (void)state;
-  fixture *f = fixture_create(200, 4, 2, 2, false, true, 10.0, 6);
-  for (size_t k = 0; k < 4; ++k) { /* whichever way gravity points, the fields fill the lungs */
-    double *mode = f->mode + 9 * k;
-    for (int i = 1; i < 9; ++i) {
-      mode[i] *= 0.1;
-    }
-    mode[0] = f->linear[k] + f->linear[4 + k] > 0.0 ? 3.0 : -3.0;
-  }
-  double resting[9] = {-100.0, 15.0, -22.5, 3.0, 0.5, -1.0, 1.5, 2.0, -2.5};
-  const supine_tensor tensors[] = {
-      {"vertices", SUPINE_F32, 2, {f->vertices, 3}, f->vertex},
-      {"triangles", SUPINE_U32, 2, {f->triangles, 3}, f->triangle},
-      {"coefficients", SUPINE_F32, 2, {f->vertices, 4}, f->coefficient},
-      {"modes", SUPINE_F64, 2, {4, 9}, f->mode},
-      {"lung", SUPINE_U8, 1, {f->vertices}, f->lung},
-      {"direction", SUPINE_F32, 2, {f->vertices, 3}, f->direction},
-      {"volume_linear", SUPINE_F64, 2, {2, 4}, f->linear},
-      {"volume_quadratic", SUPINE_F64, 3, {2, 4, 4}, f->quadratic},
-      {"volume_cubic", SUPINE_F64, 4, {2, 4, 4, 4}, f->cubic},
-      {"resting_volume", SUPINE_F64, 1, {9}, resting}};
-  const supine_metadata metadata[] = {
-      {"format", "supine-basis"}, {"version", "2"}, {"kind", "scalar"}, {"units", "mm"}};
-  char path[256];
-  supine_error error;
-  supine_basis *basis = NULL;
-  (void)snprintf(path, sizeof path, "%s/resting.safetensors", folder);
-  assert_int_equal(supine_writer_safetensors_write(path, tensors, 10, metadata, 4, &error),
-                   SUPINE_OK);
-  assert_int_equal(supine_basis_open(path, &basis, &error), SUPINE_OK);
-  supine_stream_volume *volume = fixture_allocate(1, sizeof *volume);
-  /* Harmonics of the axes by hand: Y00 = 0.2820947917738781, Y1 0.4886025119029199 along its axis,
-   * Y20 = 0.6307831305050401 at z and half of it, negative, across; Y22 = 0.5462742152960396 at x,
-   * negative at y. */
-  const double y00 = 0.2820947917738781;
-  const double y1 = 0.4886025119029199;
-  const double y20 = 0.6307831305050401;
-  const double y22 = 0.5462742152960396;
-  const struct {
-    double gravity[3], rest;
-  } known[] = {{{0, 1, 0}, -100 * y00 + 15 * y1 - 0.5 * 1.5 * y20 + 2.5 * y22},
-               {{0, -1, 0}, -100 * y00 - 15 * y1 - 0.5 * 1.5 * y20 + 2.5 * y22},
-               {{1, 0, 0}, -100 * y00 + 3 * y1 - 0.5 * 1.5 * y20 - 2.5 * y22},
-               {{0, 0, -1}, -100 * y00 + 22.5 * y1 + 1.5 * y20}};
-  for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
-    const double *g = known[i].gravity;
-    assert_int_equal(supine_stream_volume_fix(volume, "rest+35", &error), SUPINE_OK);
-    assert_true(fabs(beyond_at(volume, basis, g, 0.0) - known[i].rest - 35.0) < 1e-6);
-    assert_int_equal(supine_stream_volume_fix(volume, "scan-35", &error), SUPINE_OK);
-    assert_true(fabs(beyond_at(volume, basis, g, 0.0) + 35.0) < 1e-6);
-    assert_int_equal(supine_stream_volume_fix(volume, "full", &error), SUPINE_OK);
-    assert_true(fabs(beyond_at(volume, basis, g, 0.0)) < 1e-6);
-    supine_pv_breath breath = supine_breath_default();
-    breath.tidal = 50.0;
-    assert_int_equal(supine_stream_volume_breathe(volume, supine_breath_normal(), &breath, &error),
-                     SUPINE_OK);
-    assert_true(fabs(beyond_at(volume, basis, g, 0.0) - known[i].rest) < 1e-6);
-    /* The peak, a third into the period. */
-    assert_true(fabs(beyond_at(volume, basis, g, 5.0 / 3.0) - known[i].rest - 50.0) < 0.1);
-  }
-  free(volume);
-  supine_basis_close(basis);
-  fixture_destroy(f);
-}
-
 static int make_folder(void **state) {
   (void)state;
   folder = fixture_folder();
@@ -251,7 +172,6 @@ int main(void) {
       cmocka_unit_test(test_files_that_are_no_poses),
       cmocka_unit_test(test_latencies_are_counted),
       cmocka_unit_test(test_volumes_in_words),
-      cmocka_unit_test(test_volumes_follow_the_postures_rest),
   };
   return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
