@@ -57,12 +57,7 @@ static void fit_free(fit *f) {
 }
 
 static void fitting_free(fitting *w) {
-  prediction *o = &w->work;
-  double *const arrays[] = {w->gram,    o->analysis, o->part,     o->gram,   o->values,
-                            o->vectors, o->seen,     o->residual, o->product};
-  for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
-    free(arrays[i]);
-  }
+  free(w->gram);
   fit_free(&w->chosen);
 }
 
@@ -116,23 +111,23 @@ static bool fit_is_determined(const fit *f) {
   return determined;
 }
 
+/* Allocate the Gram matrix and the work space in one piece; all bands have fewer terms than M. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
-  prediction *o = &w->work;
-  w->gram = malloc(m * m * sizeof *w->gram); /* all bands have fewer terms than M */
-  o->analysis = malloc(m * m * sizeof *o->analysis);
-  o->part = malloc(m * m * sizeof *o->part);
-  o->gram = malloc(m * m * sizeof *o->gram);
-  o->values = malloc(m * sizeof *o->values);
-  o->vectors = malloc(m * m * sizeof *o->vectors);
-  o->seen = malloc(m * sizeof *o->seen);
-  o->residual = malloc(m * sizeof *o->residual);
-  o->product = malloc(m * sizeof *o->product);
-  return w->gram != NULL && o->analysis != NULL && o->part != NULL && o->gram != NULL &&
-                 o->values != NULL && o->vectors != NULL && o->seen != NULL &&
-                 o->residual != NULL && o->product != NULL
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
+  double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
+  if (next == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
+  }
+  double **const squares[] = {&w->work.analysis, &w->work.part, &w->work.gram, &w->work.vectors};
+  double **const lists[] = {&w->work.values, &w->work.seen, &w->work.residual, &w->work.product};
+  for (size_t i = 0; i < 4; ++i) {
+    *squares[i] = next += m * m;
+  }
+  next += m * m;
+  for (size_t i = 0; i < 4; ++i, next += m) {
+    *lists[i] = next;
+  }
+  return SUPINE_OK;
 }
 
 /* Predict direction d from the others, by the harmonics (modes 0) or the leading modes of their

@@ -10,10 +10,17 @@
 
 #include "mesh/io/image_formats.h"
 
-size_t supine_image_bytes(const supine_image *image, size_t file_size) {
+supine_status supine_image_check_size(const char *path, const supine_image *image, size_t file_size,
+                                      supine_error *error) {
+  static const double gzip_ratio = 1032.0; /* largest expansion of a byte */
   const double bytes = (double)image->size[0] * (double)image->size[1] * (double)image->size[2] *
                        (double)supine_image_voxel_size(image->voxel);
-  return bytes <= (double)SUPINE_IMAGE_GZIP_RATIO * (double)file_size ? (size_t)bytes : 0;
+  return bytes > 0.0 && bytes <= gzip_ratio * (double)file_size
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: %zu x %zu x %zu voxels are more than its %zu bytes can hold: "
+                                "it is truncated; fetch or write the file again",
+                                path, image->size[0], image->size[1], image->size[2], file_size);
 }
 
 void supine_image_free(supine_image *image) {

@@ -5,11 +5,10 @@
 
 #include "mesh/io/image.h"
 
-/* Largest expansion of a byte by gzip. */
-enum { SUPINE_IMAGE_GZIP_RATIO = 1032 };
-
-/* Compute the bytes of the image, or 0 if a file of `file_size` bytes cannot hold them. */
-size_t supine_image_bytes(const supine_image *image, size_t file_size);
+/* Refuse an image that is empty, or that a file of `file_size` bytes cannot hold:
+ * SUPINE_ERROR_FORMAT. */
+supine_status supine_image_check_size(const char *path, const supine_image *image, size_t file_size,
+                                      supine_error *error);
 
 /* Read a gzip stream from `offset` of a file to its end: SUPINE_ERROR_FORMAT unless it is
  * complete and its checksum right. */

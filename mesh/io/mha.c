@@ -113,8 +113,7 @@ static const char *check(const header *h) {
 }
 
 /* Find size, frame and type; return NULL or the error. */
-static const char *describe(const header *h, size_t file_size, supine_image *image,
-                            size_t *type_index) {
+static const char *describe(const header *h, supine_image *image, size_t *type_index) {
   const char *name = value_of(h, "ElementType", "", "");
   double dimensions = 0.0;
   double channels = 1.0;
@@ -163,8 +162,7 @@ static const char *describe(const header *h, size_t file_size, supine_image *ima
   for (size_t a = 0; !framed && a < 3; ++a) { /* without a matrix the axes are those of LPS */
     image->step[a][a] = spacing[a];
   }
-  return supine_image_bytes(image, file_size) == 0 ? "its voxels are more than the file can hold"
-                                                   : NULL;
+  return NULL;
 }
 
 static void swap_bytes(unsigned char *bytes, size_t count, size_t size) {
@@ -207,8 +205,11 @@ supine_status supine_image_read_mha(const char *path, size_t file_size, supine_i
   text[head] = '\0';
   const char *wrong = read_header(text, &h);
   wrong = wrong == NULL ? check(&h) : wrong;
-  wrong = wrong == NULL ? describe(&h, file_size, image, &type) : wrong;
+  wrong = wrong == NULL ? describe(&h, image, &type) : wrong;
   if (wrong == NULL) {
+    status = supine_image_check_size(path, image, file_size, error);
+  }
+  if (wrong == NULL && status == SUPINE_OK) {
     const size_t count = image->size[0] * image->size[1] * image->size[2];
     const size_t each = supine_image_voxel_size(image->voxel);
     image->values = malloc(count * each);

@@ -74,18 +74,13 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
   image->frames_differ = forms_differ(nifti);
   for (int k = 0; k < 3; ++k) {
     const double turn = k < 2 ? -unit : unit;
-    image->size[k] = (size_t)size[k];
+    image->size[k] = size[k] > 0 ? (size_t)size[k] : 0;
     image->origin[k] = turn * m->m[k][3];
     for (int a = 0; a < 3; ++a) {
       image->step[a][k] = turn * m->m[k][a];
     }
   }
-  if (size[0] < 1 || size[1] < 1 || size[2] < 1 || supine_image_bytes(image, file_size) == 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %zu x %zu x %zu voxels are more than its %zu bytes can hold", path,
-                            image->size[0], image->size[1], image->size[2], file_size);
-  }
-  return SUPINE_OK;
+  return supine_image_check_size(path, image, file_size, error);
 }
 
 /* Convert stored numbers to F32, times slope plus intercept. */

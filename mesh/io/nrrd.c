@@ -78,12 +78,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
     }
     image->origin[a] = (a < 2 ? turn : 1.0) * nrrd->spaceOrigin[a];
   }
-  if (supine_image_bytes(image, file_size) == 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %zu x %zu x %zu voxels are more than its %zu bytes can hold", path,
-                            image->size[0], image->size[1], image->size[2], file_size);
-  }
-  return SUPINE_OK;
+  return supine_image_check_size(path, image, file_size, error);
 }
 
 /* Find the bytes before the voxels: the header ends in an empty line. */
