@@ -255,9 +255,9 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
         u[k] = element(displacement, 3 * (n * d + i) + k);
       }
       if (!isfinite(u[0]) || !isfinite(u[1]) || !isfinite(u[2])) {
-        status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                  "%s: row %zu: the displacement of vertex %zu is not finite", path,
-                                  d, i);
+        status = supine_error_set(
+            error, SUPINE_ERROR_FORMAT,
+            "%s: row %zu: the displacement of vertex %zu is not finite: correct it", path, d, i);
       }
       supine_mesh_axes_apply(axes, unit, u);
     }

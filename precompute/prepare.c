@@ -104,10 +104,11 @@ static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesio
   for (size_t i = 0; i < 3 * lungs->mesh.vertex_count; i += 3) {
     nearest = fmin(nearest, supine_distance(lungs->mesh.vertices + i, c));
   }
-  supine_findings_add(findings,
-                      "warning: the lesion at %g,%g,%g is %.0f mm from the nearest vertex of the "
-                      "surface: with a radius of %g mm it changes nothing",
-                      c[0], c[1], c[2], nearest, lesion->radius);
+  supine_findings_add(
+      findings,
+      "warning: the lesion at %g,%g,%g is %.0f mm from the nearest vertex of the "
+      "surface: with a radius of %g mm it changes nothing: correct its centre or radius",
+      c[0], c[1], c[2], nearest, lesion->radius);
 }
 
 static supine_status set_lesions(const supine_lungs *lungs, const supine_model_choice *choice,
@@ -143,8 +144,9 @@ static supine_status set_shares(const supine_lungs *lungs, const supine_model_ch
       ++lung;
     }
     if (choice->share[side] > 0.0 && lung == lungs->lung_count) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--lung %s: the model has no %s lung",
-                                names[side], names[side]);
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "--lung %s: the model has no %s lung: leave it out", names[side],
+                                names[side]);
     } else if (choice->share[side] > 0.0) {
       p->model.share[lung] = choice->share[side];
     }

@@ -680,7 +680,7 @@ static void test_labels_bad_maps_refused(void **state) {
   const supine_labels_options edges[] = {
       {.edge = 0.1}, {.edge = 30.0}, {.edge = NAN}, {.close = -1.0}, {.close = 1e3}};
   for (size_t i = 0; i < sizeof edges / sizeof *edges; ++i) {
-    refused("bad.nrrd", &edges[i], SUPINE_ERROR_ARGUMENT, "an edge is");
+    refused("bad.nrrd", &edges[i], SUPINE_ERROR_ARGUMENT, "give --edge from");
   }
   refused("absent.nii.gz", &plain, SUPINE_ERROR_READ, "absent.nii.gz");
   refused("map.mhd", &plain, SUPINE_ERROR_FORMAT, ".nrrd");

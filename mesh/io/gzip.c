@@ -15,7 +15,8 @@ supine_status supine_image_check_gzip(const char *path, long offset, supine_erro
     if (descriptor >= 0) {
       (void)close(descriptor);
     }
-    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read", path);
+    return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: check its permissions",
+                            path);
   }
   gzFile file = gzdopen(descriptor, "rb");
   if (file == NULL) {

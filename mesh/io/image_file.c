@@ -76,8 +76,9 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   }
   supine_status status = formats[format_of(path)].read(path, (size_t)file.st_size, &read, error);
   if (status == SUPINE_OK && !is_frame(&read)) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: the header's directions are not three independent axes", path);
+    status = supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: the header's directions are not three independent axes: write the image again", path);
   }
   if (status != SUPINE_OK) {
     supine_image_free(&read);
@@ -91,7 +92,7 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
                                  supine_error *error) {
   if (!supine_image_supports(path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha", path);
+                            "%s: end the name of an image in .nrrd, .nii, .nii.gz or .mha", path);
   }
   return formats[format_of(path)].write(path, image, note, error);
 }

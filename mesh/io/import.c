@@ -249,7 +249,8 @@ supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *d
       file->bytes[word.at - file->bytes] = '#';
     } else if (supine_mesh_text_is(word, "v") && !supine_mesh_text_position(&line, position)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: line %zu: a vertex needs three numbers", file->path, number);
+                              "%s: line %zu: a vertex needs three numbers; save the mesh again",
+                              file->path, number);
     }
   }
   return import_file(file, true, mesh, dropped, error);

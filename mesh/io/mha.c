@@ -74,13 +74,13 @@ static const char *read_header(char *text, header *h) {
   for (char *line = text; h->count == 0 || strcmp(h->key[h->count - 1], "ElementDataFile") != 0;) {
     char *end = strchr(line, '\n');
     if (end == NULL || h->count == KEYS_MAX) {
-      return "no line ElementDataFile ends its header";
+      return "no line ElementDataFile ends its header; write the image again";
     }
     *end = '\0';
     char *value = strchr(line, '=');
     char *key = line + strspn(line, " \t");
     if (value == NULL) {
-      return "a line of its header has no '='";
+      return "a line of its header has no '='; write the image again";
     }
     key[strcspn(key, " \t=")] = '\0';
     ++value;
@@ -101,7 +101,7 @@ static const char *check(const header *h) {
   const char *object = value_of(h, "ObjectType", "", "");
   const char *binary = value_of(h, "BinaryData", "", "");
   if (*object != '\0' && strcasecmp(object, "Image") != 0) {
-    return "it is not an image";
+    return "it is not an image; give one";
   }
   if (strcasecmp(value_of(h, "ElementDataFile", "", ""), "LOCAL") != 0) {
     return "the voxels are in another file; save them in one (.mha)";
@@ -196,7 +196,7 @@ supine_status supine_image_read_mha(const char *path, size_t file_size, supine_i
   supine_status status = SUPINE_OK;
   if (file == NULL || bytes == NULL || text == NULL) {
     status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
-                              "%s: cannot read", path);
+                              "%s: cannot read: check its permissions, and the free memory", path);
     goto cleanup;
   }
   const size_t size = fread(bytes, 1, file_size, file);

@@ -65,7 +65,8 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
     ++type;
   }
   if (type == SUPINE_VOXEL_COUNT) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: voxels of type %s are not read", path,
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: voxels of type %s are not read; convert them to int16", path,
                             nifti_datatype_string(nifti->datatype));
   }
   image->voxel = (supine_image_voxel)type;
@@ -119,7 +120,8 @@ supine_status supine_image_read_nifti(const char *path, size_t file_size, supine
     status = supine_image_check_gzip(path, 0, error);
   }
   if (status == SUPINE_OK && nifti_image_load(nifti) != 0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: truncated or damaged", path);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: truncated or damaged; fetch or write the file again", path);
   }
   if (status == SUPINE_OK) {
     image->values = nifti->data;

@@ -56,7 +56,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   default:
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: its space is neither left-posterior-superior nor "
-                            "right-anterior-superior",
+                            "right-anterior-superior; write it in one of them",
                             path);
   }
   size_t type = 0;
@@ -65,7 +65,8 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
     ++type;
   }
   if (type == SUPINE_VOXEL_COUNT) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: voxels of type %s are not read", path,
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: voxels of type %s are not read; convert them to int16", path,
                             airEnumStr(nrrdType, nrrd->type));
   }
   image->voxel = (supine_image_voxel)type;

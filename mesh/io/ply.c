@@ -164,10 +164,11 @@ static supine_status check_header(const ply *in) {
   }
   return (in->present & needed) == needed
              ? SUPINE_OK
-             : supine_error_set(in->error, SUPINE_ERROR_MESH,
-                                "%s: no triangles: the PLY header has no faces with "
-                                "vertex_indices, or no vertices with x, y and z",
-                                path);
+             : supine_error_set(
+                   in->error, SUPINE_ERROR_MESH,
+                   "%s: no triangles: the PLY header has no faces with "
+                   "vertex_indices, or no vertices with x, y and z; save the mesh as triangles",
+                   path);
 }
 
 /* Read the next number; false if it is missing or malformed. */

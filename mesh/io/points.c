@@ -105,7 +105,8 @@ static supine_status read_fcsv(reading *r) {
   supine_axes axes = SUPINE_AXES_RAS; /* older versions of Slicer did not name the axes */
   supine_status status = SUPINE_OK;
   if (file == NULL) {
-    return supine_error_set(r->error, SUPINE_ERROR_READ, "%s: cannot open", r->path);
+    return supine_error_set(r->error, SUPINE_ERROR_READ,
+                            "%s: cannot open: check the name and its permissions", r->path);
   }
   while (status == SUPINE_OK && getline(&line, &room, file) > 0) {
     static const char system[] = "# CoordinateSystem =";

@@ -22,8 +22,10 @@ supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh
   for (size_t i = 0; i < mesh->vertex_count; ++i) {
     const double *vertex = mesh->vertices + 3 * i;
     if (!fits(vertex[0]) || !fits(vertex[1]) || !fits(vertex[2])) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: vertex %zu has a coordinate that is not finite", path, i);
+      return supine_error_set(
+          error, SUPINE_ERROR_MESH,
+          "%s: vertex %zu has a coordinate that is not finite: choose a state nearer to the scan",
+          path, i);
     }
   }
   return SUPINE_OK;

@@ -47,7 +47,8 @@ static supine_status take_text(const mesh_file *file, supine_mesh *mesh, supine_
     if (supine_mesh_text_is(word, "vertex") &&
         !supine_mesh_text_position(&line, mesh->vertices + 3 * mesh->vertex_count++)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: line %zu: a vertex needs three numbers", file->path, number);
+                              "%s: line %zu: a vertex needs three numbers; save the mesh again",
+                              file->path, number);
     }
   }
   if (open || mesh->vertex_count % 3 != 0) {
@@ -69,7 +70,7 @@ static supine_status refuse(const mesh_file *file, size_t facets, size_t promise
                    file->path, file->size)
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
                                 "%s: the file has %zu bytes, but an STL of %zu facets has %zu: it "
-                                "is truncated or not an STL file",
+                                "is truncated or not an STL file; save it again",
                                 file->path, file->size, facets, promised);
 }
 

@@ -191,7 +191,9 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   *numbers = NULL;
   /* zlib expands a byte to at most 1032 */
   if (type == NULL || count > 1032 * (size_t)(v->end - v->bytes)) {
-    return malformed(v, "an array of its points or polygons is not read", error);
+    return malformed(
+        v, "an array of its points or polygons has an unknown type or is too large; save it again",
+        error);
   }
   double *values = malloc((count + 1) * sizeof *values);
   unsigned char *bytes = malloc(count * type->size + 1);
@@ -265,7 +267,7 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   }
   if (!find_array(v, piece, within, "offsets", &offsets) ||
       !find_array(v, piece, within, "connectivity", &connectivity)) {
-    return malformed(v, "its polygons have no offsets or connectivity", error);
+    return malformed(v, "its polygons have no offsets or connectivity; save it again", error);
   }
   double *ends = NULL;
   double *corners = NULL;
@@ -306,7 +308,7 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   char compressor[64];
   if (!find_element(v->bytes, v->end, "VTKFile", &root) ||
       !is_attribute(&root, "type", "PolyData")) {
-    return malformed(v, "no VTKFile of type PolyData", error);
+    return malformed(v, "no VTKFile of type PolyData; save the surface as PolyData", error);
   }
   if (is_attribute(&root, "byte_order", "BigEndian")) {
     return malformed(v, "big-endian VTP is not read; save it as PLY", error);
@@ -323,7 +325,7 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   }
   const char *limit = v->appended != NULL ? v->appended : v->end;
   if (!find_element(root.body, limit, "Piece", piece)) {
-    return malformed(v, "no Piece", error);
+    return malformed(v, "no Piece; save it again", error);
   }
   if (find_element(piece->body, limit, "Piece", &second)) {
     return malformed(v, "it has several pieces; save it as one", error);
@@ -372,7 +374,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     return malformed(&v, "its numbers of points and polygons are invalid; save it again", error);
   }
   if (count[0] > 0 && !find_array(&v, &piece, "Points", NULL, &points)) {
-    return malformed(&v, "no array of points", error);
+    return malformed(&v, "no array of points; save it again", error);
   }
   if (count[0] > 0) {
     status = take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error);

@@ -352,8 +352,8 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   if (!(w.edge >= least_edge && w.edge <= most_edge) ||
       !(options->close >= 0.0 && options->close <= most_closing) || count > FILES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "an edge is %g to %g mm, a closing distance 0 to %g, and images at "
-                            "most %d",
+                            "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d "
+                            "images",
                             least_edge, most_edge, most_closing, FILES_MAX);
   }
   supine_status status = read_map(&w, paths, count, error);

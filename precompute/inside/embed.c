@@ -382,8 +382,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   supine_status status = SUPINE_OK;
   *report = (supine_inside_report){0};
   if (content->count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "nothing to embed: the content has no points");
+    return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: give content with points");
   }
   if (!allocate(&e)) {
     status =

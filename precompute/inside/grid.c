@@ -137,7 +137,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   supine_image grid = {0};
   if (!(spacing > 0.0) || !isfinite(spacing)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a grid's spacing must be positive, not %g mm", spacing);
+                            "give a grid a positive spacing, not %g mm", spacing);
   }
   supine_status status = make_grid(shells, like, spacing, margin, &grid, error);
   if (status != SUPINE_OK) {

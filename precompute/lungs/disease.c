@@ -28,8 +28,8 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
   if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) || !positive(lesion->radius) ||
       !positive(lesion->factor)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "lesion at %g,%g,%g, radius %g, factor %g: all must be finite, radius "
-                            "and factor positive",
+                            "lesion at %g,%g,%g, radius %g, factor %g: give finite numbers, and a "
+                            "positive radius and factor",
                             c[0], c[1], c[2], lesion->radius, lesion->factor);
   }
   size_t found = 0;

@@ -24,11 +24,12 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
     return SUPINE_OK;
   }
   if (law->axis < 0 || law->axis > 2) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "expandability: no axis %d", law->axis);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "expandability: no axis %d: give 0, 1 or 2", law->axis);
   }
   if (!positive(law->from) || !positive(law->to)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "expandability from %g to %g: both must be positive", law->from,
+                            "expandability from %g to %g: give positive values", law->from,
                             law->to);
   }
   for (size_t i = 0; i < n; ++i) {
@@ -102,7 +103,8 @@ static supine_status take_rows(supine_csv *csv, size_t count, double *a, supine_
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     if (a[i] == 0.0) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: vertex %zu of %zu has no expandability", csv->path, i, count);
+                                "%s: vertex %zu of %zu has no expandability: add it", csv->path, i,
+                                count);
     }
   }
   return status;

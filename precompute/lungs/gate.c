@@ -68,8 +68,8 @@ static supine_status check_size(const supine_lungs *lungs, const supine_lungs_so
     return SUPINE_OK;
   }
   if (source->axes_given || source->units_given) {
-    supine_findings_add(findings, "%s: warning: %.3g mm long, which no lung is", source->name,
-                        side);
+    supine_findings_add(findings, "%s: warning: %.3g mm long, which no lung is: check --units",
+                        source->name, side);
     return SUPINE_OK;
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,

@@ -46,11 +46,13 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
     triangles += meshes[m].triangle_count;
   }
   if (count == 0 || triangles == 0 || vertices == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH, "the model has no triangles");
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "the model has no triangles: give a closed surface");
   }
   if (vertices > UINT32_MAX) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%zu vertices are more than 32-bit indices reach", vertices);
+                            "%zu vertices are more than 32-bit indices reach: give a coarser mesh",
+                            vertices);
   }
   placed_mesh *placed = malloc(count * sizeof *placed);
   joined->vertices = malloc(3 * vertices * sizeof *joined->vertices);
@@ -185,10 +187,11 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
       }
       const bool first = side[0] < side[1];
       if (side[!first] < least_side_share * side[first]) {
-        return supine_error_set(error, SUPINE_ERROR_MESH,
-                                "surface %zu is %.3g mm long beside %.3g mm: it was not read "
-                                "whole, is in other units, or does not belong here",
-                                first ? i + 1 : m + 1, side[!first], side[first]);
+        return supine_error_set(
+            error, SUPINE_ERROR_MESH,
+            "surface %zu is %.3g mm long beside %.3g mm: it was not read "
+            "whole, is in other units, or does not belong here; leave it out or correct it",
+            first ? i + 1 : m + 1, side[!first], side[first]);
       }
     }
   }
@@ -275,7 +278,7 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
                                   supine_lungs *lungs, supine_error *error) {
   supine_lungs made = {0};
   if (midline != NULL && !isfinite(*midline)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the midline must be finite");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give a finite midline");
   }
   supine_status status = check_surfaces(meshes, count, error);
   status = status == SUPINE_OK ? join(meshes, count, &made.mesh, error) : status;
