@@ -75,7 +75,6 @@ static void add_lesions(entries *list, size_t count, const double *factors) {
 
 static void add_model(entries *list, const supine_lungs *lungs, const supine_model *model,
                       bool reference_known) {
-  static const char *const models[] = {"box", "normal", "radial", "vectors"};
   const supine_force_law *force = &model->force;
   const double *c = model->direction.c;
   const double *bend = model->bend;
@@ -83,8 +82,8 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   add(list, "midline_mm", "%.9g", lungs->midline);
   add(list, "force", "base=%.9g gain=%.9g cx=%.9g cy=%.9g cz=%.9g soften=%.9g", force->base,
       force->gain, force->box[0], force->box[1], force->box[2], force->soften);
-  add(list, "direction", "%s", models[model->direction.model]);
-  if (model->direction.model == SUPINE_DIRECTION_BOX) {
+  add(list, "direction", "%s", model->direction.vectors == NULL ? "box" : "vectors");
+  if (model->direction.vectors == NULL) {
     add(list, "direction_constants", "c1=%.9g c2=%.9g c3=%.9g c4=%.9g c5=%.9g c6=%.9g", c[0], c[1],
         c[2], c[3], c[4], c[5]);
   }
@@ -209,9 +208,9 @@ static supine_status find_normals(const supine_basis_content *content, const flo
   return supine_normals_modes_create(&surface, normals, error);
 }
 
-static void add_normals(entries *list, const supine_normals_modes *normals, bool closed) {
+static void add_normals(entries *list, const supine_normals_modes *normals, bool rest_known) {
   if (normals->count > 0) {
-    add(list, closed ? "normals_range_ml" : "normals_range_mm", "%.0f..%.0f", normals->range[0],
+    add(list, rest_known ? "normals_range_ml" : "normals_range_mm", "%.0f..%.0f", normals->range[0],
         normals->range[1]);
     add(list, "normals_mean_degrees", "%.2g", normals->mean);
     add(list, "normals_p999_degrees", "%.2g", normals->p999);
@@ -298,7 +297,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  add_normals(&list, &normals, content->forms != NULL);
+  add_normals(&list, &normals, content->resting != NULL);
   add(&list, "made_by", "%s", options->made_by != NULL ? options->made_by : "supine_precompute");
   if (list.failed) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);

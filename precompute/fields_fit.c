@@ -228,20 +228,25 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Compute the coefficients [rows, P]. */
+/* Write the field as the given fields [rows, m] times the analysis of its band [m, P]. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
-  const int rows = (int)w->rows;
-  const int m = (int)w->chosen.count;
-  const int terms = (int)w->chosen.terms;
-  *made = (supine_projection){.vertex_count = w->rows, .band = band, .rank = w->chosen.terms};
-  made->columns = calloc(w->rows * w->chosen.terms, sizeof *made->columns);
-  if (made->columns == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu coefficients",
-                            w->rows * w->chosen.terms);
+  const size_t m = w->chosen.count;
+  const size_t terms = w->chosen.terms;
+  *made = (supine_projection){.vertex_count = w->rows, .band = band, .rank = m};
+  made->columns = malloc(w->rows * m * sizeof *made->columns);
+  made->functions = malloc(m * terms * sizeof *made->functions);
+  if (made->columns == NULL || made->functions == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
-  cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, rows, terms, m, 1.0, w->fields->displacement,
-              rows, w->chosen.analysis, m, 0.0, made->columns, terms);
+  for (size_t d = 0; d < m; ++d) {
+    for (size_t i = 0; i < w->rows; ++i) {
+      made->columns[i * m + d] = w->fields->displacement[d * w->rows + i];
+    }
+    for (size_t t = 0; t < terms; ++t) {
+      made->functions[d * terms + t] = w->chosen.analysis[t * m + d];
+    }
+  }
   return SUPINE_OK;
 }
 

@@ -37,23 +37,6 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   return status;
 }
 
-/* Read the name of a model; a text with a dot or a slash names a file of vectors. */
-static supine_status read_direction(const char *text, void *field, supine_error *error) {
-  supine_model_choice *choice = field;
-  (void)error;
-  static const char *const names[] = {"box", "normal", "radial"};
-  choice->directions = NULL;
-  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
-    if (strcmp(text, names[i]) == 0) {
-      choice->model.direction.model = (supine_direction_model)i;
-      return SUPINE_OK;
-    }
-  }
-  choice->model.direction.model = SUPINE_DIRECTION_VECTORS;
-  choice->directions = text;
-  return supine_options_fits(strpbrk(text, "./") != NULL);
-}
-
 /* Read "linear:z:0.5:1.5"; any other text names a file. */
 static supine_status read_expandability(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
@@ -195,11 +178,10 @@ const supine_option supine_command_model_options[] = {
      "0. With the paper law, give --reach as well",
      FILLS(choice.model.force.soften), .more = true},
     {.help = "Direction of displacement:", .more = true},
-    {"direction", 0, "WHAT",
-     "box (default): (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm; normal; radial\nFILE: a vector per "
-     "vertex: CSV with the columns dx,dy,dz in mm, in the vertex order of 'supine solve'",
-     FILLS(choice), .read = read_direction, .wants = "box, normal, radial or a CSV file of vectors",
-     .file = SUPINE_FILE_IN, .more = true},
+    {"direction", 0, "FILE",
+     "a vector per vertex instead of (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm: CSV with the columns "
+     "dx,dy,dz in mm, in the vertex order of 'supine solve'",
+     FILLS(choice.directions), .file = SUPINE_FILE_IN, .more = true},
     {"constants", 0, "C1,...,C6",
      "constants of the box model; default by law:" SUPINE_LAWS(
          LAW_CONSTANTS) ". Fitted to landmarks: paper to ten 4-D CTs (DIR-Lab), deep to ten "

@@ -223,7 +223,7 @@ static supine_status check_patient(const supine_model_choice *choice, supine_err
   const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
                      !isnan(model->force.gain) || !isnan(model->force.box[0]) ||
                      !isnan(model->direction.c[0]) || !isnan(model->reach) ||
-                     model->direction.model != SUPINE_DIRECTION_BOX;
+                     choice->directions != NULL;
   return given ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "--patient has its own law and force: leave --law, --base, "
                                   "--gain, --box-force, --constants, --direction and --reach out, "

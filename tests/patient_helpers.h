@@ -15,7 +15,7 @@ static supine_model truth(void) {
   model.reach = 10.0;
   model.force = (supine_force_law){.base = 0.9, .gain = 0.4, .box = {0.0, -0.2, 0.0}};
   model.direction =
-      (supine_direction_law){.model = SUPINE_DIRECTION_BOX, .c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
+      (supine_direction_law){.c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
   return model;
 }
 

@@ -214,29 +214,6 @@ static void test_directions_two_lungs_move_outwards(void **state) {
   free(d);
 }
 
-static void test_directions_normal_and_radial_are_outward_units(void **state) {
-  const supine_lungs *lungs = *state;
-  const size_t n = lungs->mesh.vertex_count;
-  double *normal = malloc(3 * n * sizeof *normal);
-  double *radial = malloc(3 * n * sizeof *radial);
-  supine_direction_law law = {.model = SUPINE_DIRECTION_NORMAL};
-  for (size_t k = 0; k < 6; ++k) {
-    law.c[k] = 1.0;
-  }
-  assert_int_equal(supine_physics_directions(lungs, &law, normal, NULL), SUPINE_OK);
-  law.model = SUPINE_DIRECTION_RADIAL;
-  assert_int_equal(supine_physics_directions(lungs, &law, radial, NULL), SUPINE_OK);
-  for (size_t i = 0; i < n; ++i) {
-    const double *a = normal + 3 * i;
-    const double *b = radial + 3 * i;
-    assert_close(a[0] * a[0] + a[1] * a[1] + a[2] * a[2], 1.0, 1e-14);
-    assert_close(b[0] * b[0] + b[1] * b[1] + b[2] * b[2], 1.0, 1e-14);
-    assert_true(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > 0.2);
-  }
-  free(normal);
-  free(radial);
-}
-
 static void test_directions_bad_constants_refused(void **state) {
   double d[3];
   supine_error error;
@@ -260,7 +237,6 @@ int main(void) {
       cmocka_unit_test(test_height_range_neighbouring_directions_equals_each_alone),
       cmocka_unit_test(test_directions_box_model_literal_values),
       cmocka_unit_test(test_directions_two_lungs_move_outwards),
-      cmocka_unit_test(test_directions_normal_and_radial_are_outward_units),
       cmocka_unit_test(test_directions_bad_constants_refused),
   };
   return cmocka_run_group_tests(tests, setup, teardown);

@@ -37,9 +37,8 @@ static double *coefficients_of(const supine_projection *projection) {
   for (size_t i = 0; i < projection->vertex_count; ++i) {
     for (size_t r = 0; r < projection->rank; ++r) {
       for (size_t t = 0; t < terms; ++t) {
-        const double function =
-            projection->functions != NULL ? projection->functions[r * terms + t] : (double)(r == t);
-        c[i * terms + t] += projection->columns[i * projection->rank + r] * function;
+        c[i * terms + t] +=
+            projection->columns[i * projection->rank + r] * projection->functions[r * terms + t];
       }
     }
   }
@@ -303,11 +302,13 @@ static void test_modes_end_where_rounding_begins(void **state) {
   enum { ROWS = 7, TERMS = 4 };
   static const double sizes[TERMS] = {2.0, 0.5, 2.0 * 3e-7, 2.0 * 3e-8};
   double columns[ROWS * TERMS] = {0.0};
+  double functions[TERMS * TERMS] = {0.0};
   for (size_t t = 0; t < TERMS; ++t) {
     columns[(t + 2) * TERMS + t] = sizes[t];
+    functions[t * TERMS + t] = 1.0;
   }
   const supine_projection projection = {
-      .vertex_count = ROWS, .band = 1, .rank = TERMS, .columns = columns};
+      .vertex_count = ROWS, .band = 1, .rank = TERMS, .columns = columns, .functions = functions};
   supine_compression modes;
   double singular[TERMS];
   assert_int_equal(

@@ -31,10 +31,11 @@ typedef struct supine_normals_surface {
   const float *directions;   /**< [N, 3]; NULL: a vector field */
   const float *coefficients; /**< [N, K] or [N, 3, K] */
   const double *modes;       /**< [K, (band + 1)^2] */
-  const double *linear;      /**< [G, 3, K] the volume's forms; NULL: an open surface; likewise: */
+  const double *resting;     /**< [G, 9] mL beyond the surface at rest, harmonics; NULL: not known,
+                                and the volume's forms are not used */
+  const double *linear;      /**< [G, 3, K] */
   const double *quadratic;   /**< [G, 3, K, K] */
   const double *cubic;       /**< [G, K, K, K] */
-  const double *resting;     /**< [G, 9] mL beyond the surface at rest, harmonics; or NULL */
   double bend[3];            /**< see supine_volume_bend */
 } supine_normals_surface;
 
@@ -43,8 +44,8 @@ typedef struct supine_normals_modes {
   size_t count;    /**< Q; 0: none were made */
   int16_t *modes;  /**< [N, 3, Q] n, in units that `weights` contain */
   double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V */
-  double range[2]; /**< least and largest volume of the states, mL beyond the file's surface; of an
-                      open surface, largest displacement, mm */
+  double range[2]; /**< least and largest volume of the states, mL beyond the file's surface; where
+                      no rest is known, least and largest of the largest displacement, mm */
   double mean;     /**< angle, degrees, from the exact normals, over vertices and states that the
                       modes were not found from */
   double p999;     /**< 99.9th percentile of that angle */

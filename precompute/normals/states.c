@@ -11,30 +11,11 @@
 #include "precompute/normals/polynomial.h"
 #include "precompute/normals/states.h"
 
-/* Where no rest is known: of the surface's volume. */
-static const double lowest_share = -0.1;
-static const double highest_share = 0.6;
-/* Of an open surface: mm of the largest displacement. */
-static const double lowest_mm = -10.0;
-static const double highest_mm = 40.0;
+/* Range of the largest displacement where no rest is known, mm. */
+static const double lowest_mm = -15.0;
+static const double highest_mm = 60.0;
 
-/* Volume enclosed by the file's surface, mL. */
-static double enclosed(const supine_normals_surface *s) {
-  double sum = 0.0;
-  for (size_t t = 0; t < s->triangle_count; ++t) {
-    const float *p[3];
-    for (size_t v = 0; v < 3; ++v) {
-      p[v] = s->vertices + 3 * (size_t)s->triangles[3 * t + v];
-    }
-    const double x = (double)p[1][1] * (double)p[2][2] - (double)p[1][2] * (double)p[2][1];
-    const double y = (double)p[1][2] * (double)p[2][0] - (double)p[1][0] * (double)p[2][2];
-    const double z = (double)p[1][0] * (double)p[2][1] - (double)p[1][1] * (double)p[2][0];
-    sum += ((double)p[0][0] * x + (double)p[0][1] * y + (double)p[0][2] * z) / 6000.0;
-  }
-  return fabs(sum);
-}
-
-/* Largest displacement at weights w and scale 1, mm, over some of the vertices. */
+/* Find the largest displacement at weights w and gain 1, mm, over some of the vertices. */
 static double largest(const supine_normals_surface *s, const double *w) {
   enum { SOME = 4096 };
   const size_t modes = s->mode_count;
@@ -59,22 +40,16 @@ static double largest(const supine_normals_surface *s, const double *w) {
   return sqrt(top);
 }
 
-/* Add a lung's volume at weights w to a form. */
-static void add_form(const supine_normals_surface *s, size_t lung, const double *w,
-                     supine_volume_form *form) {
-  const size_t k = s->mode_count;
-  supine_volume_contract(k, 3, s->linear + lung * 3 * k, s->quadratic + lung * 3 * k * k,
-                         s->cubic + lung * k * k * k, w, form);
-}
-
-/* Gains of each lung at a share, 0 to 1, of its way from rest to the file's surface. */
+/* Find each lung's gains at a share, 0 to 1, of its way from rest to the file's surface. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
+  const size_t k = s->mode_count;
   *amount = 0.0;
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
     supine_volume_form form = {{0.0}};
     double rest = 0.0;
-    add_form(s, lung, w, &form);
+    supine_volume_contract(k, 3, s->linear + lung * 3 * k, s->quadratic + lung * 3 * k * k,
+                           s->cubic + lung * k * k * k, w, &form);
     for (size_t i = 0; i < 9; ++i) {
       rest += s->resting[9 * lung + i] * y[i];
     }
@@ -87,28 +62,15 @@ static bool gains_from_rest(const supine_normals_surface *s, const double *y, co
   return true;
 }
 
-/* The one gain of all lungs at a share, 0 to 1, of the range of a posture. */
-static bool common_gain(const supine_normals_surface *s, const double *w, double whole,
-                        double share, double (*gains)[3], double *amount) {
-  bool reached = true;
-  if (s->linear == NULL) {
-    const double size = largest(s, w);
-    *amount = lowest_mm + share * (highest_mm - lowest_mm);
-    gains[0][0] = gains[0][1] = gains[0][2] = size > 0.0 ? *amount / size : 0.0;
-    reached = size > 0.0;
-  } else {
-    static const double straight[3] = {0.0, 0.0, 0.0};
-    supine_volume_form form = {{0.0}};
-    for (size_t lung = 0; lung < s->lung_count; ++lung) {
-      add_form(s, lung, w, &form);
-    }
-    *amount = (lowest_share + share * (highest_share - lowest_share)) * whole;
-    reached = supine_volume_form_gains(&form, straight, 0.0, *amount, gains[0], NULL) == SUPINE_OK;
+/* Find the one gain of all lungs at a share, 0 to 1, of the range of displacements. */
+static bool common_gain(const supine_normals_surface *s, const double *w, double share,
+                        double (*gains)[3], double *amount) {
+  const double size = largest(s, w);
+  *amount = lowest_mm + share * (highest_mm - lowest_mm);
+  for (size_t i = 0; i < 3 * s->lung_count; ++i) {
+    gains[i / 3][i % 3] = size > 0.0 ? *amount / size : 0.0;
   }
-  for (size_t lung = 1; lung < s->lung_count; ++lung) {
-    memcpy(gains[lung], gains[0], sizeof gains[0]);
-  }
-  return reached;
+  return size > 0.0;
 }
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
@@ -116,7 +78,6 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
   static const double volume_share = 0.4142135623730950488; /* sqrt 2 - 1: apart from the angle */
   const size_t terms = 3 * supine_normals_terms(surface->mode_count);
   const size_t harmonics = supine_sh_count(surface->band);
-  const double whole = surface->linear == NULL ? 0.0 : enclosed(surface);
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
   double low[9];
   double w[SUPINE_MODES_MAX];
@@ -141,7 +102,7 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
       }
     }
     if (surface->resting != NULL ? gains_from_rest(surface, low, w, share, gains, &amount)
-                                 : common_gain(surface, w, whole, share, gains, &amount)) {
+                                 : common_gain(surface, w, share, gains, &amount)) {
       for (size_t lung = 0; lung < surface->lung_count; ++lung) {
         supine_normals_monomials(surface->mode_count, w, gains[lung],
                                  states->phi + (lung * count + states->count) * terms);

@@ -5,17 +5,18 @@
 
 #include "precompute/normals/normals.h"
 
-/* Postures and volumes, as monomials of weights and gains. */
+/* Monomials of the weights and gains in some states. */
 typedef struct supine_normals_states {
-  size_t count; /* S, of those that are reached */
-  size_t room;
-  double *phi; /* [G, room, 3, terms] */
-  double range[2];
+  size_t count;    /* S, those that are reached */
+  size_t room;     /* states that were asked for */
+  double *phi;     /* [G, room, 3, terms] */
+  double range[2]; /* as of supine_normals_modes */
 } supine_normals_states;
 
-/* Spreads up to `count` over the sphere and the volumes from rest to the file's surface, or where
- * no rest is known from a tenth below it to six tenths above; `shift` in 0 ... 1 moves them all
- * between each other. SUPINE_ERROR_MEMORY */
+/* Spread up to `count` states over the sphere and the volumes from rest to the file's surface, or
+ * where no rest is known, largest displacements of -15 to 60 mm. Another `shift`, 0 to 1, gives
+ * states between the others.
+ * SUPINE_ERROR_MEMORY */
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states);
 void supine_normals_states_free(supine_normals_states *states);

@@ -51,8 +51,8 @@ void supine_reference_compare(const supine_reference *reference, const supine_pe
   double range[2];
   supine_reference_capacity(person, range);
   const bool known = person->height > 0.0 && person->sex != SUPINE_SEX_UNKNOWN;
-  supine_text_add(text, size, known ? "expected %.0f" : "an adult's %.0f to %.0f",
-                  part * range[0], part * range[1]);
+  supine_text_add(text, size, known ? "expected %.0f" : "an adult's %.0f to %.0f", part * range[0],
+                  part * range[1]);
 }
 
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The direction of displacement (15)-(17), and two simple alternatives. */
+/* The direction of displacement (15)-(17), or one vector a vertex from a file. */
 #include <math.h>
-#include <stdlib.h>
+#include <string.h>
 
 #include "precompute/physics/force.h"
+#include "sh/base/csv.h"
 
 static void box_direction(const supine_lungs *lungs, const double c[6], size_t vertex, double *d) {
   double box[3];
@@ -12,34 +13,6 @@ static void box_direction(const supine_lungs *lungs, const double c[6], size_t v
   d[0] = lungs->side[lung] * c[0] * pow(box[0], c[1]); /* (15) */
   d[1] = -c[2] * pow(box[1], c[3]);                    /* (16) */
   d[2] = -c[4] * pow(box[2], c[5]);                    /* (17) */
-}
-
-static void radial_directions(const supine_lungs *lungs, double *d) {
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    const size_t begin = lungs->lung_begin[lung];
-    const size_t end = lungs->lung_begin[lung + 1];
-    double centre[3] = {0.0, 0.0, 0.0};
-    for (size_t i = begin; i < end; ++i) {
-      for (size_t k = 0; k < 3; ++k) {
-        centre[k] += lungs->mesh.vertices[3 * i + k] / (double)(end - begin);
-      }
-    }
-    for (size_t i = begin; i < end; ++i) {
-      for (size_t k = 0; k < 3; ++k) {
-        d[3 * i + k] = lungs->mesh.vertices[3 * i + k] - centre[k];
-      }
-    }
-  }
-}
-
-static void normalise(size_t count, double *d) {
-  for (size_t i = 0; i < count; ++i) {
-    const double length =
-        sqrt(d[3 * i] * d[3 * i] + d[3 * i + 1] * d[3 * i + 1] + d[3 * i + 2] * d[3 * i + 2]);
-    for (size_t k = 0; k < 3 && length > 0.0; ++k) {
-      d[3 * i + k] /= length;
-    }
-  }
 }
 
 supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
@@ -52,30 +25,11 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
                               k % 2 == 1 ? "exponents must be positive" : "it must be finite");
     }
   }
-  switch (law->model) {
-  case SUPINE_DIRECTION_BOX:
-    for (size_t i = 0; i < n; ++i) {
-      box_direction(lungs, law->c, i, directions + 3 * i);
-    }
-    break;
-  case SUPINE_DIRECTION_NORMAL:
-    supine_mesh_vertex_normals(&lungs->mesh, directions);
-    break;
-  case SUPINE_DIRECTION_RADIAL:
-    radial_directions(lungs, directions);
-    normalise(n, directions);
-    break;
-  case SUPINE_DIRECTION_VECTORS:
-    if (law->vectors == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "the model has no direction vectors: give --direction FILE");
-    }
-    for (size_t i = 0; i < 3 * n; ++i) {
-      directions[i] = law->vectors[i];
-    }
-    break;
-  default:
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no direction model %d", (int)law->model);
+  for (size_t i = 0; i < n && law->vectors == NULL; ++i) {
+    box_direction(lungs, law->c, i, directions + 3 * i);
+  }
+  if (law->vectors != NULL) {
+    memcpy(directions, law->vectors, 3 * n * sizeof *directions);
   }
   if (law->correct != NULL) {
     law->correct(law->context, lungs, directions);
@@ -87,4 +41,33 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
                           "no vertex would move: every direction is zero");
+}
+
+supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
+                                             supine_error *error) {
+  static const char *const columns[] = {"dx", "dy", "dz"};
+  supine_csv csv;
+  bool more = true;
+  size_t rows = 0;
+  supine_status status = supine_csv_open(path, columns, 3, 3, &csv, error);
+  while (status == SUPINE_OK && more) {
+    status = supine_csv_next(&csv, &more, error);
+    if (status == SUPINE_OK && more && rows == count) {
+      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s:%zu: more rows than the model has vertices (%zu)", path,
+                                csv.line, count);
+    }
+    for (size_t k = 0; k < 3 && status == SUPINE_OK && more; ++k) {
+      status = supine_csv_number(&csv, k, columns[k], vectors + 3 * rows + k, error);
+    }
+    rows += more ? 1 : 0;
+  }
+  supine_csv_close(&csv);
+  if (status == SUPINE_OK && rows < count) {
+    status = supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: %zu rows, but the model has %zu vertices: give one row for each vertex", path, rows,
+        count);
+  }
+  return status;
 }

@@ -46,26 +46,18 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
                           const supine_gravities *gravities, size_t vertex_count,
                           const size_t *vertices, double *force);
 
-/** Model of the direction of displacement. */
-typedef enum supine_direction_model {
-  SUPINE_DIRECTION_BOX = 0, /**< (15)-(17): d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm */
-  SUPINE_DIRECTION_NORMAL,  /**< the outward unit normal, 1 mm */
-  SUPINE_DIRECTION_RADIAL,  /**< away from the centroid of the lung's vertices, 1 mm */
-  SUPINE_DIRECTION_VECTORS  /**< given by the caller, mm */
-} supine_direction_model;
-
-/** The model and the constants c1 to c6 of the box model (model.h has three sets of them). */
+/** The direction of displacement: (15)-(17), d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm, or the
+ * caller's own. */
 typedef struct supine_direction_law {
-  supine_direction_model model;
-  double c[6];
-  const double *vectors; /**< [N, 3] of SUPINE_DIRECTION_VECTORS, mm; owned by the caller */
+  double c[6];           /**< c1 to c6 (model.h) */
+  const double *vectors; /**< [N, 3] mm, instead; NULL: none; owned by the caller */
   /** Correct the directions [N, 3] of one person's lungs in place; NULL: no correction. */
   void (*correct)(const void *context, const supine_lungs *lungs, double *directions);
   const void *context; /**< argument of `correct`; owned by the caller */
 } supine_direction_law;
 
-/** Read vectors for SUPINE_DIRECTION_VECTORS: CSV with the columns dx,dy,dz, mm, a row for each
- * of `count` vertices in the model's order, into vectors [count, 3].
+/** Read vectors of directions: CSV with the columns dx,dy,dz, mm, a row for each of `count`
+ * vertices in the model's order, into vectors [count, 3].
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (line named), SUPINE_ERROR_MEMORY */
 supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
                                              supine_error *error);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A field compressed to functions of orientation: columns times a mix. */
+/* A field compressed to a few functions of orientation. */
+#include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,43 +9,12 @@
 #include <supine/sh.h>
 
 #include "precompute/projection/compression.h"
-#include "sh/base/clones.h"
 
 void supine_projection_compression_free(supine_compression *compression) {
   free(compression->coefficients);
   free(compression->modes);
   free(compression->mix);
   *compression = (supine_compression){0};
-}
-
-typedef struct mix_work {
-  const supine_projection *projection;
-  supine_compression *compression;
-} mix_work;
-
-/* coefficients = columns x mix, row by row. */
-SUPINE_CLONES static void mix_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const mix_work *work = context;
-  const size_t rank = work->projection->rank;
-  const size_t count = work->compression->mode_count;
-  double sums[SUPINE_MODES_MADE_MAX];
-  for (size_t i = begin; i < end; ++i) {
-    const double *row = work->projection->columns + i * rank;
-    for (size_t k = 0; k < count; ++k) {
-      sums[k] = 0.0;
-    }
-    for (size_t r = 0; r < rank; ++r) {
-      const double *mix = work->compression->mix + r * count;
-      for (size_t k = 0; k < count; ++k) {
-        sums[k] += row[r] * mix[k];
-      }
-    }
-    float *out = work->compression->coefficients + i * count;
-    for (size_t k = 0; k < count; ++k) {
-      out[k] = (float)sums[k];
-    }
-  }
 }
 
 supine_status supine_projection_compression_create(const supine_projection *projection,
@@ -61,17 +31,37 @@ supine_status supine_projection_compression_create(const supine_projection *proj
   return SUPINE_OK;
 }
 
-void supine_projection_compression_mix(const supine_projection *projection,
-                                       supine_compression *made) {
-  mix_work work = {projection, made};
-  supine_parallel_for(projection->vertex_count, 1024, 0, mix_range, &work);
+typedef struct mix_work {
+  const supine_projection *projection;
+  supine_compression *made;
+} mix_work;
+
+static void mix_range(void *context, size_t begin, size_t end, size_t thread) {
+  enum { BLOCK = 128 };
+  const mix_work *work = context;
+  const int rank = (int)work->projection->rank;
+  const size_t count = work->made->mode_count;
+  double block[BLOCK * SUPINE_MODES_MADE_MAX];
+  (void)thread;
+  for (size_t i = begin; i < end; i += BLOCK) {
+    const size_t n = end - i < BLOCK ? end - i : BLOCK;
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)n, (int)count, rank, 1.0,
+                work->projection->columns + i * work->projection->rank, rank, work->made->mix,
+                (int)count, 0.0, block, (int)count);
+    for (size_t k = 0; k < n * count; ++k) {
+      work->made->coefficients[i * count + k] = (float)block[k];
+    }
+  }
 }
 
-/* functions[r, t], which are the identity where they are not stored. */
-static double function_at(const supine_projection *projection, size_t r, size_t t) {
-  return projection->functions != NULL
-             ? projection->functions[r * supine_sh_count(projection->band) + t]
-             : (double)(r == t);
+void supine_projection_compression_mix(const supine_projection *projection,
+                                       supine_compression *made) {
+  const int terms = (int)supine_sh_count(projection->band);
+  const int count = (int)made->mode_count;
+  mix_work work = {projection, made};
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)projection->rank, count, terms, 1.0,
+              projection->functions, terms, made->modes, terms, 0.0, made->mix, count);
+  supine_parallel_for(projection->vertex_count, 1024, 0, mix_range, &work);
 }
 
 supine_status supine_projection_compress_harmonics(const supine_projection *projection,
@@ -90,16 +80,13 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
   }
   for (size_t t = 0; t < terms; ++t) {
     made.modes[t * terms + t] = 1.0;
-    for (size_t r = 0; r < projection->rank; ++r) {
-      made.mix[r * terms + t] = function_at(projection, r, t);
-    }
   }
   supine_projection_compression_mix(projection, &made);
   *compression = made;
   return SUPINE_OK;
 }
 
-/* Packs the first `count` of each row of `width` to the front. */
+/* Move the first `count` values of each row of `width` to the front. */
 static void keep_columns(void *data, size_t rows, size_t width, size_t count, size_t size) {
   unsigned char *bytes = data;
   for (size_t r = 1; r < rows; ++r) {

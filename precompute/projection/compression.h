@@ -6,11 +6,11 @@
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/projection.h"
 
-/* Allocate `mode_count` modes of a projection; modes and mix are zero. */
+/* Allocate `mode_count` modes of a projection; the modes are zero. */
 supine_status supine_projection_compression_create(const supine_projection *projection,
                                                    size_t mode_count, supine_compression *made);
 
-/* Compute coefficients = columns x mix. */
+/* Compute mix = functions x modes^T and coefficients = columns x mix. */
 void supine_projection_compression_mix(const supine_projection *projection,
                                        supine_compression *made);
 

@@ -10,10 +10,11 @@
 
 #include "precompute/projection/compression.h"
 
-/* Singular values below this share of the first are rounding: the Gram matrix squares them. */
+/* Relative singular value below which a mode is rounding error: the Gram matrix squares them. */
 static const double rank_tolerance = 1e-7;
 
-/* gram = columns^T diag(weight) columns, [R, R], its lower triangle as LAPACK counts. */
+/* Compute gram = columns^T diag(weight) columns, [R, R], its lower triangle in column-major order.
+ */
 static supine_status gram_matrix(const supine_projection *projection, const double *weight,
                                  double *gram) {
   enum { BLOCK = 1024 };
@@ -65,11 +66,11 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
   return status;
 }
 
-/* Squares of the singular values of C = sqrt(W) columns x functions and its right singular vectors
- * [count, P], where the functions are stored: with H^T H = columns^T W columns, C has those of
- * A = H functions, which has R rows only. They come from the R x R eigenproblem of A A^T. */
-static supine_status factored_modes(const supine_projection *projection, double *gram, size_t count,
-                                    double *values, double *modes, double *total) {
+/* Find the squares of the singular values of C = sqrt(W) columns x functions and its right singular
+ * vectors [count, P]: with H^T H = columns^T W columns, C has those of A = H functions, which has
+ * only R rows. They come from the R x R eigenproblem of A A^T. */
+static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
+                                double *values, double *modes, double *total) {
   const size_t rank = projection->rank;
   const size_t terms = supine_sh_count(projection->band);
   double *vectors = malloc(rank * rank * sizeof *vectors);
@@ -105,33 +106,6 @@ cleanup:
   return status;
 }
 
-/* The same where the functions are the harmonics themselves: C = sqrt(W) columns. */
-static supine_status plain_modes(const supine_projection *projection, double *gram, size_t count,
-                                 double *values, double *modes, double *total) {
-  *total = 0.0;
-  for (size_t r = 0; r < projection->rank; ++r) {
-    *total += gram[r * projection->rank + r];
-  }
-  return supine_projection_leading_eigenpairs(projection->rank, gram, count, values, modes);
-}
-
-/* mix = functions x modes^T, [R, K]. */
-static void find_mix(const supine_projection *projection, supine_compression *made) {
-  const int rank = (int)projection->rank;
-  const int terms = (int)supine_sh_count(projection->band);
-  const int count = (int)made->mode_count;
-  if (projection->functions != NULL) {
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, rank, count, terms, 1.0,
-                projection->functions, terms, made->modes, terms, 0.0, made->mix, count);
-    return;
-  }
-  for (size_t r = 0; r < projection->rank; ++r) {
-    for (size_t k = 0; k < made->mode_count; ++k) {
-      made->mix[r * made->mode_count + k] = made->modes[k * projection->rank + r];
-    }
-  }
-}
-
 supine_status supine_projection_compress_modes(const supine_projection *projection,
                                                const double *weight, size_t mode_max,
                                                supine_compression *compression, double *singular,
@@ -154,9 +128,7 @@ supine_status supine_projection_compress_modes(const supine_projection *projecti
     status = gram_matrix(projection, weight, gram);
   }
   if (status == SUPINE_OK) {
-    status = projection->functions != NULL
-                 ? factored_modes(projection, gram, kept, values, modes, &energy)
-                 : plain_modes(projection, gram, kept, values, modes, &energy);
+    status = find_modes(projection, gram, kept, values, modes, &energy);
   }
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "modes of band %zu: %s", projection->band,
@@ -177,7 +149,6 @@ supine_status supine_projection_compress_modes(const supine_projection *projecti
     goto cleanup;
   }
   memcpy(made.modes, modes, count * terms * sizeof *modes);
-  find_mix(projection, &made);
   supine_projection_compression_mix(projection, &made);
   for (size_t k = 0; singular != NULL && k < mode_max; ++k) {
     singular[k] = k < count ? sqrt(values[k]) : 0.0;

@@ -21,7 +21,7 @@ typedef struct supine_projection {
   supine_span *span; /**< that columns and functions are of; NULL: another simulator's field */
   size_t rank;       /**< R */
   double *columns;   /**< [N, R] */
-  double *functions; /**< [R, (band + 1)^2]; NULL where R = (band + 1)^2 and it is the identity */
+  double *functions; /**< [R, (band + 1)^2] */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);

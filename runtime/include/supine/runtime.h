@@ -285,7 +285,8 @@ SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const sup
  *
  * The file states the angle between these and the normals of supine_normals, measured on held-out
  * states: metadata "normals_mean_degrees" and "normals_p999_degrees" (mean and 99.9th percentile),
- * for the volumes "normals_range_ml". It is larger outside those volumes.
+ * for the volumes "normals_range_ml", or where no rest is known, for the largest displacements
+ * "normals_range_mm". It is larger outside that range.
  *
  * @param xyz      [N, 3], written; NULL: the normals alone
  * @param normals  [N, 3], written; 0 for a vertex without triangles
