@@ -9,18 +9,38 @@
 static const char name[] = "render";
 static const double seen_through = 0.35; /* default opacity of the lungs with --inside */
 
-supine_status supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
-                                        const supine_command_drawing *wanted,
-                                        const supine_posture_item *item,
-                                        supine_command_drawn *found, supine_error *error) {
+supine_status supine_command_studio_open(supine_command_studio *studio, supine_error *error) {
+  supine_status status = supine_compare_create(studio->basis, &studio->compare, error);
+  if (status == SUPINE_OK) {
+    status = supine_render_create(studio->basis, &studio->renderer, error);
+  }
+  if (status == SUPINE_OK && studio->wanted->inside != NULL) {
+    status = supine_command_inside_open(studio->basis, studio->wanted->inside, &studio->inside,
+                                        &studio->names, error);
+  }
+  return status;
+}
+
+void supine_command_studio_close(supine_command_studio *studio) {
+  supine_command_names_close(&studio->names);
+  supine_basis_close(studio->inside);
+  supine_render_destroy(studio->renderer);
+  supine_compare_destroy(studio->compare);
+}
+
+/* Compute the pose for a posture. Overwrites `value`. */
+static supine_status find_pose(const supine_command_studio *studio, const supine_posture_item *item,
+                               supine_command_drawn *found, supine_error *error) {
+  const supine_command_drawing *wanted = studio->wanted;
   if (wanted->scale == 0.0) {
-    return supine_options_pose(basis, name, &wanted->volume, item->gravity, &found->pose, error);
+    return supine_options_pose(studio->basis, name, &wanted->volume, item->gravity, &found->pose,
+                               error);
   }
   supine_distance_statistics statistics;
-  (void)supine_basis_weights(basis, item->gravity, found->pose.weights); /* a unit vector */
+  (void)supine_basis_weights(studio->basis, item->gravity, found->pose.weights); /* a unit vector */
   supine_pose_fill(&found->pose, 1.0);
-  supine_compare_distances(compare, &found->pose, NULL, found->value);
-  supine_compare_statistics(compare, found->value, &statistics);
+  supine_compare_distances(studio->compare, &found->pose, NULL, found->value);
+  supine_compare_statistics(studio->compare, found->value, &statistics);
   if (!(statistics.max > 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                             "nothing moves in %s, so no --scale gives %g mm: give another posture",
@@ -30,31 +50,39 @@ supine_status supine_command_drawn_find(const supine_basis *basis, const supine_
   return SUPINE_OK;
 }
 
-void supine_command_drawn_value(const supine_basis *basis, const supine_compare *compare,
-                                const supine_pose *from, supine_command_drawn *shown,
-                                double ends[2]) {
+supine_status supine_command_drawn_find(supine_command_studio *studio,
+                                        const supine_posture_item *item,
+                                        supine_command_drawn *found, supine_error *error) {
+  const supine_status status = find_pose(studio, item, found, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
   supine_distance_statistics statistics;
-  supine_compare_distances(compare, &shown->pose, from, shown->value);
-  supine_compare_statistics(compare, shown->value, &statistics);
-  ends[0] = fmax(ends[0], statistics.p95);
-  ends[1] = fmax(ends[1], statistics.max);
+  supine_compare_distances(studio->compare, &found->pose, &studio->from->pose, found->value);
+  supine_compare_statistics(studio->compare, found->value, &statistics);
+  studio->ends[0] = fmax(studio->ends[0], statistics.p95);
+  studio->ends[1] = fmax(studio->ends[1], statistics.max);
   size_t used = 0;
-  if (supine_basis_get_info(basis)->has_volume) {
+  if (supine_basis_get_info(studio->basis)->has_volume) {
     double held[SUPINE_LUNGS_MAX];
     double volume = 0.0;
-    supine_basis_volumes(basis, &shown->pose, held);
-    for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    supine_basis_volumes(studio->basis, &found->pose, held);
+    for (size_t lung = 0; lung < supine_basis_get_info(studio->basis)->lung_count; ++lung) {
       volume += held[lung];
     }
-    used = (size_t)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, ", volume);
+    used = (size_t)snprintf(found->subtitle, sizeof found->subtitle, "%.0f mL, ", volume);
   }
-  (void)snprintf(shown->subtitle + used, sizeof shown->subtitle - used, "mean %.1f, max %.1f mm",
+  (void)snprintf(found->subtitle + used, sizeof found->subtitle - used, "mean %.1f, max %.1f mm",
                  statistics.mean, statistics.max);
+  return SUPINE_OK;
 }
 
-static void choose_size(const supine_command_drawing *wanted, supine_picture *picture) {
-  picture->width = wanted->width != 0 ? wanted->width : 20 + 440 * picture->panel_count;
-  picture->height = wanted->height != 0 ? wanted->height : 120 + 480 * picture->view_count;
+supine_status supine_command_drawn_mark(const supine_command_studio *studio,
+                                        supine_command_drawn *found, supine_error *error) {
+  return studio->inside == NULL
+             ? SUPINE_OK
+             : supine_command_marks_make(studio->inside, &studio->names, &found->pose,
+                                         &studio->from->pose, &found->marks, error);
 }
 
 supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
@@ -69,24 +97,28 @@ supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
   return panel;
 }
 
-supine_picture supine_command_drawing_picture(const supine_command_drawing *wanted,
-                                              const char *from, const double ends[2], size_t panels,
+supine_picture supine_command_drawing_picture(const supine_command_studio *studio,
+                                              const supine_panel *panels, size_t count,
                                               char *label) {
-  (void)snprintf(label, 128, "displacement from %s, mm", from);
+  const supine_command_drawing *wanted = studio->wanted;
   const double opacity = wanted->opacity > 0.0    ? wanted->opacity
                          : wanted->inside != NULL ? seen_through
                                                   : 1.0;
-  supine_picture picture = {.panel_count = panels,
-                            .view = wanted->view,
-                            .view_count = wanted->view_count,
-                            .heading = wanted->title,
-                            .bar_label = label,
-                            .colours = SUPINE_COLOURS_DISPLACEMENT,
-                            .largest = wanted->largest > 0.0 ? wanted->largest
-                                                             : supine_render_bar_end(ends[0]),
-                            .transparency = 1.0 - opacity,
-                            .dark = wanted->theme == 1};
-  picture.beyond = ends[1] > picture.largest;
-  choose_size(wanted, &picture);
-  return picture;
+  const double largest =
+      wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(studio->ends[0]);
+  (void)snprintf(label, 128, "displacement from %s, mm", studio->from->name);
+  return (supine_picture){.panel = panels,
+                          .panel_count = count,
+                          .view = wanted->view,
+                          .view_count = wanted->view_count,
+                          .heading = wanted->title,
+                          .bar_label = label,
+                          .colours = SUPINE_COLOURS_DISPLACEMENT,
+                          .largest = largest,
+                          .beyond = studio->ends[1] > largest,
+                          .transparency = 1.0 - opacity,
+                          .dark = wanted->theme == 1,
+                          .width = wanted->width != 0 ? wanted->width : 20 + 440 * count,
+                          .height = wanted->height != 0 ? wanted->height
+                                                        : 120 + 480 * wanted->view_count};
 }

@@ -39,23 +39,33 @@ typedef struct supine_command_drawn {
   supine_command_marks marks;
 } supine_command_drawn;
 
-/* Compute the pose for a posture. Overwrites `value` [N]. */
-supine_status supine_command_drawn_find(const supine_basis *basis, const supine_compare *compare,
-                                        const supine_command_drawing *wanted,
+/* What drawing needs. Set the first three, then open; close also after a failure. */
+typedef struct supine_command_studio {
+  const supine_basis *basis;
+  const supine_command_drawing *wanted;
+  const supine_reference_pose *from;
+  supine_compare *compare;
+  supine_renderer *renderer;
+  supine_basis *inside; /* or NULL */
+  supine_command_names names;
+  double ends[2]; /* of the colours: 95th percentile and largest value of all states found */
+} supine_command_studio;
+
+supine_status supine_command_studio_open(supine_command_studio *studio, supine_error *error);
+void supine_command_studio_close(supine_command_studio *studio);
+
+/* Compute the pose for a posture, the values to colour by and the line below its name. */
+supine_status supine_command_drawn_find(supine_command_studio *studio,
                                         const supine_posture_item *item,
                                         supine_command_drawn *found, supine_error *error);
 
-/* Compute the values to colour by and the line below the posture's name. Raise `ends` to the 95th
- * percentile and the largest value. */
-void supine_command_drawn_value(const supine_basis *basis, const supine_compare *compare,
-                                const supine_pose *from, supine_command_drawn *shown,
-                                double ends[2]);
+/* Compute the marks of a state found, if there is something inside. */
+supine_status supine_command_drawn_mark(const supine_command_studio *studio,
+                                        supine_command_drawn *found, supine_error *error);
 
-/* Return the picture around panels that the caller sets.
- * @param from   name of the state that displacements count from
- * @param label  [128], text of the colour bar; written */
-supine_picture supine_command_drawing_picture(const supine_command_drawing *wanted,
-                                              const char *from, const double ends[2], size_t panels,
+/* Return the picture of `count` panels. @param label  [128], text of the colour bar; written */
+supine_picture supine_command_drawing_picture(const supine_command_studio *studio,
+                                              const supine_panel *panels, size_t count,
                                               char *label);
 
 /* Return the panel of a state. */
@@ -64,9 +74,7 @@ supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
                                         const double gravity[3]);
 
 /* Draw the turn as an animation. */
-supine_status supine_command_drawing_turn(const supine_basis *basis,
-                                          const supine_command_drawing *wanted,
-                                          const supine_reference_pose *from, supine_error *error);
+supine_status supine_command_drawing_turn(supine_command_studio *studio, supine_error *error);
 
 /* Read "supine:left:10s", the value of --turn. Statuses as supine_option_reader. */
 supine_status supine_command_read_turn(const char *value, breath_turn *turn, supine_error *error);

@@ -35,87 +35,70 @@ supine_status supine_command_read_turn(const char *value, breath_turn *turn, sup
   return status == SUPINE_OK ? supine_options_posture(colon[0] + 1, turn->to, error) : status;
 }
 
-/* Resources to draw the frames. */
+/* A turn being drawn. */
 typedef struct turning {
-  const supine_basis *basis;
-  const supine_command_drawing *wanted;
-  const supine_reference_pose *from;
-  supine_compare *compare;
-  supine_renderer *renderer;
-  supine_basis *inside; /* or NULL */
-  supine_command_names names;
+  supine_command_studio *studio;
   size_t count; /* frames */
-  double ends[2];
+  supine_command_drawn shown;
+  supine_posture_item item;
+  supine_panel panel;
+  char label[128];
   double extent[SUPINE_VIEWS_MAX][4];
 } turning;
 
 /* Compute the state of a frame. */
-static supine_status find_frame(turning *t, size_t frame, supine_posture_item *item,
-                                supine_command_drawn *shown, supine_error *error) {
-  const breath_turn *turn = &t->wanted->turn;
+static supine_status find_frame(turning *t, size_t frame, supine_error *error) {
+  const breath_turn *turn = &t->studio->wanted->turn;
   const double cosine =
       turn->from[0] * turn->to[0] + turn->from[1] * turn->to[1] + turn->from[2] * turn->to[2];
   const double angle = acos(fmax(-1.0, fmin(1.0, cosine))) * 180.0 / 3.14159265358979323846;
   const double share = (double)frame / (double)(t->count - 1);
-  supine_breath_turn_gravity(turn, share * turn->seconds, item->gravity);
-  (void)snprintf(item->name, sizeof item->name, "turned by %.0f of %.0f degrees", share * angle,
+  supine_breath_turn_gravity(turn, share * turn->seconds, t->item.gravity);
+  (void)snprintf(t->item.name, sizeof t->item.name, "turned by %.0f of %.0f degrees", share * angle,
                  angle);
-  const supine_status status =
-      supine_command_drawn_find(t->basis, t->compare, t->wanted, item, shown, error);
-  if (status == SUPINE_OK) {
-    supine_command_drawn_value(t->basis, t->compare, &t->from->pose, shown, t->ends);
-  }
-  return status;
+  return supine_command_drawn_find(t->studio, &t->item, &t->shown, error);
 }
 
-static supine_picture make_picture(turning *t, supine_panel *panel, char *label) {
-  supine_picture picture =
-      supine_command_drawing_picture(t->wanted, t->from->name, t->ends, 1, label);
-  picture.panel = panel;
+static supine_picture make_picture(turning *t) {
+  t->panel =
+      supine_command_drawn_panel(t->studio->wanted, &t->shown, t->item.name, t->item.gravity);
+  supine_picture picture = supine_command_drawing_picture(t->studio, &t->panel, 1, t->label);
   picture.extent = (const double(*)[4])t->extent;
   return picture;
 }
 
 /* Find the extents of colours and picture over the whole turn, so that they stay fixed. */
-static supine_status measure(turning *t, supine_command_drawn *shown, supine_error *error) {
+static supine_status measure(turning *t, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
-  supine_posture_item item;
-  char label[128];
   supine_status status = SUPINE_OK;
   for (size_t view = 0; view < SUPINE_VIEWS_MAX; ++view) {
     memcpy(t->extent[view], none, sizeof none);
   }
   for (size_t frame = 0; frame < t->count && status == SUPINE_OK; ++frame) {
-    status = find_frame(t, frame, &item, shown, error);
-    supine_panel panel = supine_command_drawn_panel(t->wanted, shown, item.name, item.gravity);
-    const supine_picture picture = make_picture(t, &panel, label);
+    status = find_frame(t, frame, error);
+    const supine_picture picture = make_picture(t);
     if (status == SUPINE_OK) {
-      supine_render_picture_extent(t->renderer, &picture, t->extent);
+      supine_render_picture_extent(t->studio->renderer, &picture, t->extent);
     }
   }
   return status;
 }
 
-static supine_status play(turning *t, supine_command_drawn *shown, supine_animation *animation,
-                          supine_error *error) {
+static supine_status play(turning *t, supine_animation *animation, supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
-  supine_posture_item item;
   supine_status status = SUPINE_OK;
   for (size_t frame = 0; frame < t->count && status == SUPINE_OK; ++frame) {
-    char label[128];
-    status = find_frame(t, frame, &item, shown, error);
-    if (status == SUPINE_OK && t->inside != NULL) {
-      status = supine_command_marks_make(t->inside, &t->names, &shown->pose, &t->from->pose,
-                                         &shown->marks, error);
+    status = find_frame(t, frame, error);
+    if (status == SUPINE_OK) {
+      status = supine_command_drawn_mark(t->studio, &t->shown, error);
     }
-    supine_panel panel = supine_command_drawn_panel(t->wanted, shown, item.name, item.gravity);
-    const supine_picture picture = make_picture(t, &panel, label);
+    const supine_picture picture = make_picture(t);
     if (status == SUPINE_OK) {
       status =
-          supine_render_animation_add(animation, t->renderer, &picture,
+          supine_render_animation_add(animation, t->studio->renderer, &picture,
                                       frame + 1 < t->count ? 1000 / PER_SECOND : PAUSE_MS, error);
     }
-    supine_command_marks_free(&shown->marks);
+    supine_command_marks_free(&t->shown.marks);
     if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)t->count)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
@@ -126,22 +109,21 @@ static supine_status play(turning *t, supine_command_drawn *shown, supine_animat
 }
 
 /* Draw all frames of a turn, and write them. */
-static supine_status animate(turning *t, supine_command_drawn *shown, supine_error *error) {
+static supine_status animate(turning *t, supine_error *error) {
+  const char *path = t->studio->wanted->output;
   supine_animation *animation = NULL;
   supine_output output = {0};
-  char label[128];
-  supine_panel panel;
-  supine_status status = measure(t, shown, error);
-  const supine_picture picture = make_picture(t, &panel, label);
+  supine_status status = measure(t, error);
+  const supine_picture picture = make_picture(t);
   if (status == SUPINE_OK) {
-    status = supine_output_open(t->wanted->output, &output, error);
+    status = supine_output_open(path, &output, error);
   }
   if (status == SUPINE_OK) {
     status = supine_render_animation_open(picture.width, picture.height, &animation, error);
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
-    status = play(t, shown, animation, error);
+    status = play(t, animation, error);
   }
   if (status == SUPINE_OK) {
     status = supine_render_animation_write(animation, output.file, error);
@@ -152,41 +134,27 @@ static supine_status animate(turning *t, supine_command_drawn *shown, supine_err
   supine_output_abandon(&output);
   supine_render_animation_close(animation);
   if (status == SUPINE_OK) {
-    (void)printf("%s: %zu x %zu pixels, %zu frames\n", t->wanted->output, picture.width,
-                 picture.height, t->count);
+    (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height,
+                 t->count);
   }
   return status;
 }
 
-supine_status supine_command_drawing_turn(const supine_basis *basis,
-                                          const supine_command_drawing *wanted,
-                                          const supine_reference_pose *from, supine_error *error) {
-  const size_t n = supine_basis_get_info(basis)->vertex_count;
-  const double frames = floor(wanted->turn.seconds * PER_SECOND * (1.0 + 1e-12)) + 1.0;
-  turning t = {.basis = basis, .wanted = wanted, .from = from};
-  supine_command_drawn shown = {.value = NULL};
+supine_status supine_command_drawing_turn(supine_command_studio *studio, supine_error *error) {
+  const double seconds = studio->wanted->turn.seconds;
+  const double frames = floor(seconds * PER_SECOND * (1.0 + 1e-12)) + 1.0;
+  const size_t n = supine_basis_get_info(studio->basis)->vertex_count;
   if (!(frames <= FRAMES_MAX)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a turn of %g s exceeds %d frames: give a shorter one",
-                            wanted->turn.seconds, FRAMES_MAX);
+                            "a turn of %g s exceeds %d frames: give a shorter one", seconds,
+                            FRAMES_MAX);
   }
-  t.count = frames < 2.0 ? 2 : (size_t)frames;
-  shown.value = malloc(n * sizeof *shown.value);
-  supine_status status =
-      shown.value != NULL ? supine_compare_create(basis, &t.compare, error) : SUPINE_ERROR_MEMORY;
-  if (status == SUPINE_OK) {
-    status = supine_render_create(basis, &t.renderer, error);
-  }
-  if (status == SUPINE_OK && wanted->inside != NULL) {
-    status = supine_command_inside_open(basis, wanted->inside, &t.inside, &t.names, error);
-  }
-  if (status == SUPINE_OK) {
-    status = animate(&t, &shown, error);
-  }
-  supine_command_names_close(&t.names);
-  supine_basis_close(t.inside);
-  supine_render_destroy(t.renderer);
-  supine_compare_destroy(t.compare);
-  free(shown.value);
+  turning t = {.studio = studio,
+               .count = frames < 2.0 ? 2 : (size_t)frames,
+               .shown = {.value = malloc(n * sizeof *t.shown.value)}};
+  const supine_status status = t.shown.value != NULL
+                                   ? animate(&t, error)
+                                   : supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  free(t.shown.value);
   return status;
 }

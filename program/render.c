@@ -13,7 +13,6 @@
 static const char name[] = "render";
 
 typedef supine_command_drawing request;
-typedef supine_command_drawn state;
 
 static supine_status write_picture(const request *wanted, supine_renderer *renderer,
                                    const supine_picture *picture, supine_error *error) {
@@ -32,69 +31,32 @@ static supine_status write_picture(const request *wanted, supine_renderer *rende
   return status;
 }
 
-/* Draw and write the states with the colours found for them. */
-static supine_status draw(const request *wanted, supine_renderer *renderer,
-                          const supine_posture_list *postures, const char *from,
-                          const state *states, const double ends[2], supine_error *error) {
-  supine_panel panel[SUPINE_PANELS_MAX];
-  char label[128];
-  for (size_t i = 0; i < postures->count; ++i) {
-    panel[i] = supine_command_drawn_panel(wanted, &states[i],
-                                          supine_options_posture_label(postures->item[i].name),
-                                          postures->item[i].gravity);
-  }
-  supine_picture picture =
-      supine_command_drawing_picture(wanted, from, ends, postures->count, label);
-  picture.panel = panel;
-  return write_picture(wanted, renderer, &picture, error);
-}
-
-static supine_status find_marks(const supine_basis *basis, const char *path, state *states,
-                                size_t count, const supine_pose *from, supine_error *error) {
-  supine_basis *inside = NULL;
-  supine_command_names names = {0};
-  supine_status status = supine_command_inside_open(basis, path, &inside, &names, error);
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    status =
-        supine_command_marks_make(inside, &names, &states[i].pose, from, &states[i].marks, error);
-  }
-  supine_command_names_close(&names);
-  supine_basis_close(inside);
-  return status;
-}
-
-static supine_status render(const supine_basis *basis, const request *wanted,
-                            const supine_posture_list *postures, const supine_reference_pose *from,
+static supine_status render(supine_command_studio *studio, const supine_posture_list *postures,
                             supine_error *error) {
-  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const size_t n = supine_basis_get_info(studio->basis)->vertex_count;
   const size_t count = postures->count;
-  supine_compare *compare = NULL;
-  supine_renderer *renderer = NULL;
-  double ends[2] = {0.0, 0.0}; /* end of the colours: the 95th percentile, and the largest value */
-  state *states = calloc(count, sizeof *states);
+  char label[128];
+  supine_panel panel[SUPINE_PANELS_MAX];
+  supine_command_drawn *states = calloc(count, sizeof *states);
   float *values = malloc(count * n * sizeof *values);
-  supine_status status = states != NULL && values != NULL
-                             ? supine_compare_create(basis, &compare, error)
-                             : SUPINE_ERROR_MEMORY;
-  if (status == SUPINE_OK) {
-    status = supine_render_create(basis, &renderer, error);
+  supine_status status = SUPINE_OK;
+  if (states == NULL || values == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
     states[i].value = values + i * n;
-    status =
-        supine_command_drawn_find(basis, compare, wanted, &postures->item[i], &states[i], error);
+    status = supine_command_drawn_find(studio, &postures->item[i], &states[i], error);
     if (status == SUPINE_OK) {
-      supine_command_drawn_value(basis, compare, &from->pose, &states[i], ends);
+      status = supine_command_drawn_mark(studio, &states[i], error);
     }
-  }
-  if (status == SUPINE_OK && wanted->inside != NULL) {
-    status = find_marks(basis, wanted->inside, states, count, &from->pose, error);
+    panel[i] = supine_command_drawn_panel(studio->wanted, &states[i],
+                                          supine_options_posture_label(postures->item[i].name),
+                                          postures->item[i].gravity);
   }
   if (status == SUPINE_OK) {
-    status = draw(wanted, renderer, postures, from->name, states, ends, error);
+    const supine_picture picture = supine_command_drawing_picture(studio, panel, count, label);
+    status = write_picture(studio->wanted, studio->renderer, &picture, error);
   }
-  supine_render_destroy(renderer);
-  supine_compare_destroy(compare);
   for (size_t i = 0; states != NULL && i < count; ++i) {
     supine_command_marks_free(&states[i].marks);
   }
@@ -242,8 +204,13 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     status = supine_options_reference(basis, &wanted->from, true, &from, error);
   }
   if (status == SUPINE_OK) {
-    status = wanted->turns ? supine_command_drawing_turn(basis, wanted, &from, error)
-                           : render(basis, wanted, &postures, &from, error);
+    supine_command_studio studio = {.basis = basis, .wanted = wanted, .from = &from};
+    status = supine_command_studio_open(&studio, error);
+    if (status == SUPINE_OK) {
+      status = wanted->turns ? supine_command_drawing_turn(&studio, error)
+                             : render(&studio, &postures, error);
+    }
+    supine_command_studio_close(&studio);
   }
   supine_basis_close(basis);
   return status;
