@@ -103,3 +103,17 @@ void supine_render_colour(supine_colours map, double t, double rgb[3]) {
     rgb[k] = colours[map][i][k] + (at - i) * (colours[map][i + 1][k] - colours[map][i][k]);
   }
 }
+
+double supine_render_bar_step(double value) {
+  if (!(value > 0)) {
+    return 0.2;
+  }
+  const double power = pow(10, floor(log10(value / 4)));
+  const double steps = value / 4 / power;
+  return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
+}
+
+double supine_render_bar_end(double value) {
+  const double step = supine_render_bar_step(value);
+  return value > 0 ? step * ceil(value / step - 1e-9) : 5 * step;
+}

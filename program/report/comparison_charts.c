@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Coordinates of the lines and dots of the report's charts, for profile.html and map.html. */
+/* Charts of the report: coordinates of lines and dots for profile.html and map.html, colours, bars.
+ */
 #include <math.h>
 #include <string.h>
 
@@ -49,14 +50,8 @@ static json_t *profile(const supine_comparison *c, const char *axis, bool of_bre
   const double step = supine_render_bar_step(high - low);
   low = step * floor(low / step);
   high = step * fmax(1.0 + low / step, ceil(high / step));
-  json_t *heights = json_array();
   json_t *ticks = json_array();
   json_t *lines = json_array();
-  for (int height = 0; height <= 100; height += 20) {
-    (void)json_array_append_new(
-        heights, json_pack("{s:o, s:o, s:i}", "y", json_sprintf("%.1f", down(height)), "below",
-                           json_sprintf("%.1f", down(height) + 4), "height", height));
-  }
   for (int i = 0; low + i * step <= high + 1e-9 * step; ++i) {
     (void)json_array_append_new(
         ticks, json_pack("{s:o, s:o}", "x", json_sprintf("%.1f", across(low + i * step, low, high)),
@@ -76,9 +71,8 @@ static json_t *profile(const supine_comparison *c, const char *axis, bool of_bre
                          supine_options_posture_label(c->postures.item[i].name), "dashed",
                          (int)(i >= 7), "dots", dots));
   }
-  return json_pack("{s:s, s:o, s:o, s:o, s:o}", "axis", axis, "title",
-                   supine_report_profile_finding(c, of_breath), "heights", heights, "ticks", ticks,
-                   "lines", lines);
+  return json_pack("{s:s, s:o, s:o, s:o}", "axis", axis, "title",
+                   supine_report_profile_finding(c, of_breath), "ticks", ticks, "lines", lines);
 }
 
 json_t *supine_report_profiles(const supine_comparison *c) {
@@ -136,19 +130,7 @@ static json_t *map_cells(const supine_comparison *c) {
 }
 
 json_t *supine_report_map(const supine_comparison *c) {
-  static const char *const rolls[] = {"prone", "right side", "supine", "left side", "prone"};
-  static const char *const tilts[] = {"inverted", "45°", "level", "45°", "upright"};
-  json_t *across_names = json_array();
-  json_t *down_names = json_array();
   json_t *dots = json_array();
-  for (int i = 0; i < 5; ++i) {
-    (void)json_array_append_new(
-        across_names,
-        json_pack("{s:i, s:s}", "x", MAP_LEFT + i * COLUMNS * CELL / 4, "name", rolls[i]));
-    (void)json_array_append_new(
-        down_names,
-        json_pack("{s:i, s:s}", "y", MAP_TOP + 8 + i * (ROWS * CELL - 8) / 4, "name", tilts[i]));
-  }
   for (size_t i = 0; i < c->postures.count; ++i) {
     double x;
     double y;
@@ -158,8 +140,7 @@ json_t *supine_report_map(const supine_comparison *c) {
                         json_sprintf("%.1f", y), "line", supine_report_line(i), "name",
                         supine_options_posture_label(c->postures.item[i].name)));
   }
-  return json_pack("{s:o, s:o, s:o, s:o}", "cells", map_cells(c), "rolls", across_names, "tilts",
-                   down_names, "dots", dots);
+  return json_pack("{s:o, s:o}", "cells", map_cells(c), "dots", dots);
 }
 
 json_t *supine_report_direction(const double g[3]) {

@@ -107,36 +107,34 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the main finding of each posture, as the end of a chart's title. */
-static void print_ratios(const supine_comparison *c, size_t most, FILE *to) {
-  for (size_t i = 0; i <= most; ++i) {
-    (void)fprintf(to, "%s %s %.1f", i > 0 ? "," : "",
-                  supine_options_posture_label(c->postures.item[i].name),
-                  supine_report_lowest_over_uppermost(c, i));
-  }
-}
-
-static void print_shares(const supine_comparison *c, size_t most, FILE *to) {
+/* Print the title of a profile for the postures up to `most`. */
+static void print_profile(const supine_comparison *c, size_t most, bool share, FILE *to) {
+  (void)fputs(share ? "Of a breath the lower half takes:"
+                    : "The lowest third expands so many times as much as the uppermost:",
+              to);
   for (size_t i = 0; i <= most; ++i) {
     double gain = 0;
     for (size_t s = SUPINE_COMPARISON_SLABS / 2; s < SUPINE_COMPARISON_SLABS; ++s) {
       gain += c->posture[i].slab[s].gain;
     }
-    (void)fprintf(to, "%s %s %.0f %%", i > 0 ? "," : "",
+    (void)fprintf(to, share ? "%s %s %.0f %%" : "%s %s %.1f", i > 0 ? "," : "",
                   supine_options_posture_label(c->postures.item[i].name),
-                  100 * gain / supine_report_gain(c, i));
+                  share ? 100 * gain / supine_report_gain(c, i)
+                        : supine_report_lowest_over_uppermost(c, i));
   }
+}
+
+static void print_ratios(const supine_comparison *c, size_t most, FILE *to) {
+  print_profile(c, most, false, to);
+}
+
+static void print_shares(const supine_comparison *c, size_t most, FILE *to) {
+  print_profile(c, most, true, to);
 }
 
 json_t *supine_report_profile_finding(const supine_comparison *c, bool share) {
   const size_t last = (c->postures.count < 4 ? c->postures.count : 4) - 1;
-  json_t *end = printed(c, last, share ? print_shares : print_ratios);
-  json_t *title =
-      json_sprintf(share ? "Of a breath the lower half takes:%s"
-                         : "The lowest third expands so many times as much as the uppermost:%s",
-                   json_string_value(end));
-  json_decref(end);
-  return title;
+  return printed(c, last, share ? print_shares : print_ratios);
 }
 
 json_t *supine_report_postures(const supine_comparison *c) {
