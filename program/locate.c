@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine locate: from a few observed points to the whole lung. */
+/* supine locate: find the whole lung from a few observed points. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,7 +46,7 @@ static const supine_option table[] = {
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
 
-/* The lungs' surface, with the expected error of each vertex. */
+/* Write the lungs' surface, with the expected error of each vertex. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    const supine_command_located *located, supine_error *error) {
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
@@ -147,7 +147,7 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
   supine_status status =
       supine_command_located_find(&task, wanted->orientation.given, shown, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT &&
-      wanted->rigid) { /* the points of the file, not an option */
+      wanted->rigid) { /* the fault is in the file's points, not in an option */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {

@@ -16,7 +16,7 @@ static const char *const postures[SUPINE_LOCATED_POSTURES] = {"supine", "prone",
 static const double negligible = 0.01; /* smallest probability with which a posture counts */
 static const double determined = 0.95;
 
-/* Try every posture; those that no volume fits have the share 0. */
+/* Fit every posture; one that no volume fits gets the share 0. */
 static supine_status try_postures(const supine_locate_task *task, bool posture_given,
                                   supine_locate_residual *residuals,
                                   supine_command_located *located, supine_error *error) {
@@ -55,7 +55,7 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
   return SUPINE_OK;
 }
 
-/* The best posture's positions; errors of a mixture of all:
+/* Compute the best posture's positions, and the errors of a mixture of all postures:
  * sum over k of share_k (sigma_k^2 + |x_k - x|^2). */
 static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
                                     supine_command_located *located, supine_error *error) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Reading observed points. */
+/* Read observed points. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,7 +8,7 @@
 #include "program/observed.h"
 #include "program/options/command.h"
 
-/* Find the single vertex of a name. */
+/* Find the vertex of a name that has only one. */
 static supine_status find_vertex(const supine_csv *csv, const char *text,
                                  const supine_basis *inside, const supine_command_names *names,
                                  size_t *vertex, supine_error *error) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine validate: a basis against other states of the same person. */
+/* supine validate: compare a basis with other states of the same person. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -211,7 +211,7 @@ static void print_json(const supine_command_subject *s) {
   json_decref(root);
 }
 
-/* The states, each with a posture, and a volume or scale where one was given. */
+/* Set the states: each gets a posture, and a volume or scale where one was given. */
 static supine_status set_states(const request *wanted, supine_command_subject *s,
                                 supine_error *error) {
   double gravity[3] = {0.0, 1.0, 0.0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Predictions and the states that they are of. */
+/* Predict states of a person and compare them with scans. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,7 +48,7 @@ static bool same_direction(const double a[3], const double b[3]) {
   return off < same_posture;
 }
 
-/* The surface in a pose, [N, 3]. */
+/* Compute the surface in a pose, [N, 3]. */
 static supine_status deform(const supine_basis *basis, const supine_pose *pose, double *positions,
                             supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -65,7 +65,7 @@ static supine_status deform(const supine_basis *basis, const supine_pose *pose, 
   return SUPINE_OK;
 }
 
-/* mL of all lungs in a pose; 0 of an open surface. */
+/* Compute the volume of all lungs in a pose, mL; 0 for an open surface. */
 static double held(const supine_basis *basis, const supine_pose *pose) {
   double volumes[SUPINE_LUNGS_MAX] = {0.0};
   double sum = 0.0;
@@ -183,7 +183,7 @@ static supine_status distance_at(const supine_command_subject *s,
   return status;
 }
 
-/* Golden section about the scale that was predicted. */
+/* Find the scale that comes nearest to the surface, by golden section about the predicted one. */
 static supine_status find_best(const supine_command_subject *s, const supine_mesh *mesh,
                                supine_command_outcome *outcome, supine_error *error) {
   const size_t n = s->rest.vertex_count;
@@ -250,7 +250,7 @@ void supine_command_find_line(supine_command_subject *subject) {
   s->line_off = most > 0.0 ? off / most : 0.0;
 }
 
-/* Compute where points inside go: by biharmonic interpolation of the surface's displacement. */
+/* Move points inside by biharmonic interpolation of the surface's displacement. */
 static supine_status predict_points(const supine_command_subject *s, size_t which,
                                     const supine_patient_pairs *pairs, double *predicted,
                                     supine_error *error) {

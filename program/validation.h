@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What 'supine validate' works on: a basis, the state that motion starts from,
- * and the states that it is to lead to. */
+/* Data of 'supine validate': a basis, the state that motion starts from, and the states that are
+ * predicted. */
 #ifndef SUPINE_COMMAND_VALIDATION_H
 #define SUPINE_COMMAND_VALIDATION_H
 
@@ -52,16 +52,16 @@ typedef struct supine_command_subject {
 
 void supine_command_subject_free(supine_command_subject *subject);
 
-/* Opens a basis.
+/* Open a basis.
  * @retval those of the reader */
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error);
 
-/* Sets the surface that motion starts from: the scan's own state where `from` names no posture.
+/* Set the surface that motion starts from: the scan's own state where `from` names no posture.
  * @retval those of the run-time library */
 supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error);
 
-/* Predicts state i, and compares it with its surface and with landmarks (NULL: none).
+/* Predict state i, and compare it with its surface and with landmarks (NULL: none).
  * @param reverse  of the landmarks
  * @retval those of loading and comparing */
 supine_status supine_command_validate_state(supine_command_subject *subject, size_t i,
@@ -69,10 +69,10 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
                                             const char *landmarks, bool reverse,
                                             supine_error *error);
 
-/* The line of best scales over volumes. */
+/* Fit a line to the best scales over volumes. */
 void supine_command_find_line(supine_command_subject *subject);
 
-/* Draws where the errors sit, a panel a state.
+/* Draw the errors on the surface, one panel for each state.
  * @retval SUPINE_ERROR_UNSUPPORTED, SUPINE_ERROR_WRITE, ... of rendering */
 supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
                                          supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A picture of where the error of a prediction sits. */
+/* Draw the error of predictions on the surface. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,11 +9,11 @@
 #include "program/render/render.h"
 #include "sh/base/output.h"
 
-/* Least end of the colours, mm: smaller errors need no colour. */
+/* Least upper end of the colour scale, mm. */
 static const double end_least = 1.0;
 
-/* How far each vertex is predicted from the state's surface, mm; the largest, and what 95 % of the
- * vertices do not exceed in most of the states. */
+/* Compute the distance of each predicted vertex from the state's surface, mm, and raise the largest
+ * distance and the largest 95th percentile of all states. */
 static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
                         float *value, double *largest, double *end) {
   for (size_t i = 0; i < s->rest.vertex_count; ++i) {
@@ -38,7 +38,7 @@ static supine_status write_picture(supine_renderer *renderer, const supine_pictu
   if (status == SUPINE_OK) {
     return supine_output_commit(&output, error);
   }
-  if (ferror(output.file) != 0) { /* why a write failed, the output knows */
+  if (ferror(output.file) != 0) { /* committing gives the reason of the failed write */
     (void)supine_output_commit(&output, error);
   }
   supine_output_abandon(&output);

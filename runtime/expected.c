@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* How far off the law's positions are expected to be. */
+/* Compute the expected error of the law's positions. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "runtime/locate.h"
 
-static const double resting_spread = 0.05; /* standard deviation of rest, of full inflation */
+static const double resting_spread =
+    0.05; /* standard deviation of the volume at rest, over the full one */
 const double supine_expected_shift = 0.01;
 
 double supine_expected_constant(const supine_basis *basis) {
@@ -42,7 +43,7 @@ double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
   return sqrt(sum / (double)n);
 }
 
-/* Is the volume at rest a guess? */
+/* Return whether the volume at rest is assumed, not measured. */
 static bool rest_is_assumed(const supine_basis *basis) {
   const char *scanned = supine_basis_metadata(basis, "scanned");
   const char *state = supine_basis_metadata(basis, "scan_state");
@@ -52,7 +53,7 @@ static bool rest_is_assumed(const supine_basis *basis) {
          (state == NULL || strstr(state, "rest") == NULL);
 }
 
-/* Does the volume count from rest? */
+/* Return whether the state's volume counts from rest. */
 static bool counts_from_rest(const supine_state *state) {
   bool rest = state->lung_count == 0 && (state->volume.kind == SUPINE_VOLUME_REST ||
                                          state->volume.kind == SUPINE_VOLUME_DEFAULT);
@@ -76,7 +77,7 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* Poses compared, and the same with rest a little fuller where it is assumed. */
+/* The two poses, and the same with 1 % more volume where rest is assumed. */
 typedef struct poses {
   supine_pose at, from, fuller_at, fuller_from;
   bool assumed;
@@ -101,7 +102,7 @@ static supine_status find_poses(const supine_basis *basis, const supine_state *s
   return status;
 }
 
-/* sigma of a block from where its vertices are in each pose. */
+/* Compute sigma of a block of vertices. */
 static void fill_block(const supine_basis *basis, const poses *p, double constant, size_t begin,
                        size_t end, float *sigma) {
   const supine_pose *const of[4] = {&p->at, &p->from, &p->fuller_at, &p->fuller_from};

@@ -55,8 +55,8 @@ size_t supine_kriging_space(size_t count) {
   return count * (count + SUPINE_KRIGING_COLUMNS + 3);
 }
 
-/* Along axis `axis` term `term` is a column, or its negative, or nothing: r x p = (r_y p_z - r_z
- * p_y, ...). */
+/* Return the column that term `term` multiplies along axis `axis`, and its sign: 1, -1 or 0. For a
+ * rotation, r x p = (r_y p_z - r_z p_y, ...). */
 static int column_of(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
@@ -71,7 +71,7 @@ static int column_of(size_t term, size_t axis, double *sign) {
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
-/* The columns and L^-1 of them. */
+/* Fill the columns and multiply them by L^-1. */
 static void whiten(supine_kriging *fit) {
   const size_t n = fit->count;
   memset(fit->centre, 0, sizeof fit->centre);
@@ -106,7 +106,8 @@ static bool absent(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
-/* The terms' normal equations A = X' K^-1 X + P and X' K^-1 y; an absent term has the row of 1. */
+/* Compute the terms' normal equations, A = X' K^-1 X + P and X' K^-1 y. The row of an absent term
+ * is that of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -128,7 +129,7 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
   }
 }
 
-/* Is a pivot what rounding leaves of its diagonal? */
+/* Return whether every pivot is well above the rounding error of its diagonal. */
 static bool determined(const double a[TERMS * TERMS], const double factor[TERMS * TERMS]) {
   for (size_t k = 0; k < TERMS; ++k) {
     const double pivot = factor[k * TERMS + k];
@@ -139,7 +140,7 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* The terms, their covariance A^-1 and the same over columns. */
+/* Compute the terms, their covariance A^-1, and that covariance summed over columns. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
   double inverse[TERMS][TERMS]; /* row k: L^-1 e_k */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Predict the field, and its variance, at many points: runs of them side by side. */
+/* Predict the field and its variance at many points, RUN of them at a time. */
 #include <math.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 
 enum { RUN = 32, COLUMNS = SUPINE_KRIGING_TERMS };
 
-/* A run of targets, axis by axis; the last is repeated to fill it. */
+/* RUN targets, stored by axis; the last target is repeated to fill the run. */
 typedef struct run {
   float place[3][RUN]; /* p - c */
   float volume[3][RUN];
@@ -29,7 +29,8 @@ static void fill(const supine_kriging *fit, const supine_kriging_target *target,
   }
 }
 
-/* Covariances of a run with point j. exp(-a) is (exp(-a / 64))^64 by five terms: 1e-6 of it. */
+/* Compute the covariances of a run with point j. exp(-a) is (exp(-a / 64))^64 by a polynomial of
+ * degree 5: the relative error is 1e-6. */
 static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *in, float *out) {
   const supine_kriging_point *p = &fit->points[j];
   const double size = p->size > fit->model.least ? p->size : fit->model.least;
@@ -54,7 +55,7 @@ static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *
   }
 }
 
-/* Sum over points of w_j times a number each. */
+/* Compute the sum over points j of w_j numbers_j. */
 static void project(size_t count, float (*w)[RUN], const double *numbers, float *sum) {
   memset(sum, 0, RUN * sizeof *sum);
   for (size_t j = 0; j < count; ++j) {
@@ -65,7 +66,7 @@ static void project(size_t count, float (*w)[RUN], const double *numbers, float 
   }
 }
 
-/* w = L^-1 k, column by column. */
+/* Solve L w = k, k the covariances of a run with all points. */
 static void solve(const supine_kriging *fit, size_t lung, const run *in, float (*w)[RUN]) {
   const size_t n = fit->count;
   for (size_t j = 0; j < n; ++j) {
@@ -85,7 +86,8 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
   }
 }
 
-/* 3 (k(q, q) - w'w) + m' spread m, with m the columns at q less w' of theirs. */
+/* Compute the variance 3 (k(q, q) - w'w) + m' spread m, m the columns at q minus w' times those of
+ * the points. */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A limb forwards: volume and compliance at a pressure. */
+/* Compute volume and compliance of a limb at a pressure. */
 #include <math.h>
 
 #include "runtime/limb.h"
@@ -31,7 +31,7 @@ supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_err
   return SUPINE_OK;
 }
 
-/* exp(U(x)), the slope of I: U's terms are integrals of Legendre polynomials,
+/* Compute exp(U(x)), the slope of I. U's terms are integrals of Legendre polynomials,
  * (P_n+1 - P_n-1) / (2 n + 1) from -1 to x. */
 static double slope(const supine_pv_curve *curve, double x) {
   double before = 1.0;
@@ -46,8 +46,8 @@ static double slope(const supine_pv_curve *curve, double x) {
   return exp(sum);
 }
 
-/* The integral of the slope between two x, by Gauss and Legendre's 16 points [Abramowitz and
- * Stegun, table 25.4]. */
+/* Integrate the slope between two x by the Gauss-Legendre rule of 16 points [Abramowitz and Stegun,
+ * table 25.4]. */
 static double integrate(const supine_pv_curve *curve, double from, double to) {
   static const double point[8] = {
       0.0950125098376374402, 0.2816035507792589132, 0.4580167776572273863, 0.6178762444026437484,

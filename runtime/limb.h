@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * One limb of the pressure-volume loop, integrated once: volumes and pressures from then on. */
+ * One limb of the pressure-volume loop: integrated once, then evaluated at pressures and volumes.
+ */
 #ifndef SUPINE_LIMB_H
 #define SUPINE_LIMB_H
 
 #include <supine/breath.h>
 
-/** Parts of a limb's range. Where compliance changes by e^500 over the range, the most that control
- * parameters within their bounds can do, it changes by e^16 over one of these, which 16 points
- * integrate to 1e-15. */
+/** Parts of a limb's range. Within their bounds the control parameters change the compliance by at
+ * most e^500 over the range, so by e^16 over a part, which 16 points integrate to 1e-15. */
 enum { LIMB_PARTS = 32 };
 
 typedef struct supine_limb {
@@ -16,13 +16,13 @@ typedef struct supine_limb {
   double sum[LIMB_PARTS + 1]; /**< I(x) at the parts' ends */
 } supine_limb;
 
-/** Integrates a curve that supine_breath_curve_check accepts. */
+/** Integrate a curve that supine_breath_curve_check accepts. */
 void supine_limb_begin(const supine_pv_curve *curve, supine_limb *limb);
 
-/** V(P) and dV/dP (NULL: not wanted) at a pressure; one outside the range counts as its end. */
+/** Compute V(P) and dV/dP (NULL: not wanted); a pressure outside the range counts as its end. */
 double supine_limb_volume(const supine_limb *limb, double pressure, double *compliance);
 
-/** P(V) of a volume within the range, to 1e-11 of the range's volumes.
+/** Compute P(V) of a volume within the range, to 1e-11 of the range's volumes.
  * @retval SUPINE_ERROR_NUMERICAL  not found */
 supine_status supine_limb_pressure(const supine_limb *limb, double volume, double *pressure);
 

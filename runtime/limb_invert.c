@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A limb backwards: the pressure that holds a volume. */
+/* Compute the pressure of a limb at a volume. */
 #include <math.h>
 #include <stdbool.h>
 

@@ -8,22 +8,25 @@
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX, "one limit");
 
-static const double prior_spread = 0.17; /* of the volume: 0.3 of the way from rest, 0.43 of full */
+static const double prior_spread = 0.17; /* prior standard deviation of the volume, of the full one:
+                                          * 0.3 of the way from rest (0.43) to full */
 static const double outlier_limit = 3.0; /* of sigma */
-static const double outlier_noise = 300; /* mm: what one that does not fit counts as */
-static const double volume_step = 1;     /* mL, at which the volume has been found */
-static const double angle_step = 1e-4;   /* radians */
-static const double sill_of_error = 4.0 / 3; /* s of c: 6 mm of 4.5, which a translation explains */
+static const double outlier_noise = 300; /* mm: noise that an outlier is given */
+static const double volume_step = 1;     /* mL: a smaller step ends the search */
+static const double angle_step = 1e-4;   /* rad: a smaller step ends the search */
+static const double sill_of_error = 4.0 / 3; /* sill s over the expected-error constant c: 6 mm over
+                                              * 4.5; c holds after a translation, which explains
+                                              * the difference */
 
 enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
-/* What is under way. `law` are the observed points' positions in the state. */
+/* Inputs and working space of one call. */
 typedef struct study {
   const supine_locate_task *task;
   supine_location *found;
   supine_locate_fit *fit;
   supine_kriging_point *points; /* [n] */
-  double *law;                  /* [n, 3] mm */
+  double *law;                  /* [n, 3] the law's positions in the state, mm */
   double *kriging;
   double *scratch; /* [n] */
 } study;
@@ -78,7 +81,7 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
   }
 }
 
-/* What does not change with the state. */
+/* Set what does not depend on the state: scan positions, lungs, noise and the fit's options. */
 static supine_status begin(study *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
@@ -114,7 +117,7 @@ static void turn(const double rotation[9], const double x[3], double turned[3]) 
   }
 }
 
-/* Put the law's points of the state, and what volume adds to them, into the study. */
+/* Compute the law's positions in the state, and their derivative by the volume. */
 static supine_status evaluate(study *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
@@ -143,7 +146,7 @@ static supine_status evaluate(study *s, supine_error *error) {
   return status;
 }
 
-/* The translation between means, and residuals in the body's axes. */
+/* Compute the translation between the means, and the residuals in the body's axes. */
 static void find_residuals(study *s) {
   const size_t n = s->task->count;
   supine_location *found = s->found;
@@ -171,7 +174,7 @@ static void find_residuals(study *s) {
   }
 }
 
-/* Start from the rotation that fits the points best. */
+/* Set the rotation that fits the points best, as a start. */
 static void rotate_roughly(study *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
@@ -192,7 +195,7 @@ static void rotate_roughly(study *s) {
   supine_rigid_rotation((const double(*)[3])h, s->found->rotation);
 }
 
-/* R exp(r) [Rodrigues]. */
+/* Multiply R by exp(r), by Rodrigues' formula. */
 static void rotate_further(double rotation[9], const double r[3]) {
   const double angle = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
   if (angle == 0) {
@@ -218,7 +221,7 @@ static void rotate_further(double rotation[9], const double r[3]) {
   memcpy(rotation, product, sizeof product);
 }
 
-/* Change the volume, by less where no surface holds the new one. */
+/* Change the volume; halve the change while no pose has the new volume. */
 static supine_status change_volume(study *s, double ml, supine_error *error) {
   const double most = 0.5 * s->fit->deviation;
   const double before = s->found->state.volume.ml;
@@ -235,7 +238,7 @@ static supine_status change_volume(study *s, double ml, supine_error *error) {
   return status;
 }
 
-/* Fit, and move volume and rotation until both stay (Gauss and Newton). */
+/* Find volume and rotation by Gauss-Newton steps. */
 static supine_status settle(study *s, supine_error *error) {
   supine_locate_fit *fit = s->fit;
   const double deviation = fit->deviation;
@@ -263,8 +266,8 @@ static supine_status settle(study *s, supine_error *error) {
   }
 }
 
-/* Compare each point with what the others say.
- * @return the one that fits worst beyond the limit, or `count` */
+/* Compare each point with its prediction from the others.
+ * @return the point with the largest residual above the limit, or `count` */
 static size_t judge(study *s, supine_locate_residual *residuals) {
   const size_t n = s->task->count;
   size_t worst = n;

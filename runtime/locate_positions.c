@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Positions and expected errors of every vertex, from a fit. */
+/* Compute positions and expected errors of every vertex from a fit. */
 #include <math.h>
 
 #include "runtime/locate.h"
 #include "runtime/rigid.h"
 
-/* The poses that a position follows from. */
+/* The poses that positions are computed from. */
 typedef struct poses {
   supine_pose at, scan, fuller;
   double constant; /* min(c, RMS of u), mm */
-  double per_step; /* prior standard deviations of the volume in what `fuller` adds */
+  double per_step; /* prior standard deviation of the volume over the volume that `fuller` adds */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,
@@ -33,7 +33,7 @@ static supine_status find_poses(const supine_location *found, const supine_basis
   return status;
 }
 
-/* The law's positions of a block, and what predicting wants of them. */
+/* Positions of a block of vertices, and input and output of the prediction. */
 typedef struct block {
   float law[3 * LOCATE_BLOCK], scan[3 * LOCATE_BLOCK], volume[3 * LOCATE_BLOCK];
   float size[LOCATE_BLOCK];
@@ -65,8 +65,9 @@ static void predict(const supine_location *found, const supine_basis *basis, con
   supine_kriging_predict(&fit->kriging, &target, b->shift, b->variance);
 }
 
-/* To the observations' frame; no error above the one without observations, which holds after the
- * best translation: three points give one that is good enough, two understate by 0.85. */
+/* Convert to the frame of the observations, and bound the error by the one without observations.
+ * That one holds after the best translation, which three points determine well enough; with two the
+ * bound would understate the error by a factor of 0.85. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;
