@@ -51,10 +51,10 @@ supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, si
     return SUPINE_ERROR_UNSUPPORTED;
   }
   for (size_t i = begin; i < end; ++i) {
-    for (size_t word = 0; word < count; ++word) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        *words++ = supine_basis_normal_word(basis, i, axis, word);
-      }
+    const unsigned char *tile = basis->lit.bytes + i / TILE * basis->lit.stride;
+    for (size_t j = 0; j < 3 * count; ++j) { /* word j / 3 of coordinate j % 3 */
+      const size_t row = j % 3 * count + j / 3;
+      memcpy(words++, tile + (row * TILE + i % TILE) * sizeof *words, sizeof *words);
     }
   }
   return SUPINE_OK;

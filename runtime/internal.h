@@ -57,10 +57,6 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
-/** Return word `word`, of supine_tiles_normal_words, of one coordinate of a vertex's normal. */
-uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size_t axis,
-                                  size_t word);
-
 /** Count the monomials of the K weights and the gains in one coordinate of a normal,
  *
  *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)

@@ -10,17 +10,6 @@
 
 enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache during a batch */
 
-uint32_t supine_basis_normal_word(const supine_basis *basis, size_t vertex, size_t axis,
-                                  size_t word) {
-  const size_t count = basis->info.normal_count;
-  const int16_t *n = basis->info.normals + (3 * vertex + axis) * count;
-  double three[3] = {0, 0, 0};
-  for (size_t j = word, which = 0; j < count; j += supine_tiles_normal_words(count), ++which) {
-    three[which] = n[j] / normal_unit();
-  }
-  return normal_narrow(three[0], three[1], three[2]);
-}
-
 /* Pack the normals of 16 vertices, whose modes begin at `row`. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
                                     unsigned char *to) {
