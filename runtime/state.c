@@ -10,6 +10,7 @@
 #include <supine/state.h>
 
 #include "runtime/words.h"
+#include "sh/base/vec3.h"
 
 static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                     [SUPINE_VOLUME_REST] = "rest",
@@ -115,27 +116,15 @@ supine_status supine_state_parse_volume(const char *text, supine_state *state,
 /* Read gravity "X:Y:Z" of any length but 0, and normalise it. */
 static bool read_gravity(const char *text, double gravity[3]) {
   double g[3];
-  double largest = 0;
   for (int i = 0; i < 3; ++i) {
     char *end = NULL;
     g[i] = strtod(text, &end);
-    if (end == text || *end != (i < 2 ? ':' : '\0') || !isfinite(g[i])) {
+    if (end == text || *end != (i < 2 ? ':' : '\0')) {
       return false;
     }
-    largest = fmax(largest, fabs(g[i]));
     text = end + 1;
   }
-  if (largest == 0) {
-    return false;
-  }
-  for (int i = 0; i < 3; ++i) {
-    g[i] /= largest; /* so that no square overflows or underflows */
-  }
-  const double length = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-  for (int i = 0; i < 3; ++i) {
-    gravity[i] = g[i] / length;
-  }
-  return true;
+  return supine_normalise(g, gravity);
 }
 
 /* Read a tilted posture, "supine+15". */

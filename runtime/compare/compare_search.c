@@ -28,17 +28,6 @@ typedef struct search {
   double *square;           /* [reached] q^T G q */
 } search;
 
-static void normalise(double v[3]) {
-  const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-  const double x = v[0] / largest;
-  const double y = v[1] / largest;
-  const double z = v[2] / largest;
-  const double length = sqrt(x * x + y * y + z * z);
-  v[0] = x / length;
-  v[1] = y / length;
-  v[2] = z / length;
-}
-
 static supine_status state_of(const search *s, const double direction[3], double *q,
                               supine_error *error) {
   supine_pose pose;
@@ -122,7 +111,7 @@ static void turned(const double direction[3], int move, double step, double resu
   across[thin] = 1;
   double t[3];
   supine_cross(direction, across, t);
-  normalise(t);
+  (void)supine_normalise(t, t);
   if (move / 2 == 1) {
     double u[3];
     supine_cross(direction, t, u);
@@ -132,7 +121,7 @@ static void turned(const double direction[3], int move, double step, double resu
   for (int axis = 0; axis < 3; ++axis) {
     result[axis] = cos(step) * direction[axis] + sign * sin(step) * t[axis];
   }
-  normalise(result);
+  (void)supine_normalise(result, result);
 }
 
 /* Move the first `movable` of two directions while that increases the distance of their states, mm.
@@ -206,12 +195,10 @@ supine_status supine_compare_search(const supine_compare *compare, const supine_
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu directions: 2 to %d", directions,
                             (int)DIRECTIONS_MAX);
   }
-  double start[3] = {from->gravity[0], from->gravity[1], from->gravity[2]};
-  if (!isfinite(start[0]) || !isfinite(start[1]) || !isfinite(start[2]) ||
-      (start[0] == 0 && start[1] == 0 && start[2] == 0)) {
+  double start[3];
+  if (!supine_normalise(from->gravity, start)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
   }
-  normalise(start);
   search s = {.compare = compare,
               .from = from,
               .rms = rms,

@@ -49,17 +49,9 @@ static void add_cross(const double *a, const double *b, double factor, double *s
 
 /* Choose orthonormal axes with the third along gravity; false if it has no direction. */
 static bool make_axes(const double gravity[3], double axis[3][3]) {
-  const double largest = fmax(fabs(gravity[0]), fmax(fabs(gravity[1]), fabs(gravity[2])));
-  if (!(largest > 0) || !isfinite(gravity[0]) || !isfinite(gravity[1]) || !isfinite(gravity[2])) {
-    return false;
-  }
   double *g = axis[2];
-  for (int i = 0; i < 3; ++i) {
-    g[i] = gravity[i] / largest;
-  }
-  const double size = supine_length(g);
-  for (int i = 0; i < 3; ++i) {
-    g[i] /= size;
+  if (!supine_normalise(gravity, g)) {
+    return false;
   }
   double seed[3] = {0, 0, 0};
   seed[fabs(g[0]) < 0.6 ? 0 : 1] = 1;

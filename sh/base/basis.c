@@ -10,26 +10,14 @@
 
 #include <supine/sh.h>
 
+#include "sh/base/vec3.h"
+
 size_t supine_sh_count(size_t band) {
   return (band + 1) * (band + 1);
 }
 
 size_t supine_sh_index(size_t l, int m) {
   return (size_t)((ptrdiff_t)(l * l + l) + m);
-}
-
-/* Normalise, dividing by the largest component first against overflow and underflow. */
-static supine_status normalise(const double v[3], double unit[3]) {
-  const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-  if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]) || largest == 0) {
-    return SUPINE_ERROR_ARGUMENT;
-  }
-  const double s[3] = {v[0] / largest, v[1] / largest, v[2] / largest};
-  const double length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
-  for (int i = 0; i < 3; ++i) {
-    unit[i] = s[i] / length;
-  }
-  return SUPINE_OK;
 }
 
 /* Evaluate Y(l, m) and Y(l, -m) for l = m to band: `top` is q(m, m), `re` and `im` are (x + i
@@ -56,7 +44,7 @@ static void evaluate_order(size_t band, size_t m, double z, double top, double r
 
 supine_status supine_sh_evaluate(size_t band, const double direction[3], double *y) {
   double unit[3];
-  if (band > SUPINE_SH_BAND_MAX || normalise(direction, unit) != SUPINE_OK) {
+  if (band > SUPINE_SH_BAND_MAX || !supine_normalise(direction, unit)) {
     return SUPINE_ERROR_ARGUMENT;
   }
   double top = 0.28209479177387814347; /* sqrt(1 / (4 pi)) */

@@ -4,6 +4,7 @@
 #define SUPINE_VEC3_H
 
 #include <math.h>
+#include <stdbool.h>
 
 static inline double supine_dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -31,6 +32,21 @@ static inline void supine_subtract(const double a[3], const double b[3], double 
   for (int k = 0; k < 3; ++k) {
     difference[k] = a[k] - b[k];
   }
+}
+
+/** Scale a vector to length 1 without overflow or underflow; false if it is zero or not finite.
+ * `unit` may be `v`. */
+static inline bool supine_normalise(const double v[3], double unit[3]) {
+  const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+  if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]) || largest == 0) {
+    return false;
+  }
+  const double s[3] = {v[0] / largest, v[1] / largest, v[2] / largest};
+  const double length = supine_length(s);
+  for (int i = 0; i < 3; ++i) {
+    unit[i] = s[i] / length;
+  }
+  return true;
 }
 
 static inline double supine_distance(const double a[3], const double b[3]) {
