@@ -58,7 +58,7 @@ SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volum
  * (sigma 1) and beyond both:
  *
  *     ratio_j = sigma + 2 bend_j e(sigma)
- *     e = (sigma^3 - sigma) / 2  for sigma <= 1,   1 - 1 / sigma  for sigma > 1
+ *     e = (sigma^3 - sigma) / 2  for sigma <= 1,   (sigma - 1) / sigma^6  for sigma > 1
  *
  * The diaphragm (z) does most of a quiet breath, the rib cage (x, y) most of a breath near full
  * inflation (Verschakelen 1995, n 120). Below rest the bend fades: it would turn triangles over. A
