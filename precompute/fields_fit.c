@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Fit harmonics to the fields of another simulator, cross-validate, and write the basis. */
 #include <cblas.h>
-#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +8,7 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/compression.h"
 #include "precompute/projection/tally.h"
+#include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
@@ -78,9 +78,8 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
   }
   if (status == SUPINE_OK) {
     memcpy(a, f->y, count * terms * sizeof *a);
-    status = LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', m, p, a, p, s, u, p, vt, p) == 0
-                 ? SUPINE_OK
-                 : SUPINE_ERROR_NUMERICAL;
+    status =
+        supine_lapack_status(LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'S', m, p, a, p, s, u, p, vt, p));
   }
   if (status == SUPINE_OK) {
     f->condition = s[terms - 1] > 0.0 ? s[0] / s[terms - 1] : INFINITY;

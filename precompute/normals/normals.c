@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The best few modes of the normals. */
 #include <cblas.h>
-#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +12,7 @@
 #include "runtime/kernels/compact.h"
 #include "runtime/kernels/tiles.h"
 #include "sh/base/clones.h"
+#include "sh/base/lapack.h"
 #include "sh/base/parallel.h"
 
 /* Vertices of a lung, and states, that modes are found from and measured on: with twice as many the
@@ -87,9 +87,10 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   lapack_int rank = 0;
   double gram[SNAPSHOTS * SNAPSHOTS]; /* L^T L */
   double values[SNAPSHOTS];
-  if (LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product, (lapack_int)s, pivots, &rank,
-                     least_new) < 0) {
-    return SUPINE_ERROR_NUMERICAL;
+  const lapack_int info = LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product,
+                                         (lapack_int)s, pivots, &rank, least_new);
+  if (info < 0) { /* above 0: of a lower rank */
+    return supine_lapack_status(info);
   }
   const size_t r = rank < SNAPSHOTS ? (size_t)rank : SNAPSHOTS;
   made->snapshots = r;

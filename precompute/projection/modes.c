@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The best functions of orientation: a singular value decomposition through small Gram matrices. */
 #include <cblas.h>
-#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +8,7 @@
 #include <supine/sh.h>
 
 #include "precompute/projection/compression.h"
+#include "sh/base/lapack.h"
 
 /* Relative singular value below which a mode is rounding error: the Gram matrix squares them. */
 static const double rank_tolerance = 1e-7;
@@ -51,7 +51,10 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
     const lapack_int result = LAPACKE_dsyevr(LAPACK_COL_MAJOR, 'V', 'I', 'L', size, matrix, size,
                                              0.0, 0.0, size - (lapack_int)count + 1, size, 0.0,
                                              &found, values, rising, size, support);
-    status = result == 0 && (size_t)found == count ? SUPINE_OK : SUPINE_ERROR_NUMERICAL;
+    status = supine_lapack_status(result);
+    if (status == SUPINE_OK && (size_t)found != count) {
+      status = SUPINE_ERROR_NUMERICAL;
+    }
     for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
       memcpy(vectors + k * n, rising + (count - 1 - k) * n, n * sizeof *vectors);
     }

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* A few directions of gravity whose forces sum to those of all. */
 #include <cblas.h>
-#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "precompute/projection/span.h"
+#include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 
 /* What is chosen from. */
@@ -44,10 +44,10 @@ static size_t largest_of(const double *force, size_t count) {
 static supine_status invert(double *matrix, size_t rank) {
   lapack_int pivots[SUPINE_SPAN_MAX];
   const lapack_int n = (lapack_int)rank;
-  return LAPACKE_dgetrf(LAPACK_ROW_MAJOR, n, n, matrix, n, pivots) == 0 &&
-                 LAPACKE_dgetri(LAPACK_ROW_MAJOR, n, matrix, n, pivots) == 0
-             ? SUPINE_OK
-             : SUPINE_ERROR_NUMERICAL;
+  /* By columns, the transpose's inverse: the same. */
+  const lapack_int info = LAPACKE_dgetrf(LAPACK_COL_MAJOR, n, n, matrix, n, pivots);
+  return supine_lapack_status(info != 0 ? info
+                                        : LAPACKE_dgetri(LAPACK_COL_MAJOR, n, matrix, n, pivots));
 }
 
 /* Chooses crosses of the force [count, DIRECTIONS] until next to nothing is left: indices among its

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/** @file The status of a LAPACKE function. */
+#ifndef SUPINE_LAPACK_H
+#define SUPINE_LAPACK_H
+
+#include <lapacke.h>
+
+#include <supine/status.h>
+
+/** Return the status that `info`, the result of a LAPACKE function, stands for: a work array that
+ * could not be allocated is SUPINE_ERROR_MEMORY. */
+static inline supine_status supine_lapack_status(lapack_int info) {
+  return info == 0 ? SUPINE_OK
+         : info == LAPACK_WORK_MEMORY_ERROR || info == LAPACK_TRANSPOSE_MEMORY_ERROR
+             ? SUPINE_ERROR_MEMORY
+             : SUPINE_ERROR_NUMERICAL;
+}
+
+#endif
