@@ -7,12 +7,10 @@
 #include "sh/base/vec3.h"
 #include <supine/volume.h>
 
-#include "precompute/physics/inflate.h"
 #include "precompute/precompute.h"
 
 #include "precompute/basis_file.h"
 #include "precompute/projection/compression.h"
-#include "precompute/projection/held_out.h"
 
 /* Bounds of the default number of held-out directions, and vertices times directions within them. A
  * hundred directions give the error to about 5 %, a thousand to 1 or 2 %. */
@@ -37,12 +35,11 @@ typedef struct pipeline {
   double *weight; /* [N] |d|^2, so that modes minimise the error of displacement: 0.34 % RMS with
                      16 modes; without weights 0.40, by area 0.42 % (a left lung, soften 1) */
   supine_projection projection;
-  supine_volume_forms column_forms; /* of the projection, if it has few columns */
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];
   double energy; /* sum of the squares of all singular values */
   supine_volume_forms forms;
-  supine_held_out held_out;
+  supine_truth truth;
   supine_accuracy accuracy;
   double turned_over;
   double resting[2][9];    /* mL from the reference at rest by lung, harmonics; if it is known */
@@ -56,10 +53,9 @@ static void pipeline_free(pipeline *p) {
   free(p->directions);
   free(p->weight);
   supine_projection_free(&p->projection);
-  supine_physics_volume_forms_free(&p->column_forms);
   supine_projection_compression_free(&p->compression);
   supine_physics_volume_forms_free(&p->forms);
-  supine_accuracy_held_out_free(&p->held_out);
+  supine_accuracy_truth_free(&p->truth);
   supine_accuracy_error_table_free(&p->table);
 }
 
@@ -144,36 +140,15 @@ static supine_status anchor(pipeline *p, supine_error *error) {
   }
   free(amounts);
   p->lungs = &p->anchored;
-  supine_physics_volume_forms_free(&p->column_forms);
   return status;
 }
 
-/* Find the volume forms of the coefficients: from those of the projection's columns if these are
- * few, else directly. */
 static supine_status find_forms(pipeline *p, supine_error *error) {
-  const supine_compression *field = &p->compression;
-  if (!p->lungs->topology.closed) {
-    return SUPINE_OK;
-  }
-  if (p->projection.rank <= FEW_COLUMNS) {
-    supine_status status =
-        p->column_forms.linear != NULL
-            ? SUPINE_OK
-            : supine_physics_volume_forms_create(p->lungs, p->options->model.share, p->directions,
-                                                 p->projection.columns, p->projection.rank,
-                                                 &p->column_forms, error);
-    if (status == SUPINE_OK) {
-      status = supine_physics_volume_forms_mix(&p->column_forms, field->mix, field->mode_count,
-                                               &p->forms);
-      if (status != SUPINE_OK) {
-        (void)supine_error_set(error, status, "no memory for volume forms of %zu modes",
-                               field->mode_count);
-      }
-    }
-    return status;
-  }
-  return supine_projection_compression_volume_forms(field, p->lungs, p->options->model.share,
-                                                    p->directions, &p->forms, error);
+  return !p->lungs->topology.closed
+             ? SUPINE_OK
+             : supine_projection_compression_volume_forms(&p->compression, p->lungs,
+                                                          p->options->model.share, p->directions,
+                                                          &p->forms, error);
 }
 
 /* Check that the field takes each lung to its volume at unit gravity g. */
@@ -249,13 +224,12 @@ static size_t held_out_default(const pipeline *p) {
 
 static supine_status hold_out(pipeline *p, supine_error *error) {
   const size_t count = p->options->held_out > 0 ? p->options->held_out : held_out_default(p);
-  return supine_accuracy_held_out(p->lungs, &p->options->model, p->directions, &p->projection,
-                                  p->column_forms.linear != NULL ? &p->column_forms : NULL, count,
-                                  &p->held_out, error);
+  return supine_accuracy_truth_create(p->lungs, &p->options->model, p->directions, &p->projection,
+                                      count, &p->truth, error);
 }
 
 static supine_status measure(pipeline *p, supine_error *error) {
-  return supine_accuracy_measure(&p->held_out.truth, &p->compression, p->directions,
+  return supine_accuracy_measure(&p->truth, &p->compression, p->directions,
                                  p->forms.linear != NULL ? &p->forms : NULL, &p->state,
                                  &p->accuracy, error);
 }
@@ -280,7 +254,7 @@ static size_t modes_needed(const pipeline *p) {
 /* Tabulate the error by band and modes, before modes are dropped. */
 static supine_status tabulate(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_error_table_create(
-      &p->held_out.truth, &p->projection, &p->compression, p->directions, &p->table);
+      &p->truth, &p->projection, &p->compression, p->directions, &p->table);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "no memory to tabulate the error");
 }

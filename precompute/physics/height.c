@@ -140,17 +140,17 @@ static size_t cell_of(const block_box *box, const double *p) {
 }
 
 /* Sort the vertices along the curve by counting sort. */
-static void sort_vertices(const supine_mesh *mesh, size_t *begin, double *sorted) {
-  const block_box box = box_of(mesh->vertices, mesh->vertex_count);
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    ++begin[cell_of(&box, mesh->vertices + 3 * i) + 1];
+static void sort_vertices(const double *vertices, size_t count, size_t *begin, double *sorted) {
+  const block_box box = box_of(vertices, count);
+  for (size_t i = 0; i < count; ++i) {
+    ++begin[cell_of(&box, vertices + 3 * i) + 1];
   }
   for (size_t c = 0; c < CELLS; ++c) {
     begin[c + 1] += begin[c];
   }
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    const double *p = mesh->vertices + 3 * i;
-    memcpy(sorted + 3 * begin[cell_of(&box, p)]++, p, 3 * sizeof *p);
+  for (size_t i = 0; i < count; ++i) {
+    memcpy(sorted + 3 * begin[cell_of(&box, vertices + 3 * i)]++, vertices + 3 * i,
+           3 * sizeof *sorted);
   }
 }
 
@@ -161,18 +161,26 @@ static void find_boxes(const double *vertices, size_t count, size_t size, block_
   }
 }
 
-static supine_status range_of(const supine_mesh *mesh, size_t count, const double *directions,
-                              double *minimum, double *maximum) {
-  const size_t n = mesh->vertex_count;
+supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
+                                          const double *directions, double *minimum,
+                                          double *maximum) {
+  const size_t single = lungs->mesh.vertex_count;
+  const size_t n = pair && lungs->lung_count == 1 ? 2 * single : single;
   const size_t box_count = (n + BLOCK - 1) / BLOCK;
   block_box *boxes = malloc((box_count + 1) * sizeof *boxes);
   block_box *groups = malloc((box_count / GROUP + 1) * sizeof *groups);
+  double *vertices = malloc((3 * n + 1) * sizeof *vertices);
   double *sorted = malloc((3 * n + 1) * sizeof *sorted);
   size_t *begin = calloc(CELLS + 1, sizeof *begin);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (boxes != NULL && groups != NULL && sorted != NULL && begin != NULL) {
+  if (boxes != NULL && groups != NULL && vertices != NULL && sorted != NULL && begin != NULL) {
     range_work work = {n, sorted, boxes, groups, box_count, count, directions, minimum, maximum};
-    sort_vertices(mesh, begin, sorted);
+    memcpy(vertices, lungs->mesh.vertices, 3 * single * sizeof *vertices);
+    for (size_t i = 3 * single; i < 3 * n; ++i) { /* the mirror image in the midline */
+      const double at = vertices[i - 3 * single];
+      vertices[i] = i % 3 == 0 ? 2.0 * lungs->midline - at : at;
+    }
+    sort_vertices(vertices, n, begin, sorted);
     find_boxes(sorted, n, BLOCK, boxes);
     find_boxes(sorted, n, GROUP * BLOCK, groups);
     supine_parallel_for((count + LANES - 1) / LANES, 4, 0, height_range, &work);
@@ -180,39 +188,8 @@ static supine_status range_of(const supine_mesh *mesh, size_t count, const doubl
   }
   free(boxes);
   free(groups);
+  free(vertices);
   free(sorted);
   free(begin);
   return status;
-}
-
-/* Extend the range by the mirror image: p mirrored in the plane x = m has the height g'.p + 2 m
- * g_x, where g' is the mirror image of g. */
-static supine_status pair_range(const supine_lungs *lungs, size_t count, const double *directions,
-                                double *minimum, double *maximum) {
-  double *mirrored = malloc(5 * count * sizeof *mirrored);
-  if (mirrored == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  double *low = mirrored + 3 * count;
-  double *high = mirrored + 4 * count;
-  for (size_t i = 0; i < 3 * count; ++i) {
-    mirrored[i] = i % 3 == 0 ? -directions[i] : directions[i];
-  }
-  const supine_status status = range_of(&lungs->mesh, count, mirrored, low, high);
-  for (size_t d = 0; d < count && status == SUPINE_OK; ++d) {
-    const double shift = 2.0 * lungs->midline * directions[3 * d];
-    minimum[d] = fmin(minimum[d], low[d] + shift);
-    maximum[d] = fmax(maximum[d], high[d] + shift);
-  }
-  free(mirrored);
-  return status;
-}
-
-supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, size_t count,
-                                          const double *directions, double *minimum,
-                                          double *maximum) {
-  const supine_status status = range_of(&lungs->mesh, count, directions, minimum, maximum);
-  return status == SUPINE_OK && pair && lungs->lung_count == 1
-             ? pair_range(lungs, count, directions, minimum, maximum)
-             : status;
 }

@@ -11,7 +11,7 @@
 #include "sh/base/vec3.h"
 #include <supine/volume.h>
 
-#include "precompute/physics/inflate.h"
+#include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 
@@ -40,28 +40,16 @@ typedef struct ascent {
   size_t begun, history; /* differences stored so far; in use */
 } ascent;
 
-/* Fail if the surface folds on the way up, with the volume where it does. */
-static supine_status check_folds(const ascent *a, double gain, supine_error *error) {
-  const double *from = a->scan.mesh.vertices;
-  const double *to = a->lungs.mesh.vertices;
-  const double share = supine_mesh_turned_over(&a->scan.mesh, to);
-  double whole = 0.0;
-  double folded = 1.0;
-  while (share > folded_share && folded - whole > 1e-3) {
-    const double part = 0.5 * (whole + folded);
-    for (size_t i = 0; i < a->size; ++i) {
-      a->image[i] = from[i] + part * (to[i] - from[i]);
-    }
-    *(supine_mesh_turned_over(&a->scan.mesh, a->image) > folded_share ? &folded : &whole) = part;
-  }
+/* Fail if too many triangles turn over between the scan and full inflation. */
+static supine_status check_folds(const ascent *a, supine_error *error) {
+  const double share = supine_mesh_turned_over(&a->scan.mesh, a->lungs.mesh.vertices);
   return share <= folded_share
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                                 "the scan folds on its way up to full inflation: %.3g %% of its "
-                                "triangles turn over, the first %g %% some %.0f of the %.0f mL "
-                                "above the scan. If it is fuller than --scanned says, change that "
-                                "or --resting; --scanned none takes it as it is",
-                                100.0 * share, 100.0 * folded_share, folded * gain, gain);
+                                "triangles turn over. If it is fuller than --scanned says, change "
+                                "that or --resting; --scanned none takes it as it is",
+                                100.0 * share);
 }
 
 /* Find the gains of one lung's scan, A = s (sigma + 2 bend e(sigma)), with the field's form on
@@ -256,7 +244,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
   memcpy(a.scan.mesh.vertices, lungs->mesh.vertices, bytes);
   status = iterate(&a, error);
   if (status == SUPINE_OK) {
-    status = check_folds(&a, -found->scan_volume[0] - found->scan_volume[1], error);
+    status = check_folds(&a, error);
   }
   supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
   for (size_t i = 0; i < a.size; i += 3) {

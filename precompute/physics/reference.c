@@ -7,7 +7,6 @@
 #include "sh/base/vec3.h"
 #include <supine/volume.h>
 
-#include "precompute/physics/inflate.h"
 #include "precompute/physics/reference.h"
 
 static const double tissue_share = 0.1; /* of the full volume: nothing is emptier */

@@ -74,4 +74,21 @@ double supine_reference_full(const supine_reference *reference, const double g[3
 void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
                                 double *ml);
 
+/** Move scanned lungs to their reference volumes, in place: the fixed point above. `reference`
+ * holds the scan and the volumes; gains, solves and the largest move are written. Statuses as
+ * supine_reference_find. */
+supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
+                                       supine_reference *reference, supine_error *error);
+
+/** Find the gains of the scan, for a field of the reference surface applied to the scan, that
+ * match the volumes of full inflation, of rest and of the scan.
+ * @param scan        closed lungs with the scan's vertices
+ * @param directions  [N, 3] d, mm
+ * @param amounts     [N] F along the scan's gravity
+ * @param reference   its volumes; scan_gains are written
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds on the way */
+supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
+                                          const double *directions, const double *amounts,
+                                          supine_reference *reference, supine_error *error);
+
 #endif

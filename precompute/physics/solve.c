@@ -20,8 +20,6 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
                                    const double g[3], supine_solution *solution,
                                    supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
-  static const double one = 1.0;
-  supine_volume_forms forms = {0};
   supine_solution made = *solution;
   double range[2];
   double *work = malloc(n * sizeof *work);
@@ -56,21 +54,16 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
     goto cleanup;
   }
   if (made.has_volume) {
-    status = supine_physics_volume_forms_create(lungs, model->share, made.directions, made.catch_,
-                                                1, &forms, error);
-    if (status != SUPINE_OK) {
-      goto cleanup;
-    }
+    supine_physics_volume_of_fields(lungs, model->share, made.directions, made.catch_, 1,
+                                    made.form);
     for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-      supine_physics_volume_forms_contract_lung(&forms, lung, &one, &made.form[lung]);
+      supine_physics_volume_form_add(&made.form[lung], made.cubic);
     }
-    supine_physics_volume_forms_contract(&forms, &one, made.cubic);
   }
   supine_tissue_rest_directions(lungs, model->share, made.directions);
   *solution = made;
   made = (supine_solution){0};
 cleanup:
-  supine_physics_volume_forms_free(&forms);
   supine_physics_solution_free(&made);
   free(work);
   return status;

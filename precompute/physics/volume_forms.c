@@ -10,7 +10,7 @@
 #include "sh/base/vec3.h"
 
 /* A lung's triangles are summed in PARTS, whatever the number of threads, BLOCK at a time. */
-enum { PARTS = 16, BLOCK = 64, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
+enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
 static const double sixth_ml = 1e-3 / 6.0; /* of a cubic millimetre */
 
@@ -312,46 +312,6 @@ void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *sh
 }
 
 /* --- use of forms ---------------------------------------------------------------------------- */
-
-/* out[a, j, b] = sum over i of in[a, i, b] mix[i, j]. */
-static void mix_middle(const double *in, size_t outer, size_t n, size_t inner, const double *mix,
-                       size_t count, double *out) {
-  memset(out, 0, outer * count * inner * sizeof *out);
-  for (size_t a = 0; a < outer; ++a) {
-    for (size_t i = 0; i < n; ++i) {
-      for (size_t j = 0; j < count; ++j) {
-        for (size_t b = 0; b < inner; ++b) {
-          out[(a * count + j) * inner + b] += in[(a * n + i) * inner + b] * mix[i * count + j];
-        }
-      }
-    }
-  }
-}
-
-supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
-                                              size_t count, supine_volume_forms *mixed) {
-  const size_t g = forms->lung_count;
-  const size_t n = forms->column_count;
-  const size_t larger = n > count ? n : count;
-  double *first = malloc(3 * g * larger * larger * larger * sizeof *first);
-  double *second = malloc(g * larger * larger * larger * sizeof *second);
-  supine_status status = forms_allocate(g, count, mixed);
-  if (first == NULL || second == NULL) {
-    supine_physics_volume_forms_free(mixed);
-    status = SUPINE_ERROR_MEMORY;
-  }
-  if (status == SUPINE_OK) {
-    mix_middle(forms->linear, 3 * g, n, 1, mix, count, mixed->linear);
-    mix_middle(forms->quadratic, 3 * g, n, n, mix, count, first);
-    mix_middle(first, 3 * g * count, n, 1, mix, count, mixed->quadratic);
-    mix_middle(forms->cubic, g, n, n * n, mix, count, first);
-    mix_middle(first, g * count, n, n, mix, count, second);
-    mix_middle(second, g * count * count, n, 1, mix, count, mixed->cubic);
-  }
-  free(first);
-  free(second);
-  return status;
-}
 
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form) {

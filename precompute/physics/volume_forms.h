@@ -48,11 +48,6 @@ void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *sh
                                      const double *directions, const double *fields, size_t count,
                                      supine_volume_form *forms);
 
-/** Find the forms for the columns c' = c x mix, mix [K, count].
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_physics_volume_forms_mix(const supine_volume_forms *forms, const double *mix,
-                                              size_t count, supine_volume_forms *mixed);
-
 /** Compute the form of one lung for weights [K], mL. */
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form);

@@ -5,6 +5,7 @@
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
+#include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/projection.h"
 
@@ -18,15 +19,25 @@ typedef struct supine_accuracy {
   double rms_mm, p95_mm, max_mm; /**< at equal volumes */
 } supine_accuracy;
 
-/** The full solve at some directions. */
+/** The full solve at directions that no grid used: columns x functions^T, as exact as the
+ * projection's span. */
 typedef struct supine_truth {
   size_t direction_count;
-  const double *directions; /**< [D, 3] unit */
+  double *directions; /**< [D, 3] unit */
   size_t rank;
-  const double *columns;   /**< [N, rank]; the field is columns x functions^T */
-  const double *functions; /**< [D, rank] */
-  const double *cubic;     /**< [D, 3] volume as a polynomial of the gain, mL; NULL: open surface */
+  const double *columns; /**< [N, rank] the projection's */
+  double *functions;     /**< [D, rank] */
+  double *cubic;         /**< [D, 3] volume as a polynomial of the gain, mL; NULL: open surface */
 } supine_truth;
+
+/** Find the full solve at `count` held-out directions.
+ * @param directions  [N, 3] d
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
+                                           const double *directions,
+                                           const supine_projection *projection, size_t count,
+                                           supine_truth *truth, supine_error *error);
+void supine_accuracy_truth_free(supine_truth *truth);
 
 /** A volume to compare at, mL beyond the reference. */
 typedef struct supine_accuracy_state {
