@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Postures along a golden spiral, volumes along multiples of another irrational: even in both. */
+/* States for normals: postures on a golden-angle spiral, volumes at multiples of an irrational
+ * number, so that both are covered evenly. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,7 +76,8 @@ static bool common_gain(const supine_normals_surface *s, const double *w, double
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states) {
-  static const double volume_share = 0.4142135623730950488; /* sqrt 2 - 1: apart from the angle */
+  static const double volume_share =
+      0.4142135623730950488; /* sqrt 2 - 1: unrelated to the spiral's angle */
   const size_t terms = 3 * supine_normals_terms(surface->mode_count);
   const size_t harmonics = supine_sh_count(surface->band);
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};

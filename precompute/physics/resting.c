@@ -31,7 +31,7 @@ static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.41
 static const double least_share = 0.1; /* tissue alone */
 static const double most_share = 1.0;
 
-/* What the left lung has of both lungs' full volume; only to share out what is told of both. */
+/* Left lung's share of both lungs' full volume, to split a value given for both. */
 static const double left_part = 0.45;
 
 supine_resting supine_reference_resting_default(void) {

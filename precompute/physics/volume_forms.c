@@ -9,7 +9,7 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* A lung's triangles are summed in PARTS, whatever the number of threads, BLOCK at a time. */
+/* Each lung's triangles are summed in PARTS, whatever the number of threads, BLOCK at a time. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
 static const double sixth_ml = 1e-3 / 6.0; /* of a cubic millimetre */
@@ -33,7 +33,7 @@ static supine_status forms_allocate(size_t lungs, size_t count, supine_volume_fo
   return SUPINE_OK;
 }
 
-/* The triangles of one lung and what moves them. */
+/* The triangles of one lung, and the columns that move them. */
 typedef struct lung_work {
   const supine_lungs *lungs;
   const double *directions; /* [N, 3]; NULL: columns are vectors */
@@ -68,7 +68,7 @@ static const uint32_t *read_corners(const lung_work *work, size_t triangle, doub
   return corner;
 }
 
-/* The triangles of a part: begin to end. */
+/* Return the first triangle of a part. */
 static size_t part_begin(const lung_work *work, size_t part) {
   const size_t *begin = work->lungs->triangle_begin + work->lung;
   return begin[0] + (begin[1] - begin[0]) * part / PARTS;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Error against the number of functions: every prefix of the harmonics and of the modes. */
+/* Error against the number of functions: of the first harmonics, and of the first modes. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -19,8 +19,8 @@ void supine_accuracy_error_table_free(supine_error_table *table) {
   *table = (supine_error_table){0};
 }
 
-/* gram [R, R] = sum over the vertices looked at of |d|^2 times the columns' products: the squares
- * of any sum of columns. */
+/* Compute gram [R, R], the sum of |d|^2 times the products of the columns over some of the
+ * vertices: w' gram w is the squared size of the columns' sum with coefficients w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
@@ -33,7 +33,7 @@ static void find_gram(const supine_truth *truth, size_t vertex_count, const doub
   }
 }
 
-/* How large the sum of columns with these coefficients is, squared. */
+/* Compute the squared size of the columns' sum with these coefficients. */
 static double square_of(const double *gram, size_t rank, const double *coefficients) {
   double image[SUPINE_SPAN_MAX];
   cblas_dsymv(CblasRowMajor, CblasLower, (int)rank, 1.0, gram, (int)rank, coefficients, 1, 0.0,
@@ -41,7 +41,7 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
   return cblas_ddot((int)rank, coefficients, 1, image, 1);
 }
 
-/* left -= part weights, of `count` terms: part [rank] in rows of `stride`. */
+/* Compute left -= part weights; part [rank, count] has rows of `stride`. */
 static void take_off(const double *part, size_t stride, size_t count, const double *weights,
                      size_t rank, double *left) {
   cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, (int)count, -1.0, part, (int)stride, weights,

@@ -1,17 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Error against the number of functions, for the user to choose by. */
+/* Error against the number of functions, by which a user chooses it. */
 #ifndef SUPINE_ERROR_TABLE_H
 #define SUPINE_ERROR_TABLE_H
 
 #include "precompute/projection/accuracy.h"
 
-/* Relative RMS errors on the held-out directions, over at most 4096 vertices spread over the file.
- */
+/* Relative RMS errors on the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
   size_t band_count; /* L + 1 */
-  double *harmonics; /* [L + 1] of the (l + 1)^2 first harmonics */
+  double *harmonics; /* [L + 1] with the first (l + 1)^2 harmonics */
   size_t mode_count;
-  double *modes; /* [K] of the k + 1 first modes */
+  double *modes; /* [K] with the first k + 1 modes */
 } supine_error_table;
 
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,

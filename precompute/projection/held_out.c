@@ -9,7 +9,7 @@
 #include "precompute/projection/accuracy.h"
 
 void supine_accuracy_held_out_directions(size_t count, double *directions) {
-  static const double off_the_grids = 0.3; /* rad: grids have a node at longitude 0 */
+  static const double off_the_grids = 0.3; /* first longitude, rad: grids have a node at 0 */
   for (size_t i = 0; i < count; ++i) {
     supine_spiral((double)i, (double)count, off_the_grids, directions + 3 * i);
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The field over orientation: solves for a few directions, and the transform of how they sum. */
+/* The field over orientation: solve for a few directions, and transform their weights. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,7 +27,7 @@ typedef struct grid_heights {
   double *directions, *minimum, *maximum;
 } grid_heights;
 
-/* Searches half the grid: the other is opposite to it. */
+/* Find the extents along half of the grid; those of the opposite directions follow. */
 static supine_status find_heights(const supine_lungs *lungs, bool pair, const supine_sh_grid *grid,
                                   grid_heights *made) {
   const size_t width = grid->longitudes;
@@ -46,7 +46,7 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* functions [R, (band + 1)^2] of the span's weights. */
+/* Find the harmonics of the span's weights, functions [R, (band + 1)^2]. */
 static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                                const supine_span *span, double *functions, supine_error *error) {
   const size_t least = LATITUDES_PER_BAND * (band + 1);

@@ -4,9 +4,9 @@
  *
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
- * kept in factors, C = columns x functions. The transfer does not turn with gravity, so that it
- * commutes with the projection: the force at any direction is a sum of those at a few (span.h), the
- * transfer is applied to these alone, and what is transformed is how they sum. */
+ * kept as C = columns x functions. The transfer does not depend on gravity, so it commutes with the
+ * projection: the force at any direction is a sum of the forces at a few (span.h), the transfer is
+ * applied to these alone, and only the weights of the sum are transformed. */
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
@@ -18,7 +18,7 @@
 typedef struct supine_projection {
   size_t vertex_count;
   size_t band;
-  supine_span *span; /**< that columns and functions are of; NULL: another simulator's field */
+  supine_span *span; /**< directions of the columns; NULL: another simulator's field */
   size_t rank;       /**< R */
   double *columns;   /**< [N, R] */
   double *functions; /**< [R, (band + 1)^2] */
@@ -26,12 +26,11 @@ typedef struct supine_projection {
 
 void supine_projection_free(supine_projection *projection);
 
-/** Reports progress from 0 to 1; returns false to stop the work. */
+/** Report progress from 0 to 1; return false to stop the work. */
 typedef bool supine_progress_function(void *context, double fraction);
 
-/** Projects the field: solves for the span's directions, and transforms the span's functions on a
- * grid eight times finer than the band, so that their kinks, where another vertex becomes the
- * lowest or highest, do not fold back into it.
+/** Project the field. The span's weights have kinks where another vertex becomes the lowest or
+ * highest; a grid eight times finer than the band keeps them from aliasing.
  * @param progress  optional
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
  * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach, a band above
@@ -55,14 +54,14 @@ typedef struct supine_compression {
 
 void supine_projection_compression_free(supine_compression *compression);
 
-/** The harmonics themselves as modes: K = (band + 1)^2, the paper's form.
+/** Take the harmonics themselves as modes: K = (band + 1)^2, the paper's form.
  * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX harmonics
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_compress_harmonics(const supine_projection *projection,
                                                    supine_compression *compression,
                                                    supine_error *error);
 
-/** The best functions of orientation: the leading right singular vectors of the weighted
+/** Find the best functions of orientation: the leading right singular vectors of the weighted
  * coefficient matrix, from the Gram matrix of the columns.
  *
  * @param weight     [N] weight of each vertex's square, such as |d_i|^2; NULL: 1
@@ -77,7 +76,7 @@ supine_status supine_projection_compress_modes(const supine_projection *projecti
                                                supine_compression *compression, double *singular,
                                                double *total, supine_error *error);
 
-/** Keeps the first `count` modes of a compression whose projection had `rank` columns. */
+/** Keep the first `count` modes of a compression whose projection had `rank` columns. */
 void supine_projection_compression_truncate(supine_compression *compression, size_t rank,
                                             size_t count);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A few directions of gravity whose forces sum to those of all. */
+/* Directions of gravity of whose forces the force at any direction is a sum. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -9,16 +9,16 @@
 #include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 
-/* What is chosen from. */
+/* The vertices and directions that crosses are chosen from. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest force that may be left of the largest: 6e-5 of the RMS force are, a hundredth of the
- * error of 16 modes. */
+/* Largest residual force, relative to the largest force. It leaves 6e-5 of the RMS force, a
+ * hundredth of the error of 16 modes. */
 static const double left_out = 3e-4;
-static const double rounding = 1e-12; /* the same without softening: exact */
+static const double rounding = 1e-12; /* the same without softening, where the sum is exact */
 
-/* Vertex and direction of what is left of most, by full pivoting; takes its cross off all others.
- * force [vertices, DIRECTIONS]. */
+/* Subtract from force [vertices, DIRECTIONS] the product of the row and the column through entry
+ * `at`, divided by that entry: a step of elimination with full pivoting. */
 static void take_cross(double *force, size_t vertices, size_t at) {
   const double *column = force + at % DIRECTIONS;
   double row[DIRECTIONS];
@@ -40,7 +40,7 @@ static size_t largest_of(const double *force, size_t count) {
   return at;
 }
 
-/* f_j(g_r) inverted. */
+/* Invert the matrix f_j(g_r) in place. */
 static supine_status invert(double *matrix, size_t rank) {
   lapack_int pivots[SUPINE_SPAN_MAX];
   const lapack_int n = (lapack_int)rank;
@@ -50,8 +50,8 @@ static supine_status invert(double *matrix, size_t rank) {
                                         : LAPACKE_dgetri(LAPACK_COL_MAJOR, n, matrix, n, pivots));
 }
 
-/* Chooses crosses of the force [count, DIRECTIONS] until next to nothing is left: indices among its
- * vertices and directions. False: more would be needed. */
+/* Choose rows and columns of the force [count, DIRECTIONS], which is overwritten, until no residual
+ * exceeds `share` of the largest force. Return false if that takes more than SUPINE_SPAN_MAX. */
 static bool choose(double *force, size_t count, double share, size_t *rank,
                    size_t of[SUPINE_SPAN_MAX], size_t from[SUPINE_SPAN_MAX]) {
   size_t at = largest_of(force, count * DIRECTIONS);

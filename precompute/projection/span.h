@@ -3,15 +3,15 @@
  *
  *     f_i(g) = sum over r of f_i(g_r) w_r(g),      f_j(g) = sum over r of f_j(g_r) w_r(g)
  *
- * at as many vertices j, of which the second equation finds w (cross approximation: Goreinov,
- * Tyrtyshnikov and Zamarashkin 1997). Without softening four directions do, or five, and it is
- * exact; with it, as many as the tolerance asks for. */
+ * The second equation, at R vertices j, determines w (cross approximation: Goreinov, Tyrtyshnikov
+ * and Zamarashkin 1997). Without softening R is 4 or 5 and the sum is exact; with it R depends on
+ * the tolerance. */
 #ifndef SUPINE_SPAN_H
 #define SUPINE_SPAN_H
 
 #include "precompute/physics/force.h"
 
-/* Most directions of a span: those of a soften of some 12. */
+/* Most directions of a span: enough for a softening of about 12. */
 enum { SUPINE_SPAN_MAX = 128 };
 
 typedef struct supine_span {
@@ -21,13 +21,13 @@ typedef struct supine_span {
   double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX]; /* [R, R] of f_j(g_r) */
 } supine_span;
 
-/* Chooses the directions and vertices.
+/* Choose the directions and vertices.
  * @retval SUPINE_ERROR_ARGUMENT  the softening asks for more than SUPINE_SPAN_MAX
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (there is no force) */
 supine_status supine_projection_span_create(const supine_lungs *lungs, const supine_force_law *law,
                                             supine_span *span, supine_error *error);
 
-/* w at some directions, [gravities->count, R].
+/* Compute w at some directions, [gravities->count, R].
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
                                              const supine_span *span,

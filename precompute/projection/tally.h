@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Sum of squares, largest and percentiles of many non-negative numbers that are not kept. */
+/* Sum of squares, largest value and percentiles of many non-negative numbers, without keeping them.
+ */
 #ifndef SUPINE_TALLY_H
 #define SUPINE_TALLY_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* Bins of a float's exponent and first 8 bits of mantissa: 0.4 % wide over its whole range. */
+/* A bin for each exponent and first 8 bits of the mantissa of a float: 0.4 % wide everywhere. */
 enum { SUPINE_TALLY_BINS = 1 << 16 };
 
 typedef struct supine_tally {
@@ -18,10 +19,10 @@ typedef struct supine_tally {
 
 void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *values);
 
-/* Adds one tally to another. */
+/* Add one tally to another. */
 void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other);
 
-/* The value that a share (0 to 1) of the numbers lies below: the upper edge of its bin. */
+/* Return the value that a share, 0 to 1, of the numbers lies below: the upper edge of its bin. */
 double supine_accuracy_tally_percentile(const supine_tally *tally, double share);
 
 #endif
