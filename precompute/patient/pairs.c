@@ -167,10 +167,10 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
       map->m[k] *= scale;
     }
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    right = LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', 3, 3, scatter[0], 3, cross[0], 3) == 0;
     for (size_t k = 0; k < 9; ++k) {
       map->m[k] = cross[k % 3][k / 3];
     }
+    right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
   }
   supine_patient_map_apply(map, mean[0], moved);
   for (size_t k = 0; k < 3; ++k) {
