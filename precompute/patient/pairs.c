@@ -167,7 +167,7 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
       map->m[k] *= scale;
     }
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    for (size_t k = 0; k < 9; ++k) {
+    for (size_t k = 0; k < 9; ++k) { /* by columns, as LAPACKE copies rows to memory of its own */
       map->m[k] = cross[k % 3][k / 3];
     }
     right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
@@ -204,6 +204,7 @@ static summary measure(const supine_patient_pairs *pairs, bool moved) {
   const size_t n = pairs->count;
   supine_patient_affinity map;
   double covariance[9];
+  double space[8];
   double width[3] = {0.0};
   summary s = {.left = 0.0};
   for (size_t i = 0; i < 6; ++i) {
@@ -218,7 +219,7 @@ static summary measure(const supine_patient_pairs *pairs, bool moved) {
   for (size_t k = 0; k < 9; ++k) {
     covariance[k] = gsl_stats_covariance(pairs->from + k / 3, 3, pairs->from + k % 3, 3, n);
   }
-  (void)LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'N', 'L', 3, covariance, 3, width);
+  (void)LAPACKE_dsyev_work(LAPACK_COL_MAJOR, 'N', 'L', 3, covariance, 3, width, space, 8);
   s.thinnest = sqrt(fmax(0.0, width[0]));
   (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_RIGID, n, pairs->from, pairs->to, &map);
   s.turn = acos(fmin(1.0, fmax(-1.0, 0.5 * (map.m[0] + map.m[4] + map.m[8] - 1.0)))) * 180.0 /
