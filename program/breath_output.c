@@ -202,13 +202,21 @@ static supine_status write_index(breath_output *output, supine_error *error) {
               file.file);
   for (size_t t = 0; t < output->content.frames->count; ++t) {
     char *path = frame_path(slash == NULL ? output->folder : slash + 1, t);
+    if (path == NULL) {
+      status = no_memory(output->path, error);
+      break;
+    }
     (void)fprintf(file.file, "<DataSet timestep=\"%.9g\" part=\"0\" file=\"",
                   output->content.frames->time[t]);
-    supine_template_escape(path != NULL ? path : "", file.file);
+    supine_template_escape(path, file.file);
     (void)fputs("\"/>\n", file.file);
     free(path);
   }
   (void)fputs("</Collection>\n</VTKFile>\n", file.file);
+  if (status != SUPINE_OK) {
+    supine_output_abandon(&file);
+    return status;
+  }
   status = supine_output_commit(&file, error);
   if (status == SUPINE_OK) {
     free(output->folder);

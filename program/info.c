@@ -113,16 +113,17 @@ static void print_content(const supine_basis *basis, const char *content) {
 
 /* Print the expected error of a displacement from the scan to the default state, supine and prone.
  */
-static void print_expected(const supine_basis *basis) {
+static supine_status print_expected(const supine_basis *basis, supine_error *error) {
   const supine_state scan = supine_basis_scan(basis);
+  supine_status status = SUPINE_OK;
   bool first = true;
-  for (int prone = 0; prone < 2; ++prone) {
+  for (int prone = 0; prone < 2 && status != SUPINE_ERROR_MEMORY; ++prone) {
     const supine_state state = {.gravity = {0.0, prone == 1 ? -1.0 : 1.0, 0.0},
                                 .volume = supine_basis_default_volume(basis)};
     supine_expected expected = {0};
     char text[160];
-    if (supine_options_expected_find(basis, &state, &scan, &expected, NULL) == SUPINE_OK &&
-        expected.largest > 0.0) {
+    status = supine_options_expected_find(basis, &state, &scan, &expected, error);
+    if (status == SUPINE_OK && expected.largest > 0.0) {
       (void)supine_state_describe(&state, text, sizeof text);
       (void)printf("%s  %s, counted from the scan: ",
                    first ? "\nExpected error, " SUPINE_EXPECTED_MEANING
@@ -134,6 +135,7 @@ static void print_expected(const supine_basis *basis) {
     }
     supine_options_expected_free(&expected);
   }
+  return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK; /* others: no error is stated */
 }
 
 /* Print how the basis was made, and the findings about its input. */
@@ -150,7 +152,8 @@ static void print_facts(const supine_basis *basis) {
   }
 }
 
-static void print_text(const char *path, const supine_basis *basis, const double *energy) {
+static supine_status print_text(const char *path, const supine_basis *basis, const double *energy,
+                                supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const char *content = supine_basis_metadata(basis, "content");
   char state[64];
@@ -171,7 +174,7 @@ static void print_text(const char *path, const supine_basis *basis, const double
       info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
       info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
   print_facts(basis);
-  print_expected(basis);
+  const supine_status status = print_expected(basis, error);
   if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
     (void)printf(
         "\nCompression error%s against the full fields, on %s directions%s:\n"
@@ -192,7 +195,7 @@ static void print_text(const char *path, const supine_basis *basis, const double
                  state, text_of(basis, turned_over));
   }
   if (info->triangle_count == 0) {
-    return; /* energy is defined on the surface */
+    return status; /* energy is defined on the surface */
   }
   (void)puts("\nEnergy per band:");
   double odd = 0.0;
@@ -205,6 +208,7 @@ static void print_text(const char *path, const supine_basis *basis, const double
     }
   }
   (void)printf("  odd    %10.5f %%   even beyond l = 0: %.5f %%\n", 100.0 * odd, 100.0 * even);
+  return status;
 }
 
 static const double *error_list(const supine_basis *basis, const char *key, size_t *count) {
@@ -322,7 +326,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (status == SUPINE_OK && wanted->json) {
     print_json(path, basis, energy);
   } else if (status == SUPINE_OK) {
-    print_text(path, basis, energy);
+    status = print_text(path, basis, energy, error);
     print_table(basis);
   }
   free(energy);

@@ -94,7 +94,7 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   }
   if (group == NULL || parts[0].triangles == NULL || parts[1].triangles == NULL) {
     free(group);
-    return 1; /* without triangles */
+    return 0;
   }
   for (int axis = 0; axis < 3; ++axis) {
     const double middle = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
@@ -120,6 +120,11 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
                            bool *axes_hold, supine_findings *findings, supine_error *error) {
   supine_mesh parts[2];
   const size_t count = part_lungs(lungs, parts);
+  if (count == 0) {
+    free(parts[0].triangles);
+    free(parts[1].triangles);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the two lungs");
+  }
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(parts, count);
   free(parts[0].triangles);
   free(parts[1].triangles);

@@ -108,7 +108,10 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
       span->inverse[r * span->rank + c] = force[of[r] * DIRECTIONS + from[c]];
     }
   }
-  if (span->rank == 0 || invert(span->inverse, span->rank) != SUPINE_OK) {
+  status = span->rank == 0 ? SUPINE_ERROR_NUMERICAL : invert(span->inverse, span->rank);
+  if (status == SUPINE_ERROR_MEMORY) {
+    (void)supine_error_set(error, status, "no memory for the force");
+  } else if (status != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the force is zero everywhere");
   }
 cleanup:

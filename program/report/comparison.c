@@ -135,7 +135,9 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
     supine_error wrong = {SUPINE_OK, ""};
     status = find_posture(c, &c->postures.item[i], distance, xyz, &c->posture[i], &wrong);
     if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: %s", c->postures.item[i].name, wrong.message);
+      (void)supine_error_set(error, status, "%s: %s", c->postures.item[i].name,
+                             wrong.message[0] != '\0' ? wrong.message
+                                                      : supine_status_string(status));
     }
   }
   if (status != SUPINE_OK) {
