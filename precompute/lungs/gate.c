@@ -80,14 +80,16 @@ static supine_status check_size(const supine_lungs *lungs, const supine_lungs_so
                           unit != NULL ? unit : "");
 }
 
-/* Sort the triangles of two lungs apart, whatever axes they lie along. Return the number of lungs.
+/* Sort the triangles of two lungs apart, whatever axes they lie along. Return the number of lungs;
+ * 0: out of memory.
  * @param parts  share the lungs' vertices; the caller frees their triangles */
 static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   const supine_mesh *mesh = &lungs->mesh;
   const supine_topology *topology = &lungs->topology;
-  uint8_t *group = malloc(topology->component_count);
+  uint8_t *group = calloc(topology->component_count, sizeof *group);
   double least = SUPINE_LUNGS_MOST_OVERLAP;
   int along = -1;
+  bool failed = false;
   for (size_t g = 0; g < 2; ++g) {
     parts[g] = (supine_mesh){.vertex_count = mesh->vertex_count, .vertices = mesh->vertices};
     parts[g].triangles = malloc((3 * mesh->triangle_count + 1) * sizeof *parts[g].triangles);
@@ -99,19 +101,21 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   for (int axis = 0; axis < 3; ++axis) {
     const double middle = 0.5 * (lungs->minimum[axis] + lungs->maximum[axis]);
     const double overlap = supine_lungs_sides(mesh, topology, axis, middle, group);
+    failed = failed || isnan(overlap);
     along = overlap < least ? axis : along;
     least = fmin(least, overlap);
   }
   const double middle =
       along < 0 ? INFINITY : 0.5 * (lungs->minimum[along] + lungs->maximum[along]);
-  (void)supine_lungs_sides(mesh, topology, along < 0 ? 0 : along, middle, group);
+  failed =
+      isnan(supine_lungs_sides(mesh, topology, along < 0 ? 0 : along, middle, group)) || failed;
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
     supine_mesh *part = &parts[group[topology->component[corner[0]]]];
     memcpy(part->triangles + 3 * part->triangle_count++, corner, 3 * sizeof *corner);
   }
   free(group);
-  return along < 0 ? 1 : 2;
+  return failed ? 0 : along < 0 ? 1 : 2;
 }
 
 /* Judge the axes by the lungs' shape, and refuse two lungs in one piece.
