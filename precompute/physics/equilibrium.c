@@ -23,7 +23,7 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
 /* Right-hand sides that are solved together: bounds the work space. */
-enum { TOGETHER = 4 };
+enum { TOGETHER = 8 };
 
 /* Largest relative residual of a solve; double precision reaches some 1e-16 (R / link)^2. */
 static const double residual_limit = 1e-8;
@@ -356,22 +356,23 @@ static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   double minus[2] = {-1.0, 0.0};
   cholmod_dense *right = cholmod.allocate_dense(n, count, n, CHOLMOD_REAL, &p->common);
   cholmod_dense *t = NULL;
-  for (size_t c = 0; c < count && right != NULL; ++c) {
-    double *b = (double *)right->x + c * n;
-    for (size_t i = 0; i < n; ++i) {
-      b[i] = load[i] * force[i * s->count + c];
-      norm[c] += b[i] * b[i];
+  for (size_t i = 0; i < n && right != NULL; ++i) {
+    for (size_t c = 0; c < count; ++c) {
+      const double b = load[i] * force[i * s->count + c];
+      ((double *)right->x)[c * n + i] = b;
+      norm[c] += b * b;
     }
   }
   t = right != NULL ? cholmod.solve(CHOLMOD_A, p->factor, right, &p->common) : NULL;
   const bool solved = t != NULL && cholmod.sdmult(p->matrix, 0, minus, one, t, right, &p->common);
-  for (size_t c = 0; c < count && solved; ++c) {
-    const double *x = (const double *)t->x + c * n;
-    const double *left = (const double *)right->x + c * n;
-    for (size_t i = 0; i < n; ++i) {
-      catch_[i * s->count + c] = give[i] * give[i] * x[i];
-      square[c] += left[i] * left[i];
+  for (size_t i = 0; i < n && solved; ++i) {
+    for (size_t c = 0; c < count; ++c) {
+      const double left = ((const double *)right->x)[c * n + i];
+      catch_[i * s->count + c] = give[i] * give[i] * ((const double *)t->x)[c * n + i];
+      square[c] += left * left;
     }
+  }
+  for (size_t c = 0; c < count && solved; ++c) {
     const double relative = sqrt(square[c] / (norm[c] > 0.0 ? norm[c] : 1.0));
     s->residual[k] = relative <= s->residual[k] ? s->residual[k] : relative; /* keeps NaN */
   }
