@@ -246,7 +246,7 @@ static void test_gate_many_pieces_warned_of(void **state) {
     append(&mesh, 4, at[0], 4, tetrahedron[0], true);
   }
   outcome out = pass(&mesh, NULL);
-  expect_said(&out, "warning: 8 pieces; remove those that are no lung");
+  expect_said(&out, "warning: 8 pieces; remove those that are not lung");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }
@@ -267,7 +267,7 @@ static void test_gate_lungs_that_touch_parted(void **state) {
   }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
-  expect_said(&out, "surfaces touched at 1 point: parted there");
+  expect_said(&out, "surfaces touched at 1 point: separated there");
   assert_int_equal(out.lungs.lung_count, 2);
   assert_true(out.lungs.topology.closed);
   supine_lungs_free(&out.lungs);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lesions and collapse (VI). */
+/* Weight lesions, and shrink collapsed lungs (VI). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Diseased lungs ([Santhanam2008] VI): tumours that stiffen what is around them, and collapse.
+ * Diseased lungs ([Santhanam2008] VI): tumours that stiffen the tissue around them, and collapse.
  *
- * The model (model.h) holds both: as factors on the stiffness, and as shares.
+ * The model (model.h) stores lesions as factors on the stiffness, and collapse as each lung's share
+ * of its healthy volume.
  */
 #ifndef SUPINE_DISEASE_H
 #define SUPINE_DISEASE_H
@@ -14,7 +15,8 @@
  *     factor^w     w = 1 for r <= radius/2,  0 for r >= radius,  3 q^2 - 2 q^3 between
  *                  q = 2 (1 - r / radius)
  *
- * so that it is `factor` inside, exactly 1 from the radius on, and smooth. Several multiply. */
+ * so that it is `factor` inside, exactly 1 from the radius on, and smooth. The factors of several
+ * lesions multiply. */
 typedef struct supine_lesion {
   double centre[3]; /**< mm, LPS; inside the lung or on its surface */
   double radius;    /**< mm, > 0 */
@@ -23,9 +25,9 @@ typedef struct supine_lesion {
 
 /** Multiply a lesion into `factors` [N], which start as 1 everywhere. Factors apply after stiffness
  * was scaled to geometric mean 1: scaling with the lesion included would soften all other tissue,
- * by 4 % for a lesion of factor 10 over 2 % of the vertices. So at one breath scale other tissue
- * moves as before; at one volume it takes over, everywhere in proportion, what the lesion no longer
- * does.
+ * by 4 % for a lesion of factor 10 over 2 % of the vertices. At a given breath scale other tissue
+ * therefore moves as before; at a given volume all of it moves more, by one ratio, to make up for
+ * the lesion.
  *
  * @param reached  optional: number of vertices nearer than the radius; 0: no effect
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
@@ -41,12 +43,12 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
  * width nearest the midline: lengths, and displacements with them, by k = share^(1/3), after the
  * field was solved on the healthy shape. So at any breath scale s
  *
- *     rest volume = share x healthy      V_j(s, g) = share x healthy V_j(s, g)
+ *     V_j(s, g) = share x healthy V_j(s, g)
  *
- * exactly, for every direction of gravity, and a breath that both lungs draw at one scale is
- * divided as share V_sick(s) : V_healthy(s).
+ * exactly, for every direction of gravity, and for the surface itself.
  *
- * @param share  [lungs] 0 < share <= 1; 1: healthy */
+ * @param share     [lungs] volume over the healthy volume, 0 < share <= 1; 1: healthy
+ * @param vertices  [N, 3] mm, written */
 void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double *vertices);
 
 /** Scale directions d [N, 3] of the healthy shape to those of the collapsed lungs, in place. */

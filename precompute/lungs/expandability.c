@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability by a regional model (III-E) or from a file. */
+/* Compute expandability by a regional model (III-E), or read it from a file. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -42,7 +42,7 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
   return SUPINE_OK;
 }
 
-/* Parse the number of a vertex. */
+/* Parse the index of a vertex; false if it is not a whole number. */
 static bool parse_vertex(const char *text, size_t *vertex) {
   char *end = NULL;
   errno = 0;
@@ -50,7 +50,7 @@ static bool parse_vertex(const char *text, size_t *vertex) {
   return end != text && *end == '\0' && errno == 0 && text[0] != '-';
 }
 
-/* Read one row; a value of 0 in `a` is still missing. */
+/* Read one row into `a` [count], where 0 marks the vertices without a value so far. */
 static supine_status take_row(const supine_csv *csv, size_t row, size_t count, double *a,
                               supine_error *error) {
   const size_t last = csv->column_count - 1;

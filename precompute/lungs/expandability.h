@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Regional alveolar expandability a ([Santhanam2008] III-E): how readily each part of a lung
- * gives way. The stiffness of a mass node is E = 1/a.
+ * expands. The stiffness of a mass node is E = 1/a.
  *
- * Only ratios count, as E is scaled to geometric mean 1: twice the value is twice as expandable as
- * its surroundings. Vertices are in the model's order (lungs.h): the left lung's first, each lung's
- * as its file first names them. */
+ * Only ratios count, as E is scaled to geometric mean 1. Vertices are in the model's order
+ * (lungs.h): the left lung's first, and within each lung in the order in which its file first names
+ * them. */
 #ifndef SUPINE_EXPANDABILITY_H
 #define SUPINE_EXPANDABILITY_H
 
@@ -22,13 +22,13 @@ typedef enum supine_expandability_shape {
  * 1 from the back to the front, 2 from the apex to the base. */
 typedef struct supine_expandability_law {
   supine_expandability_shape shape;
-  int axis;
+  int axis;        /**< 0, 1 or 2 */
   double from, to; /**< a at t = 0 and t = 1, > 0 */
 } supine_expandability_law;
 
-/** Compute a [N] of a regional model.
- * @retval SUPINE_ERROR_ARGUMENT  an axis that is not 0 to 2, or an end that is not positive,
- *                                or too small for 1/a */
+/** Compute a [N] by a regional model.
+ * @retval SUPINE_ERROR_ARGUMENT  an axis that is not 0 to 2, or a value at an end that is not
+ *                                positive and finite, or whose reciprocal is infinite */
 supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
                                                    const supine_expandability_law *law, double *a,
                                                    supine_error *error);
@@ -36,7 +36,7 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
 /** Read a [N] from a CSV file: a header line, then either one value a line in the model's order, or
  * `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin with
  * #, are skipped.
- * @retval SUPINE_ERROR_READ    missing or unreadable
+ * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice
  *                              or not in the model: the message names line and vertex
  * @retval SUPINE_ERROR_MEMORY */

@@ -8,7 +8,7 @@
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 
-/* Largest share of its file's volume of a piece that is dropped. */
+/* Pieces with less than this share of their file's volume are dropped. */
 static const double speck_share = 0.01;
 
 static const char *plural(size_t count) {
@@ -40,8 +40,8 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         name, report.reversed, plural(report.reversed));
   }
   if (report.parted > 0) {
-    supine_findings_add(findings, "%s: note: surfaces touched at %zu point%s: parted there", name,
-                        report.parted, plural(report.parted));
+    supine_findings_add(findings, "%s: note: surfaces touched at %zu point%s: separated there",
+                        name, report.parted, plural(report.parted));
   }
   if (specks > 0) {
     supine_findings_add(findings,
@@ -50,8 +50,8 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         name, specks, plural(specks), 100.0 * speck_share, pieces,
                         pieces == 1 ? " is" : "s are");
   }
-  if (pieces > 6) { /* more than lobes */
-    supine_findings_add(findings, "%s: warning: %zu pieces; remove those that are no lung", name,
+  if (pieces > 6) { /* two lungs have five lobes */
+    supine_findings_add(findings, "%s: warning: %zu pieces; remove those that are not lung", name,
                         pieces);
   }
   return SUPINE_OK;
@@ -80,9 +80,9 @@ static supine_status check_size(const supine_lungs *lungs, const supine_lungs_so
                           unit != NULL ? unit : "");
 }
 
-/* Sort the triangles of two lungs apart, whatever axes they lie along. Return the number of lungs;
- * 0: out of memory.
- * @param parts  share the lungs' vertices; the caller frees their triangles */
+/* Separate the triangles of two lungs, along whichever axis the lungs lie apart. Return the number
+ * of lungs; 0: out of memory.
+ * @param parts  written; they share the lungs' vertices, and the caller frees their triangles */
 static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   const supine_mesh *mesh = &lungs->mesh;
   const supine_topology *topology = &lungs->topology;
@@ -119,7 +119,7 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
 }
 
 /* Judge the axes by the lungs' shape, and refuse two lungs in one piece.
- * @param side  written: that of a single lung, +1 left, -1 right; 0: unknown */
+ * @param side  written: the side of a single lung, +1 left, -1 right; 0: unknown */
 static supine_status judge(const supine_lungs *lungs, const supine_lungs_source *source, int *side,
                            bool *axes_hold, supine_findings *findings, supine_error *error) {
   supine_mesh parts[2];
@@ -136,8 +136,8 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
   *axes_hold = found.certain && found.axes == SUPINE_AXES_LPS;
   if (found.joined && source->midline == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: this looks like both lungs in one piece: part them (of a label "
-                            "map --labels one does), or give --midline if it is one lung",
+                            "%s: this looks like both lungs in one piece: separate them (--labels "
+                            "one does in a label map), or give --midline if it is one lung",
                             source->name);
   }
   if (found.axes != SUPINE_AXES_LPS) {
@@ -145,7 +145,7 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
     supine_mesh_axes_letters(supine_mesh_axes_after(source->axes, found.axes), letters);
     supine_findings_add(findings,
                         "%s: warning: the axes are doubtful: the shape of the lungs fits %s; if "
-                        "they are right, add --axes %s",
+                        "those are the axes, add --axes %s",
                         source->name, letters, letters);
   }
   return SUPINE_OK;
@@ -183,7 +183,7 @@ static void note_lungs(const supine_lungs *lungs, const char *name, supine_findi
   if (!t->closed) {
     supine_findings_add(findings,
                         "%s: note: the surface is not closed (%zu boundary, %zu non-manifold, %zu "
-                        "inconsistent edge%s): no volumes, only --scale",
+                        "inconsistent edge%s): volumes are unknown, so give --scale",
                         name, t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges,
                         plural(t->inconsistent_edges));
   }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The checks that every surface of lungs passes, from meshes or label maps. */
+ * Repair and check the surfaces of lungs, whether from meshes or from label maps. */
 #ifndef SUPINE_LUNGS_GATE_H
 #define SUPINE_LUNGS_GATE_H
 
@@ -10,10 +10,10 @@
 
 /** Where the surfaces come from. */
 typedef struct supine_lungs_source {
-  const char *name;      /**< the first file, for messages */
-  supine_axes axes;      /**< axes they were read in; AUTO: several */
-  bool axes_given;       /**< by the user: impossible sizes are then only warned of */
-  bool units_given;      /**< likewise */
+  const char *name;      /**< name of the first file, for messages */
+  supine_axes axes;      /**< axes of the files; AUTO: they differ */
+  bool axes_given;       /**< the user gave the axes: an impossible size is only a warning */
+  bool units_given;      /**< the user gave the units: likewise */
   const double *midline; /**< as for supine_lungs_create */
 } supine_lungs_source;
 
@@ -21,11 +21,11 @@ typedef struct supine_lungs_source {
  *
  * Repairs are those of supine_mesh_repair; pieces below 1 % of their file's volume are dropped. The
  * longest side must be possible for lungs. The axes are compared with the shape
- * (supine_mesh_anatomy_find). A single lung's side is judged by its shape, or else by its place.
- * Notes and warnings go to `findings`.
+ * (supine_mesh_anatomy_find). The side of a single lung follows from its shape or, if that is
+ * unclear, from its place. Notes and warnings go to `findings`.
  *
  * @param meshes     [count] changed in place
- * @param axes_hold  optional, written: the shape agrees with the axes, and with no others
+ * @param axes_hold  optional, written: whether the shape fits LPS and no other axes
  * @retval SUPINE_ERROR_MESH  a size impossible for lungs, both lungs in one piece; and those of
  *                            supine_lungs_create */
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Geodesic spheres. */
+/* Make geodesic spheres. */
 #include <math.h>
 
 #include "precompute/lungs/geodesic.h"
@@ -23,7 +23,7 @@ size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
 /* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
-  const size_t axis = index / 4; /* the coordinate 2 after it is 0: z, x, y */
+  const size_t axis = index / 4; /* of the coordinate +-1; the coordinate before it is 0 */
   const double one = index % 2 == 0 ? -1.0 : 1.0;
   const double far = index % 4 < 2 ? golden : -golden;
   p[axis % 3] = one;
@@ -31,7 +31,7 @@ static void corner(size_t index, double p[3]) {
   p[(axis + 2) % 3] = 0.0;
 }
 
-/* Number the edge between two corners, in the order of the faces. */
+/* Find the index of the edge between two corners; edges are numbered in the order of the faces. */
 static size_t edge_index(unsigned a, unsigned b) {
   size_t count = 0;
   for (size_t f = 0; f < FACES; ++f) {
@@ -49,7 +49,7 @@ static size_t edge_index(unsigned a, unsigned b) {
   return count;
 }
 
-/* Number the vertex at steps (f - i - j, i, j) from the corners of a face. */
+/* Find the index of the vertex at steps (f - i - j, i, j) from the corners of a face. */
 static size_t number(size_t face, size_t f, size_t i, size_t j) {
   const size_t step[3] = {f - i - j, i, j};
   size_t inside = 0;
@@ -65,12 +65,13 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
       if (step[k] > 0 && step[next] > 0) {
         const unsigned a = faces[face][k];
         const unsigned b = faces[face][next];
-        const size_t along = a < b ? step[next] : step[k]; /* from the smaller corner */
+        const size_t along =
+            a < b ? step[next] : step[k]; /* steps from the corner of lower index */
         return CORNERS + edge_index(a, b) * (f - 1) + along - 1;
       }
     }
   }
-  const size_t row = (i - 1) * (f - 1) - (i - 1) * i / 2; /* rows of f - 2, f - 3, ... */
+  const size_t row = (i - 1) * (f - 1) - (i - 1) * i / 2; /* rows hold f - 2, f - 3, ... */
   return CORNERS + EDGES * (f - 1) + face * ((f - 1) * (f - 2) / 2) + row + (j - 1);
 }
 

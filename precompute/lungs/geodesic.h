@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Geodesic spheres: an icosahedron whose faces are cut into f^2 triangles. */
+/* Make geodesic spheres: icosahedra whose faces are cut into f^2 triangles each. */
 #ifndef SUPINE_GEODESIC_H
 #define SUPINE_GEODESIC_H
 

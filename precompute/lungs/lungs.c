@@ -8,13 +8,15 @@
 
 /* A component with less than this share of the vertices does not make a lung. */
 static const double significant_share = 0.05;
-/* Boxes whose faces differ by less than this share of their size are of one lung: halving a mesh
- * moves its box by thousandths, and no two lobes or lungs come near. */
+/* Boxes whose faces differ by less than this share of their size belong to the same lung: a mesh of
+ * half the resolution has a box that differs by thousandths; those of two lobes or lungs differ by
+ * far more. */
 static const double same_box_share = 0.01;
-/* Least ratio of the sizes of two surfaces: those of lobes and lungs of one chest are within a
- * factor of ten. */
+/* Least ratio of the longest sides of two surfaces: lobes and lungs of one chest differ by less
+ * than a factor of ten. */
 static const double least_side_share = 0.05;
-/* Largest share of a lung beyond the midline: lungs meet behind the breastbone. */
+/* Largest extent of a lung beyond the midline over its extent on its own side: lungs reach across
+ * the midline behind the breastbone. */
 static const double most_beyond_share = 0.5;
 
 /* A surface and the mean x of its vertices: surfaces are joined from left to right. */
@@ -168,8 +170,8 @@ static supine_status group(supine_lungs *lungs, const uint8_t *left, supine_erro
   return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for edges");
 }
 
-/* Refuse surfaces of which two are one lung given twice, whatever its resolution, or one is tiny
- * beside another. */
+/* Refuse one lung given twice, even at two resolutions, and a surface that is tiny beside another.
+ */
 static supine_status check_surfaces(const supine_mesh *meshes, size_t count, supine_error *error) {
   for (size_t m = 1; m < count; ++m) {
     for (size_t i = 0; i < m; ++i) {
@@ -198,18 +200,18 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
   return SUPINE_OK;
 }
 
-/* Refuse a given midline that runs through a lung, or has both lungs on one side.
+/* Refuse a given midline that runs through a lung, or leaves both lungs on one side.
  * @param two_sided  the surfaces are two lungs */
 static supine_status check_midline(const supine_lungs *lungs, bool two_sided, supine_error *error) {
   if (two_sided && lungs->lung_count < 2) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the midline x = %g mm leaves both lungs on its %s side; they are "
-                            "parted at about %g",
+                            "the midline x = %g mm leaves both lungs on its %s side: give one "
+                            "near %g",
                             lungs->midline, supine_lungs_name(lungs, 0),
                             0.5 * (lungs->minimum[0] + lungs->maximum[0]));
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    double inner = INFINITY; /* distances to the lung's own side of the midline */
+    double inner = INFINITY; /* distances from the midline, positive on the lung's own side, mm */
     double outer = -INFINITY;
     for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
       const double x = lungs->side[lung] * (lungs->mesh.vertices[3 * i] - lungs->midline);
@@ -237,7 +239,7 @@ static void face_outwards(supine_lungs *lungs) {
   }
 }
 
-/* Find the topology, the lungs' box, their midline and sides. */
+/* Find the topology, the lungs' box, the midline and the side of each lung. */
 static supine_status measure(supine_lungs *lungs, const double *midline, supine_error *error) {
   supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
   const double low = lungs->minimum[0];

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The lungs of one model: surfaces joined, left told from right, measured. */
+ * The lungs of one model: join surfaces, sort them into left and right, and measure them. */
 #ifndef SUPINE_LUNGS_H
 #define SUPINE_LUNGS_H
 
 #include "mesh/mesh.h"
 
 /** One or two lungs as a single surface whose vertices and triangles are grouped by lung, in the
- * order of the input within each. Of two lungs the left is lung 0. */
+ * order of the input within each. With two lungs, the left one is lung 0. */
 typedef struct supine_lungs {
   supine_mesh mesh;
   supine_topology topology;
@@ -20,7 +20,7 @@ typedef struct supine_lungs {
   double maximum[3];
   double *scanned; /**< [N, 3] vertices in the scan if `mesh` was moved from there to full
                         inflation (reference.h); else NULL */
-  double midline;  /**< x of the sagittal plane that X is measured from, mm */
+  double midline;  /**< x of the sagittal plane where the box coordinate X is 0, mm */
 } supine_lungs;
 
 /** Join surfaces into a model.
@@ -31,7 +31,7 @@ typedef struct supine_lungs {
  * triangles of a closed lung face inwards, they are reversed.
  *
  * @param meshes   [count] not changed
- * @param midline  mm; NULL: found. A given one alone decides which lung is left
+ * @param midline  mm; it alone decides which lung is left. NULL: find it
  * @param lungs    written on success; release with supine_lungs_free
  * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach;
  *                                one lung given twice, a tiny surface beside another;
@@ -44,7 +44,8 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
 /** Free the arrays; a zeroed struct is legal. */
 void supine_lungs_free(supine_lungs *lungs);
 
-/** Largest overlap of two lungs along an axis as a share of the narrower; that of lobes is more. */
+/** Largest overlap of two lungs along an axis, as a share of the narrower lung; lobes of one lung
+ * overlap more. */
 #define SUPINE_LUNGS_MOST_OVERLAP 0.5
 
 /** Sort connected components to the two sides of `middle` along an axis, by the mean of their

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A synthetic pair of lungs: radius about an inner centre, mm, as real harmonics to band 12.
+/* Make a synthetic pair of lungs: the radius about an inner centre, mm, is a sum of real spherical
+ * harmonics to band 12.
  *
  * Fitted, to 5 mm RMS, to the surfaces of one adult's lungs in deep inspiration, derived from the
  * lung test data of Chaste (BSD-3-Clause, copyright University of Oxford and the Chaste authors).
@@ -14,10 +15,11 @@
 
 enum { BAND = 12, TERMS = 169 };
 
-/* DICOM patient axes (LPS), mm. */
+/* Centres of the left and the right lung, mm, LPS. */
 static const double centre[2][3] = {{97.4, -135.2, -98.5}, {-114.3, -153.7, -85.5}};
 
-/* Left, then right; coefficient of Y(l, m) at l * l + l + m. */
+/* Coefficients of the radius, mm, of the left, then the right lung; that of Y(l, m) is at
+ * l * l + l + m. */
 static const double radii[2][TERMS] = {
     {
         261.2139, -51.4562, -67.2911, -92.7709, -6.8369,  2.0246,  34.6912,  -9.3122,  -20.3808,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * A synthetic pair of lungs, to try things without a scan. */
+ * Make a synthetic pair of lungs, for trials without a scan. */
 #ifndef SUPINE_PHANTOM_H
 #define SUPINE_PHANTOM_H
 
@@ -11,13 +11,13 @@ enum { SUPINE_PHANTOM_VERTICES_MIN = 84, SUPINE_PHANTOM_VERTICES_MAX = 20000000 
 
 /** Make two closed lungs, left first, of a given total volume.
  *
- * Each is a geodesic sphere (10 f^2 + 2 vertices at frequency f) whose radius is given by harmonics
- * to band 12; the pair is scaled about the origin to the volume.
+ * Each is a geodesic sphere (10 f^2 + 2 vertices at frequency f) whose radius is a sum of
+ * spherical harmonics to band 12; the pair is scaled about the origin to the volume.
  *
- * @param vertices   wanted in total; the result is the nearest pair of geodesic spheres
+ * @param vertices     number wanted in total; the result is the nearest pair of geodesic spheres
  * @param millilitres  volume of both lungs together, > 0; adults have about 6000 at full
- *                  inflation
- * @param mesh       zero-initialised; written on success
+ *                     inflation
+ * @param mesh         zero-initialised; written on success
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error);
