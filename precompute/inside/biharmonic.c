@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Biharmonic interpolation: spread centres, one dense factorisation, sums over the centres. */
+/* Fit and evaluate the biharmonic interpolation: choose centres far apart, factorise one dense
+ * matrix, sum over the centres. */
 #include <cblas.h>
 #include <lapacke.h>
 #include <math.h>
@@ -13,7 +14,7 @@
 
 #include "precompute/inside/biharmonic.h"
 
-/* Columns of the matrix eliminated together; points and centres in a tile of sums. */
+/* Affine terms; columns of the matrix eliminated together; points and centres in a tile of sums. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
 static inline double apart(const double a[3], const double b[3]) {
@@ -39,7 +40,8 @@ static void frame(size_t count, const double *points, supine_inside_biharmonic *
   fit->unit = square > 0.0 ? sqrt(square) : 1.0;
 }
 
-/* Choose each next centre as the point farthest from all earlier ones. */
+/* Choose as first centre the point farthest from the middle, as each next one the point farthest
+ * from all earlier ones. */
 SUPINE_CLONES static supine_status choose(size_t count, const double *points, size_t centre_max,
                                           supine_inside_biharmonic *fit) {
   double *distance = malloc(count * sizeof *distance);
@@ -97,7 +99,8 @@ SUPINE_CLONES static void fill(const double *c, const kernel *k) {
   }
 }
 
-/* Subtract the last eliminated columns from those behind, alternating long and short blocks. */
+/* Subtract the products of the last eliminated columns from the columns after them. Long and short
+ * blocks alternate, so that threads get equal work. */
 static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const kernel *k = context;
@@ -112,7 +115,8 @@ static void update_blocks(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Cholesky factorisation with a result that does not depend on the number of threads. */
+/* Factorise K by Cholesky, with a result that does not depend on the number of threads. Return 0,
+ * or LAPACK's code if K is not positive definite. */
 static lapack_int factorise(kernel *k) {
   const size_t n = k->size;
   lapack_int failed = 0;
@@ -131,11 +135,12 @@ static lapack_int factorise(kernel *k) {
   return failed;
 }
 
-/* With P = (1, x, y, z) of the centres, u = -sum of w_j |x - p_j| + P b passes through the values f
- * if K w + P b = f and P' w = 0:
+/* Find the weights. With P = (1, x, y, z) of the centres, u = -sum of w_j |x - p_j| + P b passes
+ * through the values f if K w + P b = f and P' w = 0:
  *
  *     K y = f,    K z = P,    (P' z) b = P' y,    w = y - z b
  *
+ * The weights are stored as -w, then b.
  * @param p  [4, size] column by column, then f [R, size]; overwritten by z and y
  * @retval SUPINE_ERROR_NUMERICAL  K is singular, or P' z, as all centres lie in one plane */
 static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {

@@ -15,14 +15,14 @@
 /** Zero-initialise; supine_inside_biharmonic_free releases what supine_inside_biharmonic_fit
  * allocates. */
 typedef struct supine_inside_biharmonic {
-  size_t count;    /**< centres, M */
-  size_t columns;  /**< R */
-  size_t *chosen;  /**< [M] indices of the centres among the points, in order of choice */
-  double *centres; /**< [M, 3] in units of `unit` about `middle` */
-  double *weights; /**< [R, M + 4]: of the centres, then 1, x, y, z */
-  double middle[3];
-  double unit;    /**< mm */
-  double spacing; /**< largest distance of a centre from its nearest one, mm */
+  size_t count;     /**< number of centres, M */
+  size_t columns;   /**< number of values per point, R */
+  size_t *chosen;   /**< [M] indices of the centres among the points, in order of choice */
+  double *centres;  /**< [M, 3] in units of `unit` about `middle` */
+  double *weights;  /**< [R, M + 4]: those of the centres, then of 1, x, y, z */
+  double middle[3]; /**< centre of the points' box, mm */
+  double unit;      /**< half the diagonal of the points' box, mm */
+  double spacing;   /**< largest distance of a point from the nearest centre, mm */
 } supine_inside_biharmonic;
 
 /** Choose at most `centre_max` of the points, each the farthest from the earlier ones, and fit
@@ -32,8 +32,8 @@ typedef struct supine_inside_biharmonic {
  * @param values  [count, columns]
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY
- * Cost: count M distances to choose; M^3 / 6 multiplications and 4 M^2 bytes for one
- * factorisation. */
+ * Cost: count M distances to choose; M^3 / 6 multiplications for one factorisation in 8 M^2
+ * bytes, of which half are touched. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
                                            const double *values, size_t centre_max,
                                            supine_inside_biharmonic *fit, supine_error *error);
@@ -42,7 +42,7 @@ void supine_inside_biharmonic_free(supine_inside_biharmonic *fit);
 /** Evaluate the interpolation.
  * @param points  [count, 3] mm
  * @param values  [count, columns], written
- * Cost: M square roots and M columns multiplications for each point. */
+ * Cost: M square roots and M R multiplications for each point. */
 void supine_inside_biharmonic_evaluate(const supine_inside_biharmonic *fit, size_t count,
                                        const double *points, double *values);
 

@@ -64,7 +64,8 @@ supine_status supine_inside_content_points(const char *path,
   return status;
 }
 
-/* Find "airways" in "/scans/airways.ply". */
+/* Find the name of a mesh in its path, as "airways" in "/scans/airways.ply"; it is not terminated.
+ */
 static const char *part_name(const char *path, size_t *length) {
   const char *slash = strrchr(path, '/');
   const char *name = slash != NULL ? slash + 1 : path;

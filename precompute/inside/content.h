@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Content that a basis moves: named points, meshes, or the nodes of a grid. */
+/** @file Read the content that a basis moves: named points, meshes, or the nodes of a grid. */
 #ifndef SUPINE_INSIDE_CONTENT_H
 #define SUPINE_INSIDE_CONTENT_H
 
@@ -14,9 +14,9 @@ typedef struct supine_inside_content {
                    * size[1] k) */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] */
-  size_t part_count;   /**< number of names; 0: a grid */
-  char *names;         /**< in order of part, separated by newlines */
-  bool *rigid;         /**< [part_count] parts that keep their shape; NULL: none */
+  size_t part_count;   /**< number of named parts; 0: a grid */
+  char *names;         /**< names of the parts in order, separated by newlines */
+  bool *rigid;         /**< [part_count] whether the part keeps its shape; NULL: none does */
   supine_image grid;   /**< size, origin and step of its nodes */
 } supine_inside_content;
 

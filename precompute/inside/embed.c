@@ -14,22 +14,22 @@
 
 enum { BLOCK = 1024 };
 
-/* The content in the order of the lungs. */
+/* The content sorted by lung, and its motion. */
 typedef struct embedding {
   const supine_inside_shells *shells;
   const supine_inside_content *content;
   const supine_inside_options *options;
-  size_t columns; /* 3 K */
-  supine_inside_place *place;
-  unsigned char *lung;
-  size_t *order;       /* [N] indices of the content's points, lung by lung */
-  float *vertices;     /* [N, 3] in that order, as all below: */
-  float *coefficients; /* [N, 3, K] */
-  float *depth;
-  uint32_t *part;
-  unsigned char *group;
-  uint32_t *triangles; /* [M, 3] */
-  uint32_t *rigid;     /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
+  size_t columns;             /* values per point, 3 K */
+  supine_inside_place *place; /* [N] in the content's order */
+  unsigned char *lung;        /* [N] likewise */
+  size_t *order;              /* [N] indices of the content's points, lung by lung */
+  float *vertices;            /* [N, 3] mm at full inflation, in that order, as all below */
+  float *coefficients;        /* [N, 3, K] */
+  float *depth;               /* [N] mm below the surface */
+  uint32_t *part;             /* [N] */
+  unsigned char *group;       /* [N] lung */
+  uint32_t *triangles;        /* [M, 3] */
+  uint32_t *rigid; /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
   size_t rigid_count;
 } embedding;
 
@@ -137,9 +137,10 @@ static void take_back(embedding *e, size_t lung, size_t begin, size_t end, const
   }
 }
 
-/* Find the motion of points [begin, end) of the order, all of one lung, at most BLOCK. In
- * `space`: positions [2 BLOCK, 3], values [2 BLOCK, R]; the second half holds the nearest
- * surface points of those nearer than `reach`. Eight parameters: one block and its work space. */
+/* Find the motion of points [begin, end) of the order, all of one lung, at most BLOCK. `space`
+ * holds positions [2 BLOCK, 3], values [2 BLOCK, R] and one motion [R]; the nearest surface points
+ * of the points within `reach` follow the points. Eight parameters: one block and its work space.
+ */
 static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
@@ -199,7 +200,7 @@ static void residual(const embedding *e, const supine_inside_shell *shell,
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end, double sums[2],
                                 supine_inside_report *report, supine_error *error) {
-  static const double reach_spacings = 2.0; /* over the centres' spacing: errors fade out in it */
+  static const double reach_spacings = 2.0; /* reach over the centres' spacing plus an edge */
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
@@ -232,8 +233,8 @@ cleanup:
   return status;
 }
 
-/* Find the part at full inflation: its given shape, rotated and shifted so that the field at the
- * scan's weights returns it to the scan. The rotation is iterated, as the field acts on the
+/* Find a rigid part at full inflation: its given shape, rotated and shifted so that the field at
+ * the scan's weights returns it to the scan. The rotation is iterated, as the field acts on the
  * vertices at full inflation. */
 static void take_back_rigid(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
@@ -279,7 +280,7 @@ static bool dropped(const char *key) {
   return false;
 }
 
-/* Write the surface's metadata, then the content's. */
+/* Write the file with the surface's metadata, then the content's. */
 static supine_status write_file(const embedding *e, const char *path, supine_tensor *tensors,
                                 size_t tensor_count, supine_error *error) {
   enum { OWN = 5 };

@@ -6,10 +6,11 @@
  *
  * Near the surface, the residual of the interpolation is added,
  *
- *     u(x) = b(x) + (1 - t)^2 (1 + 2 t) (s(q) - b(q)),    t = |x - q| / depth < 1
+ *     u(x) = b(x) + (1 - t)^2 (1 + 2 t) (s(q) - b(q)),    t = |x - q| / reach < 1
  *
- * with q the surface's point nearest to x and s(q) its motion, linear in its triangle: points on
- * the surface move with it exactly, although only some vertices are centres of b.
+ * with q the surface's point nearest to x, s(q) its motion, linear in its triangle, and reach twice
+ * the sum of the centres' spacing and the mean edge: points on the surface move with it exactly,
+ * although only some vertices are centres of b.
  *
  * A rigid part belongs to the lung with most of its vertices (runtime/rigid.h).
  *
@@ -21,34 +22,34 @@
 #include "precompute/inside/content.h"
 #include "precompute/inside/shells.h"
 
-/** Most vertices of a lung's surface that are centres. On two lungs of 20,000 vertices with a
- * reach of 10 mm the error is 0.2 % of the motion at the other vertices and 0.05 % inside; it
- * takes a few seconds. */
+/** Most centres of one lung, chosen from its vertices. On two lungs of 20,000 vertices with a
+ * spreading length of 10 mm the error is 0.2 % of the motion at the other vertices and 0.05 %
+ * inside; it takes a few seconds. */
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 
 typedef struct supine_inside_options {
   bool clamp;          /**< points outside move as the nearest point of the surface */
-  size_t centres;      /**< 0: SUPINE_INSIDE_CENTRES */
+  size_t centres;      /**< most centres of one lung; 0: SUPINE_INSIDE_CENTRES */
   const char *made_by; /**< for the file's metadata; optional */
 } supine_inside_options;
 
 /** Result of embedding. */
 typedef struct supine_inside_report {
   size_t count;                     /**< points in the file */
-  size_t in_lung[SUPINE_LUNGS_MAX]; /**< of them, in or nearest to each lung */
-  size_t outside;      /**< points outside of every lung; of a grid: nodes of its margin */
+  size_t in_lung[SUPINE_LUNGS_MAX]; /**< points in each lung or nearest to it */
+  size_t outside;                   /**< points outside every lung; for a grid, its outer nodes */
   size_t farthest;     /**< index of the outside point that is farthest from the lungs */
-  double farthest_mm;  /**< its distance */
+  double farthest_mm;  /**< its distance from them, mm */
   size_t rigid;        /**< rigid parts of more than one vertex */
-  size_t centres;      /**< of the interpolation, all lungs */
+  size_t centres;      /**< centres of the interpolation in all lungs */
   size_t surface;      /**< vertices of the lungs with content */
-  double left_percent; /**< RMS residual of the interpolation at them over the RMS motion */
+  double left_percent; /**< RMS residual of the interpolation at them, % of their RMS motion */
 } supine_inside_report;
 
 /** Embed content in the lungs of an open basis, and write its basis file, with these additional
  * tensors
  *
- *     part   U32 [N]  which name a point goes by; of a grid, its node
+ *     part   U32 [N]  index of the point's name; for a grid, its node
  *     depth  F32 [N]  mm below the surface in the scan, negative outside
  *     names  U8 [.]   the parts' names, separated by newlines (not of a grid)
  *     rigid  U32 [R, 2] vertices begin <= i < end of each rigid part (where there is one)

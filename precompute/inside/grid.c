@@ -77,12 +77,12 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
   return SUPINE_OK;
 }
 
-/* The lung of each node, and whether the node is kept. */
+/* Arguments of the pass that classifies the nodes. */
 typedef struct search {
   const supine_inside_shells *shells;
   const supine_image *grid;
-  double limit; /* largest distance outside of nodes that are kept, mm */
-  unsigned char *keep;
+  double limit;        /* largest distance of a kept node from the lungs, mm */
+  unsigned char *keep; /* [nodes] 2 inside a lung, 1 outside within the limit, 0 dropped */
 } search;
 
 static void search_rows(void *context, size_t begin, size_t end, size_t thread) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file A grid of nodes over the lungs, as content. */
+/** @file Make content of a grid of nodes over the lungs. */
 #ifndef SUPINE_INSIDE_GRID_H
 #define SUPINE_INSIDE_GRID_H
 
@@ -11,9 +11,8 @@
  *
  * @param like     gives the axes: nodes are every n-th node of it, within its box. NULL:
  *                 along x, y, z
- * @param spacing  mm between nodes; with `like`, at least about this far
- * @param margin   mm of the grid's box beyond the lungs', without nodes; the field fades out in
- *   it
+ * @param spacing  mm between nodes; with `like`, rounded to a multiple of its spacing, at least 1
+ * @param margin   mm by which the grid's box extends beyond the lungs'; the field fades out there
  * @param content  zero-initialised
  * @retval SUPINE_ERROR_ARGUMENT  a spacing that is not positive, more than 2^31 nodes
  * @retval SUPINE_ERROR_MESH      no node is inside a lung

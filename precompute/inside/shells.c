@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The surfaces of a basis, lung by lung. */
+/* Extract the surfaces of a basis, lung by lung, and find the lung that a point is in. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -124,7 +124,8 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-/* Update the walk's place in one lung for a point. */
+/* Find a point's place in one lung, from the place of the last one; keep that if it is farther than
+ * `far` from the surface on the same side. */
 static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
                     double far, supine_inside_walk *walk) {
   supine_inside_place *place = &walk->place[lung];

@@ -22,31 +22,31 @@ typedef struct supine_inside_shell {
 
 typedef struct supine_inside_shells {
   const supine_basis *basis; /**< owned by the caller; must outlive the shells */
-  size_t count;              /**< lungs, G */
+  size_t count;              /**< number of lungs, G */
   supine_inside_shell shell[SUPINE_LUNGS_MAX];
   supine_pose scan; /**< the scan's state, in which content is given */
 } supine_inside_shells;
 
-/** Move the lungs' surfaces to their state in the scan.
+/** Extract each lung's surface, in its state in the scan.
  * @param shells  written; supine_inside_shells_free releases it
  * @retval SUPINE_ERROR_MESH    a lung without a triangle
  * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface
- * @retval SUPINE_ERROR_NUMERICAL  it cannot reach the scan's volume
+ * @retval SUPINE_ERROR_NUMERICAL  the basis cannot reach the scan's volume
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);
 
-/** Find the displacements of a lung's vertices at weight and scale 1 of each mode.
+/** Find the displacements of a lung's vertices by each of the K modes, at weight 1 and scale 1.
  * @param displacement  [vertex_count, 3, K] mm, written */
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);
 
-/** Successive nearby points: the last place found, by lung. */
+/** State of a search for successive nearby points: the last place found in each lung. */
 typedef struct supine_inside_walk {
   bool known[SUPINE_LUNGS_MAX];
-  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< of an earlier point */
-  size_t lung;                                 /**< the last answer */
+  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< place of an earlier point */
+  size_t lung;                                 /**< lung found for the last point */
 } supine_inside_walk;
 
 /** Find the lung that a point is in, or the nearest lung; walk->place[lung] is its place there.

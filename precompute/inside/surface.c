@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A tree of boxes over triangles: nearest points and winding numbers. */
+/* Find nearest points and winding numbers by a tree of boxes over triangles. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -13,8 +13,8 @@
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
-/* Distance in radii from which a box is a dipole: errs by less than 1 % of the winding number,
- * whose threshold is 50 %. */
+/* Distance, in radii of a box, beyond which a dipole replaces its triangles: the winding number
+ * errs by less than 1 %, and its threshold is 50 %. */
 static const double dipole_distance = 2.0;
 /* Distance, mm, at which a point counts as on the surface, whose positions are float32. */
 static const double on_surface = 1e-3;
@@ -22,7 +22,7 @@ static const double on_surface = 1e-3;
 typedef struct node {
   double low[3], high[3];
   double area, centre[3]; /* centre of area, mm */
-  double dipole[3];       /* sum of the triangles' normals times area */
+  double dipole[3];       /* sum of the triangles' unit normals times their areas, mm^2 */
   double radius;          /* of the box, about the centre */
   uint32_t begin, end;
   uint32_t right; /* second child; the first is the next node; 0: a leaf */
@@ -228,19 +228,19 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   }
 }
 
-/* Find the weight of the second point in the point nearest to the first's origin on their
- * segment: -w.e / e.e, clamped to 0 to 1. */
+/* Find the parameter of an edge's nearest point to x, 0 at its start and 1 at its end; `offset`
+ * leads from its start to x. */
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
   const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
   return t > 1.0 ? 1.0 : t > 0.0 ? t : 0.0;
 }
 
-/* Find the barycentric coordinates of the triangle's point nearest to x; false if a bound of its
- * squared distance, by the plane or an edge's line, exceeds `best`. */
+/* Find the barycentric coordinates of the triangle's point nearest to x; false if a lower
+ * bound of its squared distance, from the plane and an edge's line, exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  static const double slender = 1e-4; /* triangles with inexact coordinates */
+  static const double slender = 1e-4; /* below it, coordinates are too inexact for the bound */
   double u[3];
   double v[3];
   double w[3];
@@ -260,9 +260,9 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
     return true;
   }
   const double ww = supine_dot(w, w);
-  const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu};             /* squared edges */
-  const double rest = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw); /* of the distance, in the
-                                                                        * plane */
+  const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu}; /* squared edges */
+  /* bound on the squared distance within the plane */
+  const double rest = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
     farther |= b[k] < 0.0 && b[k] * b[k] * determinant > rest * opposite[k];
@@ -309,7 +309,7 @@ static double box_square(const node *n, const double x[3]) {
   return square;
 }
 
-/* Find the squared distances of the boxes of a leaf's triangles. */
+/* Find the squared distances of x from the boxes of a leaf's triangles. */
 SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], double *square) {
   for (size_t i = 0; i < LEAF; ++i) {
     square[i] = gap_square((double)leaf->low[0][i], (double)leaf->high[0][i], x[0]) +
@@ -318,7 +318,7 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
   }
 }
 
-/* Search below node `at` for a triangle nearer than the square *best. */
+/* Search below node `at` for a triangle whose squared distance is below *best. */
 static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];
@@ -371,7 +371,7 @@ static void search(const supine_inside_surface *s, size_t at, const double x[3],
   }
 }
 
-/* Find the solid angle of a triangle, 4 pi for a whole sphere. */
+/* Find the solid angle of a triangle seen from x; a whole sphere has 4 pi. */
 static double solid_angle(const double *const p[3], const double x[3]) {
   double a[3];
   double b[3];
@@ -452,7 +452,7 @@ void supine_inside_surface_distances(const supine_inside_surface *surface, size_
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
                                                const double point[3],
                                                const supine_inside_place *near) {
-  static const double half = 6.283185307179586; /* of 4 pi */
+  static const double half = 6.283185307179586; /* half of 4 pi */
   supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)

@@ -10,13 +10,13 @@
 
 typedef struct supine_inside_surface supine_inside_surface;
 
-/** The place of a point. */
+/** The place of a point relative to a surface. */
 typedef struct supine_inside_place {
   double point[3];       /**< the point, mm */
   double depth;          /**< mm to the surface; positive inside, negative outside */
   double nearest[3];     /**< the surface's nearest point, mm */
-  size_t triangle;       /**< its triangle */
-  double barycentric[3]; /**< its coordinates in the triangle */
+  size_t triangle;       /**< triangle of the nearest point */
+  double barycentric[3]; /**< barycentric coordinates of the nearest point in it */
 } supine_inside_place;
 
 /** Build a tree of boxes over the triangles.
@@ -26,10 +26,10 @@ typedef struct supine_inside_place {
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles,
                                            supine_inside_surface **surface, supine_error *error);
-/** NULL is legal. */
+/** Free the tree; NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
-/** Find the nearest point; depth is positive on both sides. Thread-safe.
+/** Find the surface's nearest point; depth is positive on both sides. Thread-safe.
  * @param near  the place of a nearby point, to save work; NULL: none */
 supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
                                                   const double point[3],
@@ -40,8 +40,8 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
 void supine_inside_surface_distances(const supine_inside_surface *surface, size_t count,
                                      const double *points, double *distance, double *nearest);
 
-/** Find the nearest point, and the side by the generalised winding number, which tolerates small
- * holes: inside if
+/** Find the surface's nearest point, and the side by the generalised winding number, which
+ * tolerates small holes: inside if
  *
  *     (1 / 4 pi) sum over triangles of their solid angle seen from the point > 1/2
  *
