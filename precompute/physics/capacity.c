@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volume at full inflation, and warnings about an implausible scan state. */
+/* Estimate the volume at full inflation, and warn of an implausible scan state. */
 #include <math.h>
 #include <stdio.h>
 
@@ -8,8 +8,8 @@
 
 static const double tissue = 860.0; /* of both lungs, mL */
 
-/* Least share of the expected full volume, and least and largest volumes of an adult: outside,
- * the stated scan state is doubtful. */
+/* Smallest share of the expected full volume, and smallest and largest full volume of an adult, mL:
+ * beyond these limits the stated scan state is doubtful. */
 static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
@@ -56,7 +56,7 @@ void supine_reference_compare(const supine_reference *reference, const supine_pe
 }
 
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
-                            const supine_resting *told, char *text, size_t size) {
+                            const supine_resting *given, char *text, size_t size) {
   const supine_state *state = &reference->scan.state;
   const double part = part_of_pair(reference);
   double range[2];
@@ -72,8 +72,8 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
   }
   for (size_t axis = 0; axis < 6 && state->volume.kind == SUPINE_VOLUME_REST; ++axis) {
     const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
-    const double ml = told->ml[axis] + state->volume.ml;
-    if (along > 1.0 - 1e-9 && told->ml[axis] > 0.0 && fabs(held - ml) > contradicts * ml) {
+    const double ml = given->ml[axis] + state->volume.ml;
+    if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > contradicts * ml) {
       supine_text_add(
           text, size,
           "the scan holds %.0f mL, but --resting and --scanned say %.0f mL: change one of them",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volumes at rest and full as functions of gravity. */
+/* Compute volumes at rest and at full inflation as functions of gravity. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,25 +10,26 @@
 #include "precompute/physics/resting.h"
 #include "sh/base/csv.h"
 
-/* Where the shares come from, tissue included (gas + tissue over full gas + tissue, supine). Totals
- * first, then the left and the right lung:
+/* Sources of the shares, tissue included (gas + tissue over full gas + tissue, supine). Shares of
+ * both lungs together:
  *
  *   supine   functional residual capacity 3.39 L of 7.21 L upright (GLI 2021, Hall et al., Eur
  *            Respir J 57: 2000289, man of 45 years and 1.78 m), 0.86 L of tissue (Denison 1986,
  *            Thorax 41:620, n 12), less 0.806 L (SD 0.293; Lumb & Nimmo 1991, Anesth Analg 73:422,
  *            n 13): 0.43
- *   prone, on either side  0.35 L above supine (Lumb & Nimmo; not told apart): 0.47
+ *   prone, on either side  0.35 L above supine (Lumb & Nimmo; one figure for all three): 0.47
  *   upright  15 % above supine (Yamada 2020, Sci Rep 10, n 100: 3.2 L seated, 2.7 L supine)
  *   head down  no volume in litres was found; end-expiratory volume follows the sine of a tilt feet
  *            down and is at or near its least when horizontal ("Effects of body tilting on
  *            respiratory mechanics", J Appl Physiol 1956): as supine
  *
- * The lungs' proportions are those tabled after Svanberg 1957. The left lung's 0.563 on the right
- * side follows from the lower lung's part of a breath there; no other check of it was found. */
+ * They are divided between the lungs in the proportions tabulated after Svanberg 1957. The left
+ * lung's 0.563 when lying on the right follows from the lower lung's part of a breath in that
+ * posture; no other check of it was found. */
 static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
                                                {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
 
-static const double least_share = 0.1; /* tissue alone */
+static const double least_share = 0.1; /* of tissue without gas */
 static const double most_share = 1.0;
 
 /* Left lung's share of both lungs' full volume, to split a value given for both. */
@@ -42,7 +43,8 @@ static bool is_share(double share) {
   return share > least_share && share <= most_share;
 }
 
-/* Read "0.43", "0.42/0.44" or "2600mL" for the axis. */
+/* Read "0.43", "0.42/0.44" or "2600mL" for the axis; return false if the text is none of them or
+ * out of range. */
 static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   char *end = NULL;
   const double first = strtod(text, &end);
@@ -77,16 +79,17 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
   supine_resting set = *resting;
   if (supine_posture_gravity(posture, g) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "no posture '%s' to rest in; did you mean '%s'?", posture,
-                            supine_posture_nearest(posture));
+                            "a volume at rest for '%s', which is no posture; did you mean '%s'?",
+                            posture, supine_posture_nearest(posture));
   }
   for (size_t k = 0; k < 3; ++k) { /* named postures lie along the axes */
     if (g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value)) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "%s at rest: '%s' is neither a share of the full volume above %g and "
-                              "at most %g (0.43; left and right lung 0.42/0.44) nor a volume as CT "
-                              "shows it (2600mL)",
-                              posture, value, least_share, most_share);
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT,
+          "%s at rest: '%s' is neither a share of the full volume above %g and "
+          "at most %g (0.43; left and right lung 0.42/0.44) nor a volume of gas "
+          "and tissue (2600mL): give one of them",
+          posture, value, least_share, most_share);
     }
   }
   *resting = set;
@@ -125,7 +128,7 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
                                               const int *side, const double *full,
                                               supine_error *error) {
   double sum = 0.0;
-  size_t told = 0;
+  size_t known = 0;
   double factor[6];
   for (size_t axis = 0; axis < 6; ++axis) {
     double rest = 0.0;
@@ -134,21 +137,21 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
     }
     factor[axis] = resting->ml[axis] / rest;
     sum += factor[axis];
-    told += resting->ml[axis] > 0.0;
+    known += resting->ml[axis] > 0.0;
   }
-  for (size_t axis = 0; axis < 6 && told > 0; ++axis) {
+  for (size_t axis = 0; axis < 6 && known > 0; ++axis) {
     for (size_t k = 0; k < 2; ++k) {
       double *share = &resting->share[k][axis];
       if (resting->ml[axis] > 0.0) {
         *share *= factor[axis];
       } else if (*share == usual.share[k][axis]) {
-        *share = fmin(*share * sum / (double)told, most_share);
+        *share = fmin(*share * sum / (double)known, most_share);
       }
     }
     if (!is_share(resting->share[0][axis]) || !is_share(resting->share[1][axis])) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "lungs whose full volume is %.0f mL do not hold %.0f mL at rest: "
-                              "change --resting, or what --scanned says of the scan",
+                              "change --resting or --scanned",
                               full[0] + (count > 1 ? full[1] : 0.0), resting->ml[axis]);
     }
     resting->ml[axis] = 0.0;

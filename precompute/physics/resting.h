@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Volume at rest and at full inflation, by posture and by lung.
+ * Volumes at rest and at full inflation, by posture and by lung.
  *
  * At rest lung l holds the share r_l(g) of its reference volume F_l, tissue included. Full
  * inflation is larger upright, phi(g) = 1 + 0.109 max(0, -g_z)^2. Between them each lung fills on a
@@ -16,18 +16,18 @@
 
 #include <supine/status.h>
 
-/** What full inflation gains upright over supine, as a share: both lungs, 32 people; the left lung
- * 0.116, the right 0.103 (Yamada et al., Respiration 99:598, 2020). */
+/** Volume that full inflation gains from supine to upright, as a share: mean of both lungs of 32
+ * people; the left lung gains 0.116, the right 0.103 (Yamada et al., Respiration 99:598, 2020). */
 #define SUPINE_FULL_UPRIGHT_GAIN 0.109
 
 /** Volumes at rest with gravity along +x, -x, +y, -y, +z, -z: lying on the left, on the right,
  * supine, prone, head down, upright. */
 typedef struct supine_resting {
   double share[2][6]; /**< r of the left and the right lung */
-  double ml[6];       /**< what the lungs hold together, mL, where that is known; 0: by share */
+  double ml[6];       /**< volume of both lungs together, mL, where it was given; 0: by share */
 } supine_resting;
 
-/** The starting values, of healthy people; resting.c has their sources. */
+/** Return the default shares, those of healthy people; resting.c has their sources. */
 supine_resting supine_reference_resting_default(void);
 
 /** Set the volume at rest in a posture along an axis ("prone", ...; posture.h).
@@ -37,7 +37,7 @@ supine_resting supine_reference_resting_default(void);
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
 
-/** Set those that a CSV file with the columns posture,share has.
+/** Set the volumes at rest in the postures of a CSV file with the columns posture,share.
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_ARGUMENT (line named) */
 supine_status supine_reference_resting_load(const char *path, supine_resting *resting,
                                             supine_error *error);
@@ -46,29 +46,31 @@ supine_status supine_reference_resting_load(const char *path, supine_resting *re
  * 256 characters are enough. */
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);
 
-/** Turn volumes in mL into shares of reference volumes. Where there are any, postures that were
- * left at their default keep their proportion to them.
- * @param side  [count] +1 left, -1 right
+/** Convert volumes in mL into shares of the reference volumes. If any posture was given in mL, the
+ * default shares of the other postures are scaled by the same mean factor.
+ * @param side  [count] of the lungs: +1 left, -1 right
  * @param full  [count] F, mL
- * @retval SUPINE_ERROR_ARGUMENT  a volume that is none of such lungs at rest */
+ * @retval SUPINE_ERROR_ARGUMENT  a share out of range: less than the tissue alone, or above 1 */
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error);
 
-/** Shares along unit gravity g: r of a lung (side +1 left, -1 right), and phi. */
+/** Compute r of one lung (side +1 left, -1 right) with gravity along the unit vector g. */
 double supine_reference_resting_share(const supine_resting *resting, int side, const double g[3]);
+
+/** Compute phi with gravity along the unit vector g. */
 double supine_reference_full_share(const double g[3]);
 
-/** r of both lungs together, of usual size. */
+/** Compute r of both lungs together, for lungs of usual size: the left one holds 45 %. */
 double supine_reference_resting_total(const supine_resting *resting, const double g[3]);
 
-/** The function of bands 0, 1 and the two diagonal ones of band 2 that has these values along the
- * axes, at unit gravity `g`:
+/** Interpolate six values along the axes +x, -x, +y, -y, +z, -z at unit gravity g, by a function of
+ * bands 0 and 1 and the two diagonal harmonics of band 2:
  *
  *     sum over k of (v(+k) - v(-k)) / 2 g_k + (v(+k) + v(-k)) / 2 g_k^2 */
 double supine_reference_along_axes(const double values[6], const double g[3]);
 
-/** The same as coefficients of real harmonics [9] (sh.h). */
+/** Compute the coefficients [9] of the same function in real harmonics (sh.h). */
 void supine_reference_harmonics(const double values[6], double harmonics[9]);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Linear, quadratic and cubic forms of the volume that closed lungs gain. */
+/* Compute linear, quadratic and cubic forms of the volume that closed lungs gain. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,10 +9,11 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* Each lung's triangles are summed in PARTS, whatever the number of threads, BLOCK at a time. */
+/* Each lung's triangles are summed in PARTS, BLOCK at a time; the number of parts is fixed, so that
+ * the sum does not depend on the number of threads. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double sixth_ml = 1e-3 / 6.0; /* of a cubic millimetre */
+static const double sixth_ml = 1e-3 / 6.0; /* mL of a tetrahedron per mm^3 of its determinant */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
@@ -37,13 +38,13 @@ static supine_status forms_allocate(size_t lungs, size_t count, supine_volume_fo
 typedef struct lung_work {
   const supine_lungs *lungs;
   const double *directions; /* [N, 3]; NULL: columns are vectors */
-  const double *columns;    /* [N, K], [N, 3, K] */
+  const double *columns;    /* [N, K]; without directions [N, 3, K] */
   size_t count;             /* K */
   size_t lung;
-  double centre[3];
-  double *sums; /* [PARTS, size] */
-  size_t size;
-  double *space; /* of each thread */
+  double centre[3]; /* of the lungs' box, mm: origin of the corners */
+  double *sums;     /* [PARTS, size] */
+  size_t size;      /* sums of one part */
+  double *space;    /* [threads, room] work space */
   size_t room;
 } lung_work;
 
@@ -76,12 +77,12 @@ static size_t part_begin(const lung_work *work, size_t part) {
 
 /* --- forms of columns ------------------------------------------------------------------------ */
 
-/* Place of the symmetric product of columns k and l. */
+/* Find the index of the symmetric product of columns k and l. */
 static size_t pair_of(size_t k, size_t l) {
   return k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
 }
 
-/* pairs += factor (a_k b_l + a_l b_k), k >= l. */
+/* Compute pairs += factor (a_k b_l + a_l b_k) for k >= l. */
 static void add_pairs(size_t count, double factor, const double *a, const double *b,
                       double *pairs) {
   for (size_t k = 0; k < count; ++k) {
@@ -93,8 +94,8 @@ static void add_pairs(size_t count, double factor, const double *a, const double
   }
 }
 
-/* Add the cubic terms of a block: det(u0, u1, u2), symmetric in the first two columns. Where one
- * direction moves a vertex, that is det(d0, d1, d2) c0 c1 c2. */
+/* Add the cubic terms of a block: det(u0, u1, u2), symmetric in the first two columns. With
+ * directions it is det(d0, d1, d2) c0 c1 c2. */
 SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
                                     double *x, double *sums) {
   const size_t count = work->count;
@@ -127,8 +128,9 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
   }
 }
 
-/* Add up to BLOCK triangles: det(p0 + u0, p1 + u1, p2 + u2) by powers of u and by axis, linear by
- * that of u, quadratic by that of p. Rows of u, area and at are corner by corner. */
+/* Add the terms of det(p0 + u0, p1 + u1, p2 + u2) of up to BLOCK triangles, apart by power of u and
+ * by axis: linear terms by the axis of u, quadratic terms by the axis of p. The rows of u, area and
+ * at are the n first corners, then the n second, then the n third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;
@@ -190,7 +192,7 @@ static void forms_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Sum the parts and make the forms symmetric. */
+/* Sum the parts, times `unit`, into one lung's forms and make these symmetric. */
 static void forms_collect(const lung_work *work, double unit, supine_volume_forms *forms) {
   const size_t n = work->count;
   double *linear = forms->linear + 3 * work->lung * n;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Volume of a deformed lung without a pass over its vertices.
+ * Compute the volume of a deformed lung without a pass over its vertices.
  *
  * With u_ij = A_j (sum over k of w_k c_ik) d_ij, the volume that a closed surface gains is a
- * polynomial of the gains A and the weights w (supine/volume.h). Its forms are computed for any set
- * of columns c, once, and follow them through any linear mix. */
+ * polynomial of the gains A and the weights w (supine/volume.h). Its forms are computed
+ * once for a set of K columns c and hold for all weights. */
 #ifndef SUPINE_VOLUME_FORMS_H
 #define SUPINE_VOLUME_FORMS_H
 
@@ -12,10 +12,10 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** Most functions of orientation that a basis is made with. */
+/** Largest number of functions of orientation in a basis that this program makes. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
 
-/** The forms of each lung for K columns, mL. */
+/** The forms of each of G lungs for K columns, mL. */
 typedef struct supine_volume_forms {
   size_t lung_count;
   size_t column_count;
@@ -26,22 +26,24 @@ typedef struct supine_volume_forms {
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
-/** Find the forms of closed lungs.
- * @param share       [G] of each lung's healthy volume (disease.h); NULL: 1
+/** Find the forms of closed lungs. The caller frees them with supine_physics_volume_forms_free.
+ * @param share       [G] each lung's share of its healthy volume (disease.h); NULL: 1
  * @param directions  [N, 3] d of the healthy shape, mm; NULL: the columns are vectors,
  *                    u_ij = A_j sum over k of w_k c_ijk
  * @param columns     [N, count] c, or [N, 3, count]
- * Cost: 3 count^3 / 2 multiplications a triangle. Uses all cores.
+ * Cost: count^3 / 2 multiplications per triangle, three times as many without directions. Uses all
+ * cores.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error);
 
-/** Most fields of supine_physics_volume_of_fields. */
+/** Largest count of supine_physics_volume_of_fields. */
 enum { SUPINE_VOLUME_FIELDS = 16 };
 
-/** Find the forms of closed lungs for each of some fields u_ij = A_j f_i d_ij alone.
+/** Find the forms of closed lungs for each of `count` fields u_ij = A_j f_i d_ij, at most
+ * SUPINE_VOLUME_FIELDS. `share` and `directions` as above.
  * @param fields  [N, count] f
  * @param forms   [G, count] */
 void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *share,
@@ -57,7 +59,7 @@ void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms,
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
-/** Add one lung's coefficients of that polynomial. */
+/** Add the coefficients [3] of that polynomial for one lung to `cubic`. */
 void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]);
 
 #endif
