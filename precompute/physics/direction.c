@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The direction of displacement (15)-(17), or one vector a vertex from a file. */
+/* Compute the directions of displacement (15)-(17), or read one vector for each vertex. */
 #include <math.h>
 #include <string.h>
 
@@ -40,7 +40,8 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
     }
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "no vertex would move: every direction is zero");
+                          "no vertex would move, as every direction is zero: change the direction "
+                          "constants or vectors");
 }
 
 supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
@@ -53,9 +54,11 @@ supine_status supine_physics_directions_load(const char *path, size_t count, dou
   while (status == SUPINE_OK && more) {
     status = supine_csv_next(&csv, &more, error);
     if (status == SUPINE_OK && more && rows == count) {
-      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s:%zu: more rows than the model has vertices (%zu)", path,
-                                csv.line, count);
+      status =
+          supine_error_set(error, SUPINE_ERROR_FORMAT,
+                           "%s:%zu: more rows than the model has vertices (%zu): give one row for "
+                           "each vertex",
+                           path, csv.line, count);
     }
     for (size_t k = 0; k < 3 && status == SUPINE_OK && more; ++k) {
       status = supine_csv_number(&csv, k, columns[k], vectors + 3 * rows + k, error);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equilibrium of (5), (8), (12)-(14): eliminate the springs, make the matrix symmetric, and
- * factorise it with CHOLMOD. */
+/* Solve for the equilibrium of (5), (8), (12)-(14): eliminate the springs, make the matrix
+ * symmetric, and factorise it with CHOLMOD. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,18 +22,19 @@
 
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
-/* Right-hand sides that are solved together: bounds the work space. */
+/* Number of right-hand sides that are solved together; it bounds the work space. */
 enum { TOGETHER = 8 };
 
-/* Largest relative residual of a solve; double precision reaches some 1e-16 (R / link)^2. */
+/* Largest relative residual of a solve; double precision reaches about 1e-16 (R / h)^2, h the
+ * length of a link. */
 static const double residual_limit = 1e-8;
 
-/* Vertices and edges that no edge links to others, as those of one lung: solved in a thread each.
- */
+/* A part of the mesh that no edge links to the rest, such as one lung. Each part is solved in its
+ * own thread. */
 typedef struct part {
-  size_t vertex, vertex_count; /* the first, and their number */
+  size_t vertex, vertex_count; /* index of the first vertex, and their number */
   size_t edge, edge_count;
-  bool factorised; /* `factor` is that of `matrix` */
+  bool factorised; /* `factor` matches the values of `matrix` */
   cholmod_sparse
       *matrix; /* lower half: column i holds the diagonal and the edges that begin in i */
   cholmod_factor *factor;
@@ -45,10 +46,10 @@ struct supine_equilibrium {
   const supine_topology *topology;
   double reach;    /* mm */
   double *area;    /* [N] area of a vertex over the mean; NULL: the paper's springs */
-  double *link;    /* [edges] with a reach w / 2, without D(mass, spring) in mm */
+  double *link;    /* [edges] with a reach: w / 2; without: D(mass, spring) in mm */
   double *lesions; /* [N] factors on the normalised stiffness */
-  double *give;    /* [N] S of the operator; with a reach 1 */
-  double *load;    /* [N] factor of a force on the right side: 1; with a reach area / E */
+  double *give;    /* [N] S of the matrix: a = 1/E; with a reach: 1 */
+  double *load;    /* [N] right-hand side per unit force: 1; with a reach: area / E */
   size_t part_count;
   part parts[2];
 };
@@ -98,11 +99,12 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
   return SUPINE_OK;
 }
 
-/* Split the vertices where no edge passes, as near to the middle as possible. */
+/* Split the vertices in two between indices that no edge spans, as near to the middle as possible;
+ * one part if there is no such place. */
 static void split(supine_equilibrium *eq) {
   const size_t n = eq->vertex_count;
   const supine_topology *topology = eq->topology;
-  size_t last = 0; /* linked to a vertex before */
+  size_t last = 0; /* highest index that an edge links to a vertex before i */
   part *first = &eq->parts[0];
   *first = (part){.vertex_count = n, .edge_count = topology->edge_count};
   for (size_t i = 1, e = 0; i < n; ++i) {
@@ -159,7 +161,7 @@ static bool create_matrices(supine_equilibrium *eq) {
   return made;
 }
 
-/* Index of the edge between two vertices of a triangle. */
+/* Find the index of the edge between two vertices of a triangle. */
 static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   const uint32_t first = a < b ? a : b;
   const part *p = &eq->parts[first < eq->parts[0].vertex_count ? 0 : 1];
@@ -171,14 +173,14 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   return e;
 }
 
-/* Compute areas and conductances of a reach.
+/* Compute vertex areas and link weights for a reach.
  *
  * The system of equilibrium.h with a reach is (1 - R^2 Laplacian) F = a f in the weak form on the
  * surface, where area_i is the vertex's area A_i over the mean area A and w = 2 R^2 c / A, with
- * link coefficients c that make sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. Of a
- * link's own area a (a third of its triangles') and length h, c = 2 a / h^2 does so for links that
- * run in all directions alike; unlike cotangents it is never negative, whatever the triangles, at
- * the price of R^2 within a tenth or so. */
+ * link coefficients c that make sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. With
+ * the link's area a (a third of its triangles' area) and length h, c = 2 a / h^2 does so if links
+ * run equally in all directions. Unlike cotangent weights it is never negative, whatever the
+ * triangles, but R^2 is then accurate only to about a tenth. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
@@ -187,7 +189,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* Neither a vertex's weight nor a link's may vanish. */
+  /* mm^2; degenerate triangles must not give a vertex or a link the weight 0 */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
@@ -196,7 +198,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
     double edge[2][3];
-    double normal[3]; /* twice the triangle's area long */
+    double normal[3]; /* its length is twice the triangle's area */
     for (size_t k = 0; k < 3; ++k) {
       edge[0][k] = p[3 * (size_t)corner[1] + k] - p[3 * (size_t)corner[0] + k];
       edge[1][k] = p[3 * (size_t)corner[2] + k] - p[3 * (size_t)corner[0] + k];
@@ -315,17 +317,17 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
   return supine_physics_equilibrium_set_stiffness(eq, stiffness, error);
 }
 
-/* One solve of all right-hand sides. */
+/* One solve for all right-hand sides. */
 typedef struct solve {
   supine_equilibrium *eq;
   size_t count;
   const double *force; /* [N, count] */
   double *catch_;      /* [N, count] */
   supine_status status[2];
-  double residual[2]; /* largest of a part */
+  double residual[2]; /* largest relative residual of each part */
 } solve;
 
-/* Factorise the matrix of a part unless it is done. */
+/* Factorise the matrix of a part unless its factor is current. */
 static supine_status factorise(part *p) {
   if (!p->factorised) {
     if (p->factor == NULL) {
@@ -342,7 +344,8 @@ static supine_status factorise(part *p) {
   return SUPINE_OK;
 }
 
-/* Solve a part for right-hand sides r to r + count - 1 and raise its residual to theirs. */
+/* Solve a part for right-hand sides r to r + count - 1, and raise the part's residual to the
+ * largest of theirs. */
 static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   part *p = &s->eq->parts[k];
   const size_t n = p->vertex_count;

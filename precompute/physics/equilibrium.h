@@ -43,7 +43,7 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** The matrix of one surface and its factor. Not thread-safe. */
+/** The matrix of one surface and its Cholesky factor. Not thread-safe. */
 typedef struct supine_equilibrium supine_equilibrium;
 
 /** Assemble the matrix of a surface with a stiffness of 1 everywhere.
@@ -51,6 +51,7 @@ typedef struct supine_equilibrium supine_equilibrium;
  * @param topology  its edges; must outlive the equilibrium
  * @param reach     R in mm; 0: the paper's springs
  * @param lesions   [N] factors on the normalised stiffness, copied; NULL: 1
+ * @param equilibrium  written; release with supine_physics_equilibrium_destroy
  * @retval SUPINE_ERROR_MEMORY
  * @retval SUPINE_ERROR_UNSUPPORTED  CHOLMOD is not installed */
 supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
@@ -60,8 +61,8 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 supine_error *error);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
-/** Set vertices that have moved, the reach (above 0 if it was) and the stiffness: faster than
- * another equilibrium. Parameters and statuses as supine_physics_equilibrium_set_stiffness */
+/** Set moved vertices, the reach (above 0 if it was at creation, else 0) and the stiffness: faster
+ * than to create another equilibrium. Statuses as supine_physics_equilibrium_set_stiffness. */
 supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibrium,
                                                    const supine_mesh *mesh, double reach,
                                                    const double *stiffness, supine_error *error);
@@ -73,19 +74,20 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
                                                        const double *stiffness,
                                                        supine_error *error);
 
-/** Solve for the catch F of `count` applied forces. The first solve factorises the matrix, in
- * about 30 N log2 N bytes.
+/** Solve for the catch F of `count` applied forces. The first solve factorises the matrix
+ * and allocates about 30 N log2 N bytes for it.
  * @param force     [N, count] f on the masses (nothing is applied to springs)
  * @param catch_    [N, count] F, written
- * @param residual  the largest of |b - A t| / |b|, b = area a f; NULL: not wanted
+ * @param residual  the largest |b - A t| / |b| of any force, with b = area a f with a reach, b = f
+ *                  without; NULL: not wanted
  * @retval SUPINE_ERROR_MEMORY
  * @retval SUPINE_ERROR_NUMERICAL  a residual above 1e-8, or a force that is not finite */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                                const double *force, double *catch_,
                                                double *residual, supine_error *error);
 
-/** Find the force f [N] whose equilibrium is the catch F [N]: f = A t / (area a) ([Santhanam2008]
- * IV-B.3).
+/** Find the force f [N] whose equilibrium is the catch F [N]: f = A t / (area a) with a reach,
+ * f = A t without ([Santhanam2008] IV-B.3).
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
                                                const double *catch_, double *force,
@@ -105,9 +107,10 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
  * @param force      [N]
  * @param masses     [N] F of the masses, written
  * @param springs    [edge_count] F of the springs, written; NULL: not wanted
- * @param progress   called after every N distributions with their number and the sum still held
- *   relative to the sum of |f|; NULL: not wanted
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY */
+ * @param progress   called at the beginning and after every N distributions, with their number and
+ *   the sum of what nodes still hold, |held|, relative to the sum of |f|; NULL: not wanted
+ * @retval SUPINE_ERROR_ARGUMENT  no vertices, a tolerance or a stiffness that is not positive
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_pitcher_catcher(
     const supine_mesh *mesh, const supine_topology *topology, const double *stiffness,
     const double *force, double tolerance, double *masses, double *springs,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The applied force (18) for any direction of gravity. */
+/* Compute the applied force (18) for any direction of gravity. */
 #include <math.h>
 #include <stddef.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file The force that gravity and breath apply to the mass nodes, (18) for any orientation,
- * and the direction that they move in, (15)-(17).
+ * and the direction in which these move, (15)-(17).
  *
  *     h_i(g) = (g.p_i - min_j g.p_j) / (max_j g.p_j - min_j g.p_j)      1 where most dependent
  *     f_i(g) = (base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i) exp(soften (h_i(g) - mean h(g)))
@@ -13,14 +13,14 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** Constants of the law. */
+/** Constants of the force f, without unit. */
 typedef struct supine_force_law {
   double base;
-  double gain;   /**< the part that turns with gravity */
+  double gain;   /**< factor of the height h: the gravity-dependent part */
   double box[3]; /**< cx, cy, cz: fixed to the body */
   double soften; /**< softening of dependent tissue; needs a reach (model.h) */
-  bool pair;     /**< true: a single lung gets the heights of the pair with its mirror image in
-                  * the midline, so that it moves as beside the other lung; false: its own */
+  bool pair;     /**< true: heights of a single lung are those of a pair, the lung and its mirror
+                  * image in the midline, so that it moves as if beside the other lung */
 } supine_force_law;
 
 /** Find the smallest and largest g.p over all vertices, in mm, for each of `count` directions g
@@ -50,14 +50,14 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
  * caller's own. */
 typedef struct supine_direction_law {
   double c[6];           /**< c1 to c6 (model.h) */
-  const double *vectors; /**< [N, 3] mm, instead; NULL: none; owned by the caller */
+  const double *vectors; /**< [N, 3] mm, used instead of c; NULL: c; owned by the caller */
   /** Correct the directions [N, 3] of one person's lungs in place; NULL: no correction. */
   void (*correct)(const void *context, const supine_lungs *lungs, double *directions);
   const void *context; /**< argument of `correct`; owned by the caller */
 } supine_direction_law;
 
-/** Read vectors of directions: CSV with the columns dx,dy,dz, mm, a row for each of `count`
- * vertices in the model's order, into vectors [count, 3].
+/** Read directions into vectors [count, 3] from a CSV file with the columns dx,dy,dz, in mm, and a
+ * row for each of `count` vertices in the model's order.
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (line named), SUPINE_ERROR_MEMORY */
 supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
                                              supine_error *error);

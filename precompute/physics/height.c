@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Extent of the lungs along many directions: the min and max of the heights in (18). */
+/* Find the extent of the lungs along many directions: the min and max of the heights in (18). */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -11,9 +11,9 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* Vertices stand in blocks of neighbours with bounding boxes, and blocks in groups, so that few of
- * them can hold an extreme: sorted along a curve through 32 x 32 x 32 cells (Morton 1966). LANES
- * directions are searched together. */
+/* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells, cut into blocks of
+ * neighbours, and blocks into groups. Each block and group has a bounding box, so that most of them
+ * are skipped. LANES directions are searched together. */
 enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS), LANES = 8 };
 
 typedef struct block_box {
@@ -25,15 +25,15 @@ typedef struct range_work {
   size_t count;            /* vertices */
   const double *vertices;  /* [count, 3] sorted */
   const block_box *boxes;  /* [box_count] */
-  const block_box *groups; /* of GROUP boxes each */
+  const block_box *groups; /* bounding boxes of GROUP blocks each */
   size_t box_count;
   size_t direction_count;
   const double *directions;
   double *minimum, *maximum;
 } range_work;
 
-/* Directions side by side, the absolute values of their components, and the greatest height along
- * each so far. */
+/* LANES directions, the absolute values of their components, and the greatest height along each so
+ * far, mm. */
 typedef struct lanes {
   double g[3][LANES];
   double size[3][LANES];
@@ -60,7 +60,7 @@ static block_box box_of(const double *vertices, size_t count) {
 static inline bool rises(const block_box *box, const lanes *at) {
   const block_box b = *box;
   int64_t any = 0;
-#pragma GCC unroll 1 /* else it is taken apart before it is made a vector */
+#pragma GCC unroll 1 /* full unrolling would prevent vectorisation */
   for (size_t l = 0; l < LANES; ++l) {
     const double bound = at->g[0][l] * b.centre[0] + at->size[0][l] * b.half[0] +
                          at->g[1][l] * b.centre[1] + at->size[1][l] * b.half[1] +
@@ -70,14 +70,14 @@ static inline bool rises(const block_box *box, const lanes *at) {
   return any != 0;
 }
 
-/* Raise the lanes' best to the vertices of a block. */
+/* Raise the best height of each lane to that of a block's vertices. */
 static inline void look_into(const range_work *work, size_t block, lanes *at) {
   const size_t end = (block + 1) * BLOCK < work->count ? (block + 1) * BLOCK : work->count;
   for (size_t i = block * BLOCK; i < end; ++i) {
     const double x = work->vertices[3 * i];
     const double y = work->vertices[3 * i + 1];
     const double z = work->vertices[3 * i + 2];
-#pragma GCC unroll 1 /* likewise */
+#pragma GCC unroll 1 /* as above */
     for (size_t l = 0; l < LANES; ++l) {
       const double h = at->g[0][l] * x + at->g[1][l] * y + at->g[2][l] * z;
       at->best[l] = h > at->best[l] ? h : at->best[l];
@@ -85,7 +85,8 @@ static inline void look_into(const range_work *work, size_t block, lanes *at) {
   }
 }
 
-/* Find the greatest heights, beginning in block `seed`; return a block that was looked into. */
+/* Find the greatest heights, beginning in block `seed`; return the last block that was searched, as
+ * the seed for the next directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
   look_into(work, seed, at);
   for (size_t first = 0; first < work->box_count; first += GROUP) {
@@ -139,7 +140,8 @@ static size_t cell_of(const block_box *box, const double *p) {
   return cell;
 }
 
-/* Sort the vertices along the curve by counting sort. */
+/* Sort the vertices along the curve by counting sort, into sorted [count, 3]. begin [CELLS + 1] is
+ * zero and is overwritten. */
 static void sort_vertices(const double *vertices, size_t count, size_t *begin, double *sorted) {
   const block_box box = box_of(vertices, count);
   for (size_t i = 0; i < count; ++i) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The Pitcher/Catcher iteration, (5)-(14), as the paper writes it: the reference of the fast solve.
- */
+/* Run the Pitcher/Catcher iteration, (5)-(14), as the paper states it: the reference of the direct
+ * solve. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -10,14 +10,15 @@
  * holds most on top. */
 typedef struct iteration {
   size_t node_count;
-  size_t *clique_begin; /* neighbours of node j without j itself */
+  size_t
+      *clique_begin; /* [nodes + 2] node j's neighbours begin here in `clique`, without j itself */
   size_t *clique;
-  double *te;     /* Te[j->i] to each neighbour */
+  double *te;     /* Te[j->i] of each neighbour in `clique` */
   double *kept;   /* Te[j->j] */
   double *held;   /* the Pitcher, may be negative */
   double *caught; /* the Catcher */
-  size_t *heap;   /* nodes, by falling |held| */
-  size_t *place;  /* where each node stands in the heap */
+  size_t *heap;   /* nodes; the largest |held| on top */
+  size_t *place;  /* index of each node in the heap */
 } iteration;
 
 static void iteration_free(iteration *it) {
@@ -66,7 +67,7 @@ static void heap_down(iteration *it, size_t at) {
   }
 }
 
-/* Cliques and local transfers Te, straight from (8). */
+/* Build the cliques and the local transfers Te of (8). Return false if out of memory. */
 static bool iteration_create(const supine_mesh *mesh, const supine_topology *topology,
                              const double *stiffness, iteration *it) {
   const size_t n = mesh->vertex_count;
@@ -84,7 +85,8 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
       it->held == NULL || it->caught == NULL || it->heap == NULL || it->place == NULL) {
     return false;
   }
-  size_t *begin = it->clique_begin + 1; /* one ahead, so that filling leaves the beginnings */
+  size_t *begin =
+      it->clique_begin + 1; /* offset by one: filling advances it to where the next begins */
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];
     ++begin[topology->edges[2 * e + 1] + 1];
@@ -120,7 +122,7 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
   return true;
 }
 
-/* Node j gives away all that it holds, (5)-(7). */
+/* Distribute all that node j holds over its clique, (5)-(7). */
 static void distribute(iteration *it, size_t j) {
   const double held = it->held[j];
   it->caught[j] += it->kept[j] * held;
@@ -138,8 +140,8 @@ static void distribute(iteration *it, size_t j) {
   }
 }
 
-/* Twelve parameters and over 60 lines: the paper's algorithm with the paper's quantities, step by
- * step; for tests alone. */
+/* Ten parameters and over 60 lines: the paper's algorithm with the paper's quantities, step by
+ * step. */
 supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,
@@ -148,7 +150,7 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
                                void *context, supine_error *error) {
   const size_t n = mesh->vertex_count;
   if (n == 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no vertices");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no vertices: give a mesh");
   }
   iteration it = {0};
   supine_status status = SUPINE_OK;

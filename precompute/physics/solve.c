@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The full physics for one orientation: the reference that every basis is measured against. */
+/* Solve the full physics for one orientation: the reference that every basis is measured against.
+ */
 #include <math.h>
 #include <stdlib.h>
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The full physics for one orientation: the reference that every basis is measured against. */
+ * Solve the full physics for one orientation: the reference that every basis is measured against.
+ */
 #ifndef SUPINE_SOLVE_H
 #define SUPINE_SOLVE_H
 
@@ -9,32 +10,33 @@
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
 
-/** Full physics for one orientation, no harmonics: u_i = s F_i d_i. */
+/** Solution for one orientation, without harmonics: displacements u_i = s F_i d_i at scale s. */
 typedef struct supine_solution {
   size_t vertex_count;
-  supine_equilibrium *equilibrium; /**< of the lungs solved, for another solve */
+  supine_equilibrium *equilibrium; /**< of the same lungs, kept for another solve */
   double *catch_;                  /**< [N] F */
-  double *directions;              /**< [N, 3] d, mm */
+  double *directions;              /**< [N, 3] d, mm, of the collapsed lungs' shape (disease.h) */
   bool has_volume;                 /**< the surface is closed, and cubic is set */
   double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
-  supine_volume_form form[2]; /**< of each lung, of three gains */
+  supine_volume_form form[2]; /**< volume that each lung gains, by its three gains */
   double residual;            /**< relative, of the equilibrium */
 } supine_solution;
 
 /** Solve for gravity along the unit vector `g`.
- * @param solution  zero-initialised, or of the same lungs, whose vertices may have moved: then
- *   its arrays and the factor's memory serve again; empty after a failure
+ * @param solution  zero-initialised, or a solution of the same lungs, whose vertices may have
+ * moved: then its arrays and the factor's memory are reused. Empty after a failure; release with
+ *   supine_physics_solution_free
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,
                                    const double g[3], supine_solution *solution,
                                    supine_error *error);
 void supine_physics_solution_free(supine_solution *solution);
 
-/** Largest |F_i d_i| of a solution, mm: the displacement at scale 1. */
+/** Find the largest displacement at scale 1, |F_i d_i|, mm. */
 double supine_physics_solution_largest(const supine_solution *solution);
 
-/** Positions p + s F d, [N, 3], mm, from the surface at rest (disease.h: that of healthy lungs is
- * their mesh). */
+/** Compute positions [N, 3], p + s F d, mm.
+ * @param rest  p: the lungs' mesh; of collapsed lungs the surface of supine_tissue_rest */
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *rest,
                                    double scale, double *positions);
 
