@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Move a scan to full inflation: Anderson's acceleration (D. G. Anderson, J. ACM 12, 1965) of
- * p_j -> scan_j - A_j F(g; p) d_j(p). The next step starts from the combination of the last
- * images whose combined residual r is least. */
+/* Move a scan to full inflation by Anderson's acceleration (D. G. Anderson, J. ACM 12, 1965) of the
+ * iteration p_j -> scan_j - A_j F(g; p) d_j(p). The next step starts from the combination of the
+ * last images that has the smallest residual. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,27 +17,28 @@
 
 enum { SOLVES_MAX = 30, DEPTH = 4 };
 
-/* RMS residual, mm, that ends the iteration, and a larger one that ends it if it no longer
- * halves: near an almost degenerate triangle a few vertices oscillate by some 0.03 mm. */
-static const double settled = 5e-4;
-static const double trembling = 5e-3;
-static const double folded_share = 0.01; /* folded triangles that make a surface invalid */
-static const double ridge = 1e-12;       /* relative; regularises equal residuals */
+/* RMS residual, mm, that ends the iteration, and a larger one that ends it once a step no longer
+ * halves the residual: near an almost degenerate triangle a few vertices oscillate by about
+ * 0.03 mm. */
+static const double converged = 5e-4;
+static const double stalled = 5e-3;
+static const double folded_share = 0.01; /* largest share of folded triangles in a valid surface */
+static const double ridge = 1e-12;       /* relative regularisation, against equal residuals */
 
 typedef struct ascent {
-  supine_lungs lungs; /* present estimate; vertices are the caller's */
+  supine_lungs lungs; /* current estimate; the caller owns its vertices */
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
-  supine_solution field; /* of the present estimate */
+  supine_solution field; /* of the current estimate */
   size_t size;           /* 3 N */
-  double *image;         /* [size] of the lungs' vertices */
-  double *last;          /* [size] the image before */
-  double *residual;      /* [size] the residual before */
-  double rms;            /* of the residual, mm */
-  double *images;        /* [DEPTH, size] differences of successive images */
-  double *residuals;     /* [DEPTH, size] differences of successive residuals */
-  size_t begun, history; /* differences stored so far; in use */
+  double *image;     /* [size] positions that the iteration gives for the current estimate, mm */
+  double *last;      /* [size] the previous image */
+  double *residual;  /* [size] the previous residual, mm */
+  double rms;        /* of the residual, mm */
+  double *images;    /* [DEPTH, size] differences of successive images */
+  double *residuals; /* [DEPTH, size] differences of successive residuals */
+  size_t begun, history; /* number of differences stored so far, and of those in use */
 } ascent;
 
 /* Fail if too many triangles turn over between the scan and full inflation. */
@@ -110,7 +111,7 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* Apply the field of the present lungs to the scan, with the gains that give each lung its
+/* Apply the field of the current estimate to the scan, with the gains that give each lung its
  * reference volume. */
 static supine_status find_image(ascent *a, supine_error *error) {
   supine_solution *field = &a->field;
@@ -177,7 +178,11 @@ static supine_status advance(ascent *a, supine_error *error) {
     gsl_matrix_view system = gsl_matrix_view_array(matrix, n, n);
     gsl_vector_view right = gsl_vector_view_array(weights, n);
     if (gsl_linalg_HH_svx(&system.matrix, &right.vector) != 0) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "equal steps on the way up");
+      return supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "no full surface was found: successive steps are equal. If the scan is "
+          "fuller than --scanned says, change that or --resting; --scanned none "
+          "takes it as it is");
     }
   }
   double *to = a->lungs.mesh.vertices;
@@ -197,14 +202,15 @@ static supine_status iterate(ascent *a, supine_error *error) {
     const double before = a->rms;
     status = find_image(a, error);
     if (status == SUPINE_OK &&
-        (a->rms <= settled || (a->rms <= trembling && a->rms > 0.5 * before))) {
+        (a->rms <= converged || (a->rms <= stalled && a->rms > 0.5 * before))) {
       memcpy(a->lungs.mesh.vertices, a->image, a->size * sizeof(double));
       return SUPINE_OK;
     }
     if (status == SUPINE_OK) {
       remember(a);
       status = advance(a, error);
-    } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) { /* too long a step */
+    } else if (status == SUPINE_ERROR_NUMERICAL &&
+               a->history > 0) { /* the step was too long: restart from the last image */
       a->history = 0;
       a->begun = 0;
       memcpy(a->lungs.mesh.vertices, a->last, a->size * sizeof(double));

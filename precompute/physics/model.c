@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The laws by name. */
+/* Select a law, check a model, and set up its equilibrium. */
 #include <math.h>
 
 #include "precompute/physics/model.h"
@@ -27,15 +27,16 @@ supine_status supine_physics_model_check(const supine_model *model, supine_error
   return model->force.soften == 0.0 || model->reach > 0.0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "--soften needs a reach: the paper's transfer holds the stiffness, "
-                                "which may not turn with gravity. Give --reach 10, or leave "
-                                "--soften out");
+                                "--soften needs a reach: the paper's transfer depends on the "
+                                "stiffness, so it would change with gravity. Give --reach 10, or "
+                                "leave --soften out");
 }
 
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,
                                                supine_error *error) {
-  /* A force that spreads over the whole lungs is even, and the matrix close to singular. */
+  /* A longer reach spreads every force evenly over the lungs; the matrix is then nearly singular.
+   */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);
   const double reach = fmin(model->reach, longest);
   if (*equilibrium != NULL) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From a scan to the same lungs at full inflation. */
+/* Find the reference volumes from a scan's state, and move its lungs to full inflation. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 
 #include "precompute/physics/reference.h"
 
-static const double tissue_share = 0.1; /* of the full volume: nothing is emptier */
+static const double tissue_share = 0.1; /* least share of the full volume: tissue without gas */
 
 supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
                                           supine_error *error) {
@@ -25,15 +25,16 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
   const supine_volume_kind kind = read.state.volume.kind;
   if (read.state.lung_count > 0 || (kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s': the mesh has its volume; say what it shows: full, POSTURE:rest, "
-                            "either with +ML or -ML of the lungs together, or none",
+                            "'%s' is no state of a scan, as the mesh has its volume: give full or "
+                            "POSTURE:rest, either with +ML or -ML for both lungs together, or none",
                             text);
   }
   *scan = read;
   return SUPINE_OK;
 }
 
-/* What lung `lung` holds as a share of its reference volume: resting.h's lines. */
+/* Compute a lung's volume at t from those at rest and at full inflation, by the lines of resting.h.
+ */
 static double line(double rest, double full, double t) {
   return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
 }
@@ -70,8 +71,9 @@ void supine_reference_share_out(const supine_reference *reference, const double 
   }
 }
 
-/* Find the reference volumes F of lungs whose scan held `volume`, from the t of resting.h at which
- * the scan is as far from rest, or from full, as its state says. */
+/* Find the reference volumes F of lungs that hold `volume` [lung_count] mL in the scan: those for
+ * the t of resting.h at which the scan is as many mL from rest, or from full inflation, as its
+ * state says. */
 static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
   const supine_state *state = &found->scan.state;
   const bool from_rest = state->volume.kind == SUPINE_VOLUME_REST;
@@ -80,7 +82,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   double high = 1.0;
   double t = from_rest ? 0.0 : 1.0;
   for (int halving = 0; halving < 60; ++halving) {
-    double beyond = 0.0; /* mL of the scan beyond rest, or full, if this were t */
+    double beyond = 0.0; /* volume of the scan beyond rest, or full inflation, at this t, mL */
     for (size_t lung = 0; lung < found->lung_count; ++lung) {
       const double rest =
           supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);
@@ -123,9 +125,9 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
   const supine_volume *volume = &scan->state.volume;
   const bool full = volume->kind == SUPINE_VOLUME_FULL && volume->ml == 0.0;
   if (!lungs->topology.closed && scan->known && !full) {
-    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                            "an open surface has no volume to take up to full inflation: close it, "
-                            "or say that it is full");
+    return supine_error_set(
+        error, SUPINE_ERROR_OPEN_SURFACE,
+        "an open surface has no volume: close it, or give --scanned full or none");
   }
   if (!lungs->topology.closed || !scan->known) {
     return SUPINE_OK;
