@@ -34,9 +34,8 @@ static const double residual_limit = 1e-8;
 typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and their number */
   size_t edge, edge_count;
-  bool factorised; /* `factor` matches the values of `matrix` */
-  cholmod_sparse
-      *matrix; /* lower half: column i holds the diagonal and the edges that begin in i */
+  bool factorised;        /* `factor` matches the values of `matrix` */
+  cholmod_sparse *matrix; /* lower half: column i has the diagonal and the edges from i on */
   cholmod_factor *factor;
   cholmod_common common;
 } part;

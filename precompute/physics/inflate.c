@@ -209,8 +209,8 @@ static supine_status iterate(ascent *a, supine_error *error) {
     if (status == SUPINE_OK) {
       remember(a);
       status = advance(a, error);
-    } else if (status == SUPINE_ERROR_NUMERICAL &&
-               a->history > 0) { /* the step was too long: restart from the last image */
+    } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) {
+      /* The step was too long: restart from the last image. */
       a->history = 0;
       a->begun = 0;
       memcpy(a->lungs.mesh.vertices, a->last, a->size * sizeof(double));

@@ -10,15 +10,14 @@
  * holds most on top. */
 typedef struct iteration {
   size_t node_count;
-  size_t
-      *clique_begin; /* [nodes + 2] node j's neighbours begin here in `clique`, without j itself */
-  size_t *clique;
-  double *te;     /* Te[j->i] of each neighbour in `clique` */
-  double *kept;   /* Te[j->j] */
-  double *held;   /* the Pitcher, may be negative */
-  double *caught; /* the Catcher */
-  size_t *heap;   /* nodes; the largest |held| on top */
-  size_t *place;  /* index of each node in the heap */
+  size_t *clique_begin; /* [nodes + 2] node j's first index in `clique` */
+  size_t *clique;       /* neighbours of each node, without itself */
+  double *te;           /* Te[j->i] of each neighbour in `clique` */
+  double *kept;         /* Te[j->j] */
+  double *held;         /* the Pitcher, may be negative */
+  double *caught;       /* the Catcher */
+  size_t *heap;         /* nodes; the largest |held| on top */
+  size_t *place;        /* index of each node in the heap */
 } iteration;
 
 static void iteration_free(iteration *it) {
@@ -85,8 +84,8 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
       it->held == NULL || it->caught == NULL || it->heap == NULL || it->place == NULL) {
     return false;
   }
-  size_t *begin =
-      it->clique_begin + 1; /* offset by one: filling advances it to where the next begins */
+  /* Offset by one: filling advances each entry to where the next node begins. */
+  size_t *begin = it->clique_begin + 1;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];
     ++begin[topology->edges[2 * e + 1] + 1];

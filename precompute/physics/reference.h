@@ -47,11 +47,10 @@ typedef struct supine_reference {
   supine_scan scan;
   supine_resting resting; /**< as shares: volumes in mL are converted */
   size_t lung_count;
-  int side[2];           /**< +1 left, -1 right */
-  double full_volume[2]; /**< F, volume of the reference surface */
-  double scan_volume[2]; /**< volume of the scan less F: negative below full inflation */
-  double
-      scan_rest[2]; /**< volume at rest in the scan's posture; unset if the scan is the reference */
+  int side[2];             /**< +1 left, -1 right */
+  double full_volume[2];   /**< F, volume of the reference surface */
+  double scan_volume[2];   /**< volume of the scan less F: negative below full inflation */
+  double scan_rest[2];     /**< volume at rest in the scan's posture; 0 if the scan is full */
   double scan_gains[2][3]; /**< A of the scan */
   size_t solves;           /**< number of full solves to the fixed point */
   double moved;            /**< largest distance from the scan to the reference surface, mm */
