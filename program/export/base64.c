@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Base64: three bytes become four characters. */
+/* Encode bytes as base64. */
 #include <stdint.h>
 
 #include "program/export/base64.h"

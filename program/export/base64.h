@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Base64 (RFC 4648, section 4). */
+ * Encode bytes as base64 (RFC 4648, section 4). */
 #ifndef SUPINE_EXPORT_BASE64_H
 #define SUPINE_EXPORT_BASE64_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* glTF 2.0 binary: a header, a chunk of JSON, a chunk of numbers. */
+/* Write a glTF 2.0 binary file: a header, a JSON chunk and a binary chunk. */
 #include "program/export/glb.h"
 
 #include <math.h>
@@ -10,10 +10,10 @@
 #include "program/render/render.h"
 #include "sh/base/output.h"
 
-static const double step_mm = 0.02; /* of stored places, where they all fit */
+static const double step_mm = 0.02; /* smallest unit of quantized positions */
 
-/* Find the largest move of each vertex in a lying posture, from supine, at rest; mm. Return the
- * largest of all. */
+/* Compute the largest displacement of each vertex from supine over the lying postures, at rest, mm;
+ * return the largest of all. `xyz` and `supine_xyz` are workspace, [N, 3]. */
 static double find_moves(const glb *g, float *xyz, float *supine_xyz, float *move) {
   static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
   double largest = 0;
@@ -35,7 +35,7 @@ static double find_moves(const glb *g, float *xyz, float *supine_xyz, float *mov
   return largest;
 }
 
-/* Colour vertices by their moves; glTF's colours are linear. */
+/* Colour vertices by displacement, 0 to `end` mm; glTF's vertex colours are linear RGBA. */
 static void colour(const float *move, size_t count, double end, uint8_t *colours) {
   for (size_t i = 0; i < count; ++i) {
     double rgb[3];
@@ -48,7 +48,7 @@ static void colour(const float *move, size_t count, double end, uint8_t *colours
   }
 }
 
-/* Append a mesh for each lung. */
+/* Append a mesh for each lung; set the displacement at the end of the colours, mm. */
 static supine_status add_lungs(glb *g, json_int_t *nodes, double *end, supine_error *error) {
   static const double white[3] = {1, 1, 1};
   const export_source *s = g->source;
@@ -89,7 +89,8 @@ cleanup:
   return status;
 }
 
-/* Append the patient, the parts that move with him, and what is around him. */
+/* Append the node "patient" with the lungs and their content, the animations, the table and the
+ * arrow of gravity. */
 static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
   const size_t lung_count = g->source->info->lung_count;
   json_int_t nodes[2 * SUPINE_LUNGS_MAX];
@@ -121,8 +122,8 @@ static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *
   return g->status == SUPINE_OK ? SUPINE_OK : supine_error_set(error, g->status, "out of memory");
 }
 
-/* Make the file's JSON. The second buffer, of which nothing is stored, is what the compressed
- * arrays decode to. */
+/* Build the file's JSON. The second buffer of a compressed file is a fallback without data: its
+ * size is that of the decoded arrays. */
 static json_t *make_root(glb *g, size_t bytes, double end, json_t *roots) {
   static const char packed[] = "EXT_meshopt_compression";
   json_t *root =
@@ -155,7 +156,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   *total = 12 + 8 + length + padding + 8 + bytes;
   if (*total > UINT32_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: %zu bytes, and glTF binary ends at 4 GiB: take fewer modes or "
+                            "%s: %zu bytes exceed the 4 GiB of glTF binary: use fewer modes or "
                             "vertices",
                             path, *total);
   }
@@ -177,7 +178,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   return status;
 }
 
-/* Make all parts in memory, then write them. */
+/* Build all parts in memory, then write the file. */
 static supine_status make_and_write(glb *g, const char *path, size_t *total, supine_error *error) {
   char *numbers = NULL;
   size_t bytes = 0;
@@ -197,7 +198,7 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
     char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(10));
     status = text == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path)
                           : write_file(path, text, numbers, bytes, total, error);
-    free(text); /* as jansson's default allocator gave it */
+    free(text); /* jansson's default allocator is malloc */
     json_decref(root);
   }
   free(numbers);
@@ -208,7 +209,8 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error) {
   if (source->info->triangle_count == 0) {
-    return supine_error_set(error, SUPINE_ERROR_MESH, "a basis without triangles shows nothing");
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "the basis has no triangles to draw: precompute it from a surface");
   }
   supine_status status = supine_export_pack_begin(error);
   glb *g = status == SUPINE_OK ? calloc(1, sizeof *g) : NULL;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * A glTF binary file being made, for the files that make its parts. */
+ * State of a glTF binary file while it is built, shared by glb.c and glb_*.c. */
 #ifndef SUPINE_EXPORT_GLB_H
 #define SUPINE_EXPORT_GLB_H
 
@@ -8,75 +8,81 @@
 
 #include "program/export/targets.h"
 
-/** What arrays hold. Unless the file is plain, places are stored as counts and normals as bytes,
- * and all but numbers and rotations are compressed. */
+/** Kinds of array. Unless the file is plain, positions are stored as 16-bit integers and normals as
+ * bytes, and all kinds but GLB_NUMBERS and GLB_ROTATIONS are compressed. */
 typedef enum glb_kind {
-  GLB_CORNERS,  /**< uint32_t: vertex numbers of triangles */
-  GLB_PLACES,   /**< float [3], mm */
-  GLB_NORMALS,  /**< float [3], unit */
-  GLB_CHANGES,  /**< float [3], what a target adds to normals */
-  GLB_COLOURS,  /**< uint8_t [4], linear */
-  GLB_NUMBERS,  /**< float, of animations */
-  GLB_ROTATIONS /**< float [4], quaternions X, Y, Z, W */
+  GLB_CORNERS,  /**< uint32_t: vertex indices of triangles */
+  GLB_PLACES,   /**< float [3]: positions or displacements in units of glb.step */
+  GLB_NORMALS,  /**< float [3]: unit normals */
+  GLB_CHANGES,  /**< float [3]: what a target adds to normals */
+  GLB_COLOURS,  /**< uint8_t [4]: RGBA, linear */
+  GLB_NUMBERS,  /**< float: times or weights of animations */
+  GLB_ROTATIONS /**< float [4]: quaternions X, Y, Z, W */
 } glb_kind;
 
-/** The file's parts. */
+/** Parts of the file that are built so far. */
 typedef struct glb {
   const export_source *source;
   const export_glb_options *options;
   export_targets targets;
-  double step; /**< mm per stored unit of places */
+  double step; /**< unit of GLB_PLACES, mm; 1 in plain files */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
-  FILE *numbers;        /**< the buffer */
-  size_t unpacked;      /**< bytes of the compressed arrays when decoded */
-  supine_status status; /**< of memory */
+  FILE *numbers;        /**< contents of the binary chunk, in memory */
+  size_t unpacked;      /**< bytes of the compressed arrays once decoded */
+  supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */
 } glb;
 
-/** Vertices of a lung or of what is inside it, and how they are drawn. */
+/** Vertices of a lung or of its content, and how they are drawn. N is the vertex count of `source`.
+ */
 typedef struct glb_shape {
   const char *name;
   const export_source *source;
   size_t lung;
-  const float *normals;           /**< [N, 3] of all of the source's vertices */
-  const float *added;             /**< [count, N, 3] what targets add to them, or NULL */
-  const uint8_t *colours;         /**< [N, 4], or NULL */
-  size_t parts;                   /**< primitives, each of a material */
-  const uint32_t *const *corners; /**< of each part, vertex numbers of the source */
-  const size_t *corner_count;
-  const json_int_t *material;
+  const float *normals;           /**< [N, 3] */
+  const float *added;             /**< [targets, N, 3] what targets add to normals, or NULL */
+  const uint8_t *colours;         /**< [N, 4] RGBA, or NULL */
+  size_t parts;                   /**< number of primitives, each with its material */
+  const uint32_t *const *corners; /**< [parts] vertex indices of each part's triangles */
+  const size_t *corner_count;     /**< [parts] number of those indices */
+  const json_int_t *material;     /**< [parts] index of each part's material */
 } glb_shape;
 
-/** Append an array and return its accessor's index. */
+/** Append an array of `count` rows and return its accessor's index. */
 json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, size_t count);
 
-/** Append a mesh and the node that shows it, in mm LPS from the lungs' middle; return the node's
- * index. @param mesh  taken over */
+/** Append a mesh and a node that shows it; return the node's index. The mesh is in units of
+ * glb.step, LPS, from the centre of the lungs; the node converts it to metres, y up.
+ * @param mesh  the function takes ownership */
 json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
 
 /** Append a shape with morph targets; return its node's index. */
 json_int_t supine_export_glb_add(glb *g, const glb_shape *shape);
 
-/** Append a material and return its index; below an `alpha` of 1 it is seen through. */
+/** Append a material and return its index; it is translucent if `alpha` < 1. */
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3], double alpha);
 
-/** Return the extras of the file: how weights follow from gravity and volume. */
+/** Return the extras of the file: how weights follow from gravity and volume.
+ * @param largest_move  displacement at the end of the colours, mm */
 json_t *supine_export_glb_extras(const glb *g, double largest_move);
 
 /** Return the extras of a lung's mesh. */
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
 
-/** Compute the rotation X, Y, Z, W of the node "patient", who lies down and has turned about the
- * body's long axis by `roll`: pi / 2 is the left side. */
+/** Compute the rotation X, Y, Z, W of the node "patient", lying down and turned about the body's
+ * long axis by `roll` radians: 0 is supine, pi / 2 the left side. */
 void supine_export_glb_rotation(double roll, float q[4]);
 
-/** Append the animations. @param nodes  [count] with targets, of lungs [count] */
+/** Append the animations.
+ * @param nodes  [count] nodes with morph targets
+ * @param lungs  [count] lung of each node */
 void supine_export_glb_animate(glb *g, size_t count, const json_int_t *nodes, const size_t *lungs);
 
-/** Append what is inside the lungs, for each lung that has something; nodes and lungs get an entry
- * each. */
+/** Append the content of each lung that has any: append its node to `nodes` and its lung to
+ * `lungs`, and increment `*count`. */
 void supine_export_glb_inside(glb *g, size_t *count, json_int_t *nodes, size_t *lungs);
 
-/** Append a table and an arrow that shows gravity; return their nodes as an array. */
+/** Append a table and an arrow that shows gravity; return the root nodes of the scene: the patient,
+ * the table and the arrow. */
 json_t *supine_export_glb_room(glb *g);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Animations: breathing while the patient turns about the long axis, and breathing in each lying
- * posture; gravity stays down. */
+/* Append animations: breathing while the patient turns about the long axis, and breathing in each
+ * lying posture; gravity stays down. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -9,8 +9,8 @@
 static const double pi = 3.14159265358979323846;
 enum { RATE = 10, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
 
-/* Gravity in the body is (sin t, cos t, 0): supine, left, prone, right. In glTF's axes the patient
- * lies down, -90 degrees about x, after turning about y, the body's long axis, by t. */
+/* Gravity in the body is (sin t, cos t, 0) at roll t. In glTF's axes the patient turns by t about
+ * y, the body's long axis, then by -90 degrees about x to lie down. */
 void supine_export_glb_rotation(double roll, float q[4]) {
   const double c = cos(roll / 2) * sqrt(0.5);
   const double s = sin(roll / 2) * sqrt(0.5);
@@ -20,21 +20,23 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the roll at a time: each posture for half of its time, then on to the next. */
+/* Return the roll at a time, radians: each posture is held for half of SECONDS, then the patient
+ * turns to the next. */
 static double roll_at(double seconds) {
   const double stage = floor(seconds / SECONDS);
   const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
   return pi / 2 * (stage + x * x * (3 - 2 * x));
 }
 
-/* Compute the weights of all nodes at a time of the breath, [count, targets]. */
+/* Compute the weights of all nodes at a time. `rows` points to this frame of the first node in an
+ * array [count, frames, targets]. */
 static void make_frame(glb *g, size_t count, const size_t *lungs, double roll, double seconds,
                        float *rows, size_t frames) {
   const double gravity[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
   double weights[EXPORT_TARGETS_MAX];
   supine_pose pose;
-  /* Every direction and both ends of the breath were posed when the targets were chosen. */
+  /* This succeeds: supine_export_targets_choose posed directions all around at both ends. */
   (void)supine_export_breath_pose(g->source, &g->options->breath, gravity, fraction, &pose, NULL);
   for (size_t i = 0; i < count; ++i) {
     supine_export_targets_weights(g->source, &g->targets, &pose, lungs[i], weights);
@@ -44,7 +46,7 @@ static void make_frame(glb *g, size_t count, const size_t *lungs, double roll, d
   }
 }
 
-/* Append an animation of some seconds; `roll` NAN turns through all postures. */
+/* Append an animation at `roll` radians; NAN turns the patient through all lying postures. */
 static void add(glb *g, const char *name, double roll, size_t seconds, size_t count,
                 const json_int_t *nodes, const size_t *lungs) {
   const size_t frames = RATE * seconds + 1;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Arrays of a glTF file: accessors, buffer views and the buffer. */
+/* Append arrays to a glTF file: accessors, buffer views and the binary chunk. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,10 +12,10 @@
 typedef struct layout {
   const char *type;
   size_t columns;
-  size_t stride; /* bytes a row */
-  int component; /* glTF's number of the type of a column */
-  int limit;     /* largest count, or 0: rows are stored as given */
-  int target;    /* of the buffer view, or 0 */
+  size_t stride; /* bytes per row */
+  int component; /* glTF's code for the type of a column */
+  int limit;     /* largest stored integer; 0: rows are stored as given */
+  int target;    /* glTF's code for the use of the buffer view; 0: none */
 } layout;
 
 static layout layout_of(const glb *g, glb_kind kind) {
@@ -40,7 +40,7 @@ static layout layout_of(const glb *g, glb_kind kind) {
   }
 }
 
-/* Return rows as they are stored, malloc. */
+/* Return the rows as they are stored; the caller frees them. Return NULL if out of memory. */
 static unsigned char *store(glb_kind kind, const layout *l, const void *rows, size_t count) {
   unsigned char *stored = calloc(count + 1, l->stride);
   if (stored == NULL || l->limit == 0) {
@@ -56,13 +56,13 @@ static unsigned char *store(glb_kind kind, const layout *l, const void *rows, si
     for (size_t axis = 0; axis < 3; ++axis) {
       const double value = (double)values[3 * i + axis] * (kind == GLB_PLACES ? 1 : l->limit);
       const int16_t counts = (int16_t)rint(fmax(-l->limit, fmin(l->limit, value)));
-      memcpy(row + axis * l->stride / 4, &counts, l->stride / 4); /* the low byte comes first */
+      memcpy(row + axis * l->stride / 4, &counts, l->stride / 4); /* the low byte is first */
     }
   }
   return stored;
 }
 
-/* Write stored rows, compressed if `mode` is not NULL, and describe them as a buffer view. */
+/* Write stored rows, compressed unless `mode` is NULL, and return their buffer view. */
 static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned char *stored,
                           size_t count, const char *mode) {
   const size_t bytes = count * l->stride;
@@ -95,7 +95,7 @@ static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned
   return view;
 }
 
-/* Least and largest of each column of what is stored. */
+/* Set the accessor's minimum and maximum of each column from the stored rows. */
 static void set_bounds(json_t *accessor, const layout *l, const unsigned char *stored,
                        size_t count) {
   double low[3] = {INFINITY, INFINITY, INFINITY};

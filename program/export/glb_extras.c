@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What a reader of the glTF file needs to set the weights itself. */
+/* Write the extras of a glTF file: formulas and constants from which its reader computes weights.
+ */
 #include <stdio.h>
 #include <string.h>
 
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-enum { FORMS_MAX = 32 }; /* targets: beyond this their volume forms would outgrow the mesh */
+enum { FORMS_MAX = 32 }; /* with more targets, the volume forms would be larger than the mesh */
 
 static const char frame_text[] =
     "Meshes of lungs are in the patient's axes, LPS (x left, y back, z head), from 'middle', mm: "
@@ -23,7 +24,7 @@ static const char weights_text[] =
     "* "
     "bend[a]; s = t = 0 gives the basis' own surface.";
 static const char volume_text[] =
-    "mL a lung gains beyond its referenceVolume: L[a] A[a] + Q[0] A[1] A[2] + Q[1] A[0] A[2] + "
+    "mL a lung holds beyond its referenceVolume: L[a] A[a] + Q[0] A[1] A[2] + Q[1] A[0] A[2] + "
     "Q[2] "
     "A[0] A[1] + C A[0] A[1] A[2], summed over the axes a, L[a] = sum linear[a][k] v[k], Q[a] = "
     "sum "
@@ -31,17 +32,20 @@ static const char volume_text[] =
     "index "
     "fastest; if linear has no axis a, all A are s and the terms L s + Q s^2 + C s^3. For a volume "
     "with "
-    "a bend: r, the root for s at rest, t = 0, then the q at which s = r q, t = 2 r e(q), e = (q^3 "
-    "- q) "
-    "/ 2 for q <= 1, (q - 1) / q^6 above; without: the root s that grows out of 0.";
+    "a bend, first find r, the s that gives the volume at rest with t = 0; then the q at which s = "
+    "r "
+    "q, t = 2 r e(q) give the volume, where e = (q^3 - q) / 2 for q <= 1, (q - 1) / q^6 above. "
+    "Without "
+    "a bend, find s on the branch through s = 0.";
 static const char resting_text[] =
-    "mL that a lung holds at rest beyond referenceVolume, negative: the sum over l <= 2 and m of "
+    "volume of a lung at rest minus referenceVolume, mL: the sum over l <= 2 and m of "
     "resting[l*l+l+m] * Y[l*l+l+m](g), of all lungs together if byLung is false. Above rest all "
     "lungs "
-    "have gone the same part of the way to full, which is max(0, -g_z)^2 * fullUprightGain * "
-    "referenceVolume.";
+    "have filled by the same fraction of the way from rest to full inflation, which is "
+    "max(0, -g_z)^2 "
+    "* fullUprightGain * referenceVolume, counted from referenceVolume too.";
 
-/* "mode_3", and "bend_3" for the same mode's bend. */
+/* Return the names of the targets: "mode_3", and "bend_3" for the bend of that mode. */
 static json_t *target_names(const glb *g) {
   const size_t k = g->source->info->mode_count;
   json_t *names = json_array();
@@ -51,7 +55,7 @@ static json_t *target_names(const glb *g) {
   return names;
 }
 
-/* Keys of the basis' metadata that go along. */
+/* Return the metadata of the basis that the file repeats. */
 static json_t *origin(const export_source *source) {
   static const char *const keys[] = {
       "lungs",       "made_by",          "force", "direction", "direction_constants", "stiffness",

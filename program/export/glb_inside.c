@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What is inside the lungs, in the same glTF file, with their targets. Points become small balls,
- * which move with them. */
+/* Append the content of the lungs to a glTF file, with morph targets that have the lungs' weights.
+ * Points become small balls. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,21 +10,21 @@
 enum { BALL_VERTICES = 12, BALL_TRIANGLES = 20 };
 static const double ball_radius = 4.0; /* mm: a nodule that is easy to see */
 
-/* Beyond this many parts they share one material, and so lose their names. */
+/* With more parts than this, all share one material and their names are lost. */
 enum { PARTS_MAX = 256 };
 
 /* The content, with balls in place of points. */
 typedef struct inside {
-  export_source source; /* its arrays are this struct's */
+  export_source source; /* the content with the vertices and coefficients below */
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
   float *vertices, *normals; /* [N, 3] */
   float *coefficients;       /* [N, 3, K] */
   uint32_t *corners;         /* [M, 3], lung by lung, then part by part */
-  unsigned char *point;      /* [content's N] vertices that no triangle has */
-  uint32_t *first;           /* [content's N] where each went */
+  unsigned char *point;      /* [content's N] 1 for a vertex that is in no triangle, else 0 */
+  uint32_t *first;           /* [content's N] index in `vertices` of each vertex, or of its ball */
   size_t parts;
-  size_t begin[SUPINE_LUNGS_MAX * PARTS_MAX + 1]; /* of corners, by lung and part */
+  size_t begin[SUPINE_LUNGS_MAX * PARTS_MAX + 1]; /* first corner of each lung and part */
 } inside;
 
 static const uint32_t faces[BALL_TRIANGLES][3] = {
@@ -32,7 +32,7 @@ static const uint32_t faces[BALL_TRIANGLES][3] = {
     {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
     {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
 
-/* An icosahedron: corners at (0, +-1, +-phi) and so on, outwards. */
+/* Compute the corners of a regular icosahedron of radius 1. */
 static void place_ball(double corner[BALL_VERTICES][3]) {
   const double phi = 0.5 * (1.0 + sqrt(5.0));
   const double a = 1.0 / sqrt(1.0 + phi * phi);
@@ -43,7 +43,7 @@ static void place_ball(double corner[BALL_VERTICES][3]) {
   memcpy(corner, corners, sizeof corners);
 }
 
-/* Fill in the content's vertices, and a ball's in place of each point. */
+/* Copy the content's vertices, normals and coefficients; replace each point by a ball. */
 static void place_vertices(inside *in, const export_source *content, const float *normals) {
   const size_t row = 3 * content->info->mode_count;
   double corner[BALL_VERTICES][3];
@@ -64,8 +64,8 @@ static void place_vertices(inside *in, const export_source *content, const float
   }
 }
 
-/* Give all vertices of a rigid part their mean motion, so that it keeps its size. Morph targets,
- * which add up, cannot turn it. */
+/* Give all vertices of a rigid part their mean displacement, so that the part keeps its shape.
+ * Morph targets are linear and cannot rotate it. */
 static void hold_rigid(inside *in, const export_source *content) {
   const size_t row = 3 * content->info->mode_count;
   const supine_tensor *rigid = supine_basis_tensor(content->basis, "rigid");
@@ -85,8 +85,8 @@ static void hold_rigid(inside *in, const export_source *content) {
   }
 }
 
-/* Append the triangle's corners to those of its lung and part; count them alone where `next` is the
- * count. */
+/* Append a triangle's corners at the end, `next`, of those of its lung and part, and advance that.
+ * If `corners` is NULL, only advance it, to count. */
 static void add_triangle(const inside *in, const export_parts *parts, size_t vertex,
                          const uint32_t *corner, uint32_t *corners, size_t *next) {
   size_t lung = 0;
@@ -101,7 +101,7 @@ static void add_triangle(const inside *in, const export_parts *parts, size_t ver
   }
 }
 
-/* Visit every triangle, of meshes and of balls. */
+/* Add every triangle of the meshes and the balls. */
 static void visit(const inside *in, const export_source *content, const export_parts *parts,
                   uint32_t *corners, size_t *next) {
   for (size_t t = 0; t < content->info->triangle_count; ++t) {

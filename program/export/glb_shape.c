@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Meshes of a glTF file, their morph targets, nodes and materials. */
+/* Append meshes with morph targets, nodes and materials to a glTF file. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -29,7 +29,7 @@ json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb
   return (json_int_t)json_array_size(g->materials) - 1;
 }
 
-/* Compute a vertex of target `j`, in stored units. */
+/* Compute the displacement of a vertex in target `j`, in units of glb.step. */
 static void place_target(const glb *g, const glb_shape *shape, size_t j, size_t vertex,
                          double xyz[3]) {
   supine_export_targets_field(shape->source, vertex, j, xyz);
@@ -38,8 +38,8 @@ static void place_target(const glb *g, const glb_shape *shape, size_t j, size_t 
   }
 }
 
-/* Compute a vertex of the base, in stored units, so that what is lost by rounding the targets is
- * made up for at rest. */
+/* Compute a vertex of the base mesh, in units of glb.step, with a correction that cancels the
+ * rounding of the targets at the weights `rest`. */
 static void place_base(const glb *g, const glb_shape *shape, const double *rest, size_t vertex,
                        double xyz[3]) {
   supine_export_targets_base(shape->source, &g->targets, shape->lung, vertex, xyz);
@@ -55,7 +55,7 @@ static void place_base(const glb *g, const glb_shape *shape, const double *rest,
   }
 }
 
-/* Append target `j` of a shape, or the base where `j` is the number of targets. */
+/* Append the positions of target `j` of a shape, or of the base if `j` is the number of targets. */
 static json_int_t put_places(glb *g, const glb_shape *shape, size_t j, const double *rest,
                              float *xyz) {
   const size_t first = shape->source->info->lung_begin[shape->lung];

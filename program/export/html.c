@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The page: page.html with its other sources and the basis. */
+/* Write the page: fill page.html with its scripts, its shaders and the basis. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 #include "program/export/template.h"
 #include "program/render/render.h"
 
-extern const supine_asset supine_export_assets[]; /* page/, put in by the build */
+extern const supine_asset supine_export_assets[]; /* files of page/, embedded by the build */
 
 enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3 };
 
@@ -19,12 +19,12 @@ enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3 };
 typedef struct page {
   const export_source *source;
   const export_page *shown;
-  double middle[3];   /* of the box of all vertices, mm: positions count from there */
+  double middle[3];   /* origin of stored positions: centre of the box of all vertices, mm */
   double place_unit;  /* mm per count of a position */
   double unit;        /* mm per count of a coefficient, for directions of unit length */
-  double inside_unit; /* the same for what is inside */
-  uint32_t *corners;  /* of the triangles, lung by lung */
-  size_t corner_begin[SUPINE_LUNGS_MAX + 1];
+  double inside_unit; /* mm per count of a coefficient of the content */
+  uint32_t *corners;  /* vertex indices of the triangles, lung by lung */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /* first corner of each lung, and the end */
   supine_status *status;
 } page;
 
@@ -82,8 +82,9 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* The three numbers of a word of the normals, which supine.glsl reads from its bits: the first of
- * all words and axes, then the second, then the third. */
+/* Unpack the words of a vertex' normals, each of which holds three numbers (see supine.glsl): fill
+ * the row with the first numbers of all words and axes, then the second ones, then the third ones.
+ */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
@@ -98,7 +99,7 @@ static void normal_row(const page *p, const export_source *s, size_t vertex, int
 
 typedef void fill_row(const page *p, const export_source *s, size_t vertex, int16_t *row);
 
-/* Write a row of `columns` counts for each vertex, padded to an even number. */
+/* Write a row of `columns` 16-bit counts for each vertex, padded to an even number of columns. */
 static void write_rows(const page *p, FILE *file, const char *name, const export_source *s,
                        size_t columns, fill_row *fill) {
   const size_t n = s->info->vertex_count;
@@ -124,7 +125,8 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
   write_packed(p, file, name, status, packed);
 }
 
-/* Choose the sizes of counts: fine enough for positions to 0.02 mm, and so that all fit. */
+/* Choose the units of the counts: small enough for positions to 0.02 mm, unless a count would
+ * exceed COUNT_MAX. */
 static void find_units(page *p) {
   static const double step = 0.005;
   const export_source *s = p->source;
@@ -154,7 +156,7 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* Write the basis' tensors of doubles as they are. */
+/* Write those tensors of doubles that the basis has, uncompressed. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -170,7 +172,7 @@ static void write_doubles(FILE *file, const supine_basis *basis) {
   }
 }
 
-/* Each map's 256 colours as hexadecimal digits. */
+/* Return the 256 colours of each map as hexadecimal digits. */
 static json_t *colours(void) {
   static const char *const names[SUPINE_COLOURS_COUNT] = {"displacement", "difference"};
   enum { COLOURS = 256 };
@@ -189,7 +191,7 @@ static json_t *colours(void) {
   return maps;
 }
 
-/* Where each lung begins among vertices or corners, and the end. */
+/* Return `begin`, [lungs + 1], as JSON: where each lung begins among vertices or corners. */
 static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
   for (size_t i = 0; i <= s->info->lung_count; ++i) {
@@ -198,7 +200,7 @@ static json_t *begins(const export_source *s, const size_t *begin) {
   return list;
 }
 
-/* Return the embedded structures as JSON, or null. */
+/* Return the description of the content as JSON; null without content. */
 static json_t *describe_inside(const page *p) {
   if (p->shown->inside == NULL) {
     return json_null();
@@ -221,7 +223,8 @@ static json_t *describe_inside(const page *p) {
                    "unit", p->inside_unit);
 }
 
-/* mL of the scan beyond the reference surface. */
+/* Return the volume of the scan minus that of the reference surface, all lungs together, mL; 0 if
+ * it is unknown. */
 static double scan_volume(const export_source *s) {
   const supine_state scan = supine_basis_scan(s->basis);
   double held[SUPINE_LUNGS_MAX];
@@ -238,7 +241,7 @@ static double scan_volume(const export_source *s) {
   return beyond;
 }
 
-/* State that displacements are measured from. */
+/* Return the pose that displacements are measured from as JSON. */
 static json_t *describe_from(const page *p) {
   return json_pack(
       "{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",
@@ -273,7 +276,7 @@ static json_t *describe(const page *p) {
       supine_template_numbers(info->bend, 3));
 }
 
-/* {{tensors}} */
+/* Write the tensors in place of {{tensors}}. */
 static void write_tensors(const void *context, const char *name, FILE *file) {
   const page *p = context;
   const export_source *s = p->source;
@@ -303,11 +306,12 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error) {
   const supine_basis_info *info = source->info;
   if (info->vector || info->mode_count > EXPORT_PAGE_MODES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
-                            "a page shows scalar bases of up to %d modes; this one is %s of %zu: "
-                            "precompute it with --modes %d, or export .glb",
-                            EXPORT_PAGE_MODES_MAX, info->vector ? "a vector basis" : "scalar",
-                            info->mode_count, EXPORT_PAGE_MODES_MAX);
+    return supine_error_set(
+        error, SUPINE_ERROR_UNSUPPORTED,
+        "a page shows scalar bases of up to %d modes; this is a %s basis of %zu "
+        "mode%s: precompute it with --modes %d, or export .glb",
+        EXPORT_PAGE_MODES_MAX, info->vector ? "vector" : "scalar", info->mode_count,
+        info->mode_count == 1 ? "" : "s", EXPORT_PAGE_MODES_MAX);
   }
   supine_status status = supine_export_pack_begin(error);
   page p = {.source = source, .shown = shown, .status = &status};

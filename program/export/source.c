@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A basis with all of its tensors, and a breath of its lungs. */
+/* Open a basis to export, and compute poses during a breath. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -74,8 +74,11 @@ supine_status supine_export_breath_set(const export_source *source, double volum
     farthest = fmax(farthest, hypot(hypot(sum[0], sum[1]), sum[2]));
   }
   if (!(farthest > 0)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "nothing moves when supine: no breath scale gives %g mm", largest);
+    return supine_error_set(
+        error, SUPINE_ERROR_NUMERICAL,
+        "the basis has no displacement when supine, so no breath can move it by %g "
+        "mm: check its forces and precompute it again",
+        largest);
   }
   breath->scale = largest / farthest;
   return SUPINE_OK;

@@ -8,7 +8,8 @@
 #include "sh/base/vec3.h"
 
 enum { DIRECTIONS = 4096 };
-static const double margin = 0.02; /* of each range, for directions between those sampled */
+/* Share of each range that is added at both ends, for directions between those sampled. */
+static const double margin = 0.02;
 
 /* Find s and t of gains s + t bend, from the axes that bend least and most. */
 static void split_gains(const double bend[3], const double gains[3], double split[2]) {
@@ -42,9 +43,9 @@ void supine_export_targets_weights(const export_source *source, const export_tar
   }
 }
 
-/* Find the least amount of each field over directions and the breath, as its offset, and the range
- * above it, as its unit. Gains go one way with the volume, so the breath's ends are the extremes.
- */
+/* Find the smallest amount of each field over directions and the breath, as its offset, and the
+ * range above it, as its unit. Gains are monotonic in the volume, so both ends of the breath
+ * suffice. */
 static supine_status find_ranges(const export_source *source, const export_breath *breath,
                                  export_targets *targets, supine_error *error) {
   double amounts[EXPORT_TARGETS_MAX];
@@ -107,7 +108,7 @@ void supine_export_targets_field(const export_source *source, size_t vertex, siz
   }
 }
 
-/* Add sum over j of amount_j field_j. */
+/* Add the sum over j of amount_j field_j at a vertex to `xyz`. */
 static void add_fields(const export_source *source, size_t count, const double *amount,
                        size_t vertex, double xyz[3]) {
   for (size_t j = 0; j < count; ++j) {
@@ -127,7 +128,8 @@ void supine_export_targets_base(const export_source *source, const export_target
   add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
 }
 
-/* Normals of the surface where one weight is `step` away from a pose, in every lung. */
+/* Compute the normals of the surface at `weights`, [lungs], with weight j increased by `step` in
+ * every lung. `xyz` is workspace, [N, 3]. */
 static void find_normals(const export_source *source, const export_targets *targets,
                          double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
                          float *normals) {
@@ -149,16 +151,16 @@ static void find_normals(const export_source *source, const export_targets *targ
   supine_normals(source->basis, xyz, normals);
 }
 
-/* Engines draw normalize(base + sum over j of weight_j added_j), so a vertex' normals may be
- * divided by the length of its base, which glTF wants to be 1. */
+/* Scale the base normals to length 1, which glTF requires, and divide what targets add to them by
+ * the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* of a base that points somewhere */
+  static const double least = 0.2; /* smallest length to divide by; limits what targets add */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
     const double length = hypot(hypot((double)b[0], (double)b[1]), (double)b[2]);
-    if (length < 1e-6) { /* a vertex without a triangle */
+    if (length < 1e-6) { /* the vertex is in no triangle */
       b[2] = 1;
       continue;
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Morph targets of a basis, and their weights. */
+ * Compute the morph targets of a basis and their weights. */
 #ifndef SUPINE_EXPORT_TARGETS_H
 #define SUPINE_EXPORT_TARGETS_H
 
@@ -8,15 +8,15 @@
 
 enum { EXPORT_TARGETS_MAX = 2 * SUPINE_MODES_MAX };
 
-/** The weights of one lung's targets. They lie within 0 and 1 for every direction of gravity and
- * every breath up to the one exported, because engines clamp them:
+/** Offsets and units of one lung's weights. Engines clamp weights to [0, 1], so these are chosen to
+ * keep them there for every direction of gravity and every volume up to the end of the breath:
  *
  *     base = vertex - middle + sum over j of offset_j field_j        target_j = unit_j field_j
  *     weight_j = (gain v - offset_j) / unit_j
  *
- * With K modes, gains A = s + t bend of the three axes and weights v_k: field_k is the displacement
- * of mode k and its gain is s; where gains differ between axes, field_(K + k) is the same times
- * bend, axis by axis, and its gain is t. */
+ * The basis has K modes, weights v_k and, along the three axes, gains A = s + t bend. field_k is
+ * the displacement of mode k, and its gain is s; where gains differ between axes, field_(K + k) is
+ * that displacement times bend, axis by axis, and its gain is t. */
 typedef struct export_weights {
   double offset[EXPORT_TARGETS_MAX];
   double unit[EXPORT_TARGETS_MAX];
@@ -41,12 +41,12 @@ void supine_export_targets_weights(const export_source *source, const export_tar
 /** Compute the displacement of field `j` at a vertex, mm. */
 void supine_export_targets_field(const export_source *source, size_t vertex, size_t j, double u[3]);
 
-/** Compute a vertex of the base, mm. */
+/** Compute a vertex of the base, mm from the middle. */
 void supine_export_targets_base(const export_source *source, const export_targets *targets,
                                 size_t lung, size_t vertex, double xyz[3]);
 
-/** Compute normals of the base, unit, [N, 3], and what each weight adds to them, [count, N, 3]: the
- * linear change of the surface's own normals about supine at rest.
+/** Compute unit normals of the base, [N, 3], and what each target adds to them at weight 1, [count,
+ * N, 3], by linearising the surface's normals at supine, at rest.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_targets_normals(const export_source *source,
                                             const export_breath *breath,

@@ -14,7 +14,7 @@ const supine_asset *supine_template_asset(const supine_asset *assets, const char
   return NULL;
 }
 
-/* A value of the data, and those around it. */
+/* A value of the data, and the scope around it. */
 typedef struct scope {
   const json_t *value;
   const struct scope *outer;
@@ -25,7 +25,7 @@ typedef struct tag {
   char kind; /* '#', '/' or 0 */
   const char *name;
   size_t length;
-  const char *begin, *end; /* of the tag with its braces; end NULL: no more tags */
+  const char *begin, *end; /* of the tag with its braces; both NULL if there is no further tag */
 } tag;
 
 static tag next_tag(const char *at, const char *end) {
@@ -89,7 +89,7 @@ static void write_named(const supine_template *t, const tag *named, const scope 
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
     const size_t size =
-        asset->size - (asset->bytes[asset->size - 1] == '\n'); /* the tag's line ends */
+        asset->size - (asset->bytes[asset->size - 1] == '\n'); /* the tag's line has its own newline */
     fill(t, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {
     (void)fwrite(asset->bytes, 1, asset->size, file);
@@ -100,7 +100,7 @@ static void write_named(const supine_template *t, const tag *named, const scope 
   }
 }
 
-/* Find the tag that ends a section; its end is NULL if there is none. */
+/* Return the tag that ends a section; its `end` is NULL if there is none. */
 static tag find_end(const char *at, const char *end) {
   size_t depth = 1;
   tag found = next_tag(at, end);

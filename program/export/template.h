@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Templates of the page and the report:
+ * Fill the templates of the page and the report:
  *
- *     {{name}}                a string or number of the data, escaped; or another asset, a .html
- *                             filled with the same data, anything else as it is
- *     {{#name}} ... {{/name}} once for each element of a list, once for an object or a value that
- *                             is true; not at all where there is none
+ *     {{name}}                a string or number of the data, escaped; else the asset of that name,
+ *                             a .html filled with the same data, any other file unchanged
+ *     {{#name}} ... {{/name}} repeated for each element of a list; once for an object, a string, a
+ *                             number or true; omitted for false, null or an unknown name
  *     {{.}}                   the element itself
  *
- * Inside a section its element's names come first, then those around it. A line's end right after
- * a section's tag is left out. */
+ * Inside a section, names are looked up in its element first, then in those around it. A newline
+ * right after the tag of a section is omitted. */
 #ifndef SUPINE_TEMPLATE_H
 #define SUPINE_TEMPLATE_H
 
@@ -19,7 +19,7 @@
 
 /** A file embedded in the program by supine_embed; an array of them ends with a NULL name. */
 typedef struct supine_asset {
-  const char *name;  /**< "page.css" */
+  const char *name;  /**< file name, as "page.css" */
   const char *bytes; /**< ends with a 0 that `size` does not count */
   size_t size;
 } supine_asset;
@@ -32,8 +32,8 @@ const supine_asset *supine_template_asset(const supine_asset *assets, const char
 typedef struct supine_template {
   const supine_asset *assets;
   const json_t *data;
-  /** Called for names that are neither data nor assets: writes what is too large for JSON; or NULL.
-   */
+  /** Write what is too large for JSON in place of a name that is neither data nor an asset; or
+   * NULL. */
   void (*write)(const void *context, const char *name, FILE *file);
   const void *context;
 } supine_template;
@@ -42,7 +42,7 @@ typedef struct supine_template {
  * them when the program is built. Write errors stay in the stream. */
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
 
-/** Return numbers as an array. */
+/** Return numbers as a JSON array. */
 json_t *supine_template_numbers(const double *values, size_t count);
 
 /** Write text with the reserved characters of HTML, & < > ", replaced. */
