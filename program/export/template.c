@@ -89,7 +89,7 @@ static void write_named(const supine_template *t, const tag *named, const scope 
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
     const size_t size =
-        asset->size - (asset->bytes[asset->size - 1] == '\n'); /* the tag's line has its own newline */
+        asset->size - (asset->bytes[asset->size - 1] == '\n'); /* the tag precedes one */
     fill(t, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {
     (void)fwrite(asset->bytes, 1, asset->size, file);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The basis in the page, and what the run-time library computes once a frame: weights from gravity,
-// the lungs' gains from a volume.
+// Read the basis from the page, and compute what the run-time library computes once a frame: weights from
+// gravity, and the lungs' gains from a volume.
 
 /** Decode base64. */
 function fromBase64(text) {
@@ -15,7 +15,7 @@ function fromBase64(text) {
   return bytes;
 }
 
-/** Take the bytes of a tensor out of the page. */
+/** Return the bytes of a tensor and remove its text from the page. */
 function takeBytes(name) {
   const element = document.getElementById(`tensor-${name}`);
   const text = element.textContent;
@@ -33,7 +33,7 @@ function takeCounts(name, rows, columns, filter) {
   return new Int16Array(bytes.buffer);
 }
 
-/** Take `columns` numbers a row, counts of `unit` from middle[column]. */
+/** Take rows of `columns` numbers, stored as counts of `unit` from middle[column]. */
 function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)) {
   const counts = takeCounts(name, rows, columns);
   const numbers = new Float32Array(rows * columns);
@@ -49,7 +49,7 @@ function takeTriangles(name, count) {
   return corners;
 }
 
-/** Take the normals' words as supine.glsl reads them: three numbers, of 13, 10 and 9 bits, to a word. */
+/** Take the normals and pack them as supine.glsl reads them: numbers of 13, 10 and 9 bits in each word. */
 function takeNormals(vertices, words) {
   const columns = 3 * words;
   const counts = takeCounts('normals', vertices, 3 * columns);
@@ -102,8 +102,8 @@ function readBasis() {
   return basis;
 }
 
-/** Return the factors of the recurrence below for a band, computed once. */
-const recurrences = new Map();
+const recurrences = new Map(); // factors by band
+/** Return the factors of the recurrence in harmonics() for a band, computed once. */
 function recurrenceOf(band) {
   if (!recurrences.has(band)) {
     const tops = new Float64Array(band + 1);
@@ -117,8 +117,8 @@ function recurrenceOf(band) {
   return recurrences.get(band);
 }
 
-/** Real spherical harmonics Y_lm of a unit vector at l*l + l + m, orthonormal, no Condon-Shortley
- * phase: q(l, m)(z) times Re, Im of (x + i y)^m, by the recurrence in l. */
+/** Return the real spherical harmonics Y_lm of a unit vector at l*l + l + m, orthonormal, without
+ * Condon-Shortley phase: q(l, m)(z) times Re, Im of (x + i y)^m, by the recurrence in l. */
 function harmonics(band, [x, y, z]) {
   const values = new Float64Array((band + 1) ** 2);
   const { tops, steps } = recurrenceOf(band);
@@ -144,7 +144,7 @@ function harmonics(band, [x, y, z]) {
   return values;
 }
 
-/** Compute the weights of the modes for gravity along a unit vector. */
+/** Return the weights of the modes for gravity along a unit vector. */
 function weightsFor(basis, gravity) {
   const y = harmonics(basis.band, gravity);
   return Float64Array.from({ length: basis.modes }, (_, k) => {
@@ -154,8 +154,8 @@ function weightsFor(basis, gravity) {
   });
 }
 
-/** Return the mL that lung `lung` gains at weights w, as a polynomial of its three gains:
- * f . (x, y, z, yz, xz, xy, xyz). Files whose gains are equal have one axis. */
+/** Return the volume of a lung at weights w minus that of its reference surface, mL, as coefficients f of
+ * its three gains: f . (x, y, z, yz, xz, xy, xyz). A basis whose gains are equal has one axis. */
 function lungForm(basis, lung, w) {
   const k = basis.modes;
   const dot = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += tensor[at + i] * w[i]; return sum; };
@@ -172,13 +172,13 @@ function lungForm(basis, lung, w) {
 
 const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
 
-/** Coefficients c of the mL gained where all gains are s: c[0] s + c[1] s^2 + c[2] s^3. */
+/** Return the coefficients c of that volume where all gains are s: c[0] s + c[1] s^2 + c[2] s^3. */
 const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
 const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
 
-/** Return the extremum of the volume nearest to s = 0 on one side, or infinity. */
+/** Return the s of the extremum of that volume nearest to 0 on one side, 1 or -1; infinite if none. */
 function cubicTurn(c, side) {
   const discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant < 0) return side * Infinity;
@@ -187,8 +187,8 @@ function cubicTurn(c, side) {
   return side * Math.min(Infinity, ...ahead);
 }
 
-/** The scale at which the volume is gained, on the branch that grows out of 0; NaN where the
- * surface would fold before. */
+/** Return the gain s at which that volume is `volume`, on the branch through s = 0; NaN if the surface
+ * would fold before. */
 function scaleForVolume(c, volume) {
   if (volume === 0) return 0;
   const side = volume / c[0] > 0 ? 1 : -1;
@@ -217,15 +217,16 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** The path of the gains from full inflation (sigma 0) to rest (1), relative to those at rest. */
+/** Return the three gains, relative to that at rest, on the path from full inflation (sigma 0) through
+ * rest (sigma 1). */
 function pathAt(bend, sigma) {
   const cube = sigma * sigma * sigma;
   const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   return bend.map((c) => sigma + 2 * c * e);
 }
 
-/** The three gains at which a lung of this form holds `volume` beyond the basis' surface, on the path
- * through `rest`; NaN where the surface would fold before. */
+/** Return the three gains at which a lung of this form holds `volume` beyond the reference surface, on the
+ * path through `rest`, both mL; NaN if the surface would fold before. */
 function gainsForVolume(form, bend, rest, volume) {
   const straight = bend.every((c) => c === 0) || volume === rest;
   const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
@@ -251,9 +252,9 @@ function gainsForVolume(form, bend, rest, volume) {
 
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
-/** What the lungs hold in a posture, mL beyond the basis' surface: at rest and at full inflation, by
- * lung; at rest only together (`rest` has one number) where all lungs have one gain. Rest is the scan
- * where the basis does not know it. */
+/** Return the volumes of the lungs in a posture, mL beyond the reference surface: `rest` and, at full
+ * inflation, `full`, by lung. `rest` is one number for all lungs together where they share one gain, and
+ * the scan where the basis does not know rest. */
 function volumesFor(basis, gravity) {
   const y = harmonics(2, gravity);
   const rows = basis.resting ? basis.resting.length / y.length : 1;
@@ -262,11 +263,11 @@ function volumesFor(basis, gravity) {
   return { rest, full: basis.references.map((ml) => (Number(basis.metadata.full_upright_gain) || 0) * up * ml) };
 }
 
-/** Return the resting volume of all lungs for gravity along a unit vector, mL beyond the basis' surface. */
+/** Return the resting volume of all lungs for gravity along a unit vector, mL beyond the reference surface. */
 const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
 
-/** Share a total out among the lungs: each fills on the straight line between its rest and its full
- * volume, all at the same part of the way; below rest all shrink in proportion. */
+/** Return the share of each lung in a total volume, mL beyond the reference surface: above rest, all have
+ * covered the same fraction of the way from rest to full; below rest all shrink in proportion. */
 function shareOut({ references }, { rest, full }, total) {
   const [all, resting] = [sumOf(references), sumOf(rest)];
   const part = (total - resting) / (sumOf(full) - resting);
@@ -274,17 +275,17 @@ function shareOut({ references }, { rest, full }, total) {
   return references.map((ml, lung) => (total >= resting ? rest[lung] + part * (full[lung] - rest[lung]) : (ml + rest[lung]) * shrunk - ml));
 }
 
-/** The gains of each lung, [x, y, z], at which the lungs hold `total` mL beyond the basis' surface
- * together. */
+/** Return the gains [x, y, z] of each lung at which all lungs together hold `total` mL beyond the
+ * reference surface. */
 function gainsFor(basis, forms, volumes, total) {
   if (basis.byLung) return shareOut(basis, volumes, total).map((ml, lung) => gainsForVolume(forms[lung], basis.bend, volumes.rest[lung], ml));
   const gains = gainsForVolume(forms[0].map((_, i) => sumOf(forms.map((f) => f[i]))), [0, 0, 0], 0, total);
   return forms.map(() => gains);
 }
 
-/** Everything about one moment: the modes' weights, three gains of each lung, and the mL that each
- * lung holds (`held`), gas and tissue. `depth` is mL above rest where the surface is closed, else mm of
- * the largest displacement when supine. `folds` where the surface would fold before it holds that. */
+/** Return one moment: the weights of the modes, three gains of each lung, and `held`, the volume of each
+ * lung with its tissue, mL. `depth` is mL above rest for a closed surface, else mm of the largest
+ * displacement when supine. `folds` is true if the surface would fold before it holds that volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   if (!basis.hasVolume) {
@@ -298,10 +299,10 @@ function momentFor(basis, gravity, depth) {
   return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
 }
 
-/** What supine.glsl multiplies by: the weights, three gains of each lung, and the weights of the normal's
- * modes, three to a word: modes j, j + words and j + 2 words. Of the normal's component along an axis
- * the monomials are 1, a w_k, b w_k, a b w_k w_l, with the gains a, b of the next two axes; files whose
- * gains are equal have one component for all, without b w_k. */
+/** Return the uniforms of supine.glsl: the weights, three gains of each lung, and the weights of the
+ * normal's modes, three to a word: modes j, j + words and j + 2 words. A weight is a polynomial for each
+ * component of the normal with the monomials 1, a w_k, b w_k, a b w_k w_l, where a and b are the gains
+ * along the next two axes; a basis whose gains are equal has one for all components, without b w_k. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const weights = new Float32Array(4 * Math.ceil(k / 4));
@@ -357,7 +358,7 @@ function placesOf({ rest, direction, coefficients, modes, lungBegin, lungs }, { 
   return places;
 }
 
-/** Compute the positions of the corners of a few thousand triangles, for the range of the colours. */
+/** Compute the positions of the corners of up to 3000 triangles, mm, for the range of the colours. */
 function samplePlaces(basis, moment) {
   const stride = 3 * Math.max(1, Math.ceil(basis.corners.length / 3 / 3000));
   const places = [];

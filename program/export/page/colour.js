@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colours, their ranges and ticks, by the same rule as in pictures and reports.
+// Compute colours, their ranges and ticks, by the same rules as for pictures and reports.
 
 /** Return a round number that fits 4 to 10 times into `value`. */
 function tickStep(value) {
@@ -15,7 +15,7 @@ function rangeEnd(value) {
   return value > 0 ? step * Math.ceil(value / step - 1e-9) : 5 * step;
 }
 
-/** Quantities to colour by: the shader's measure, colour map and unit. */
+/** Quantities to colour by: the shader's `kind`, colour map and unit. */
 const KINDS = {
   displacement: { measure: 0, map: 'displacement', unit: 'mm' },
   difference: { measure: 0, map: 'difference', unit: 'mm' },

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What is inside the lungs on the screen: a ball around each point, or a mesh, whose `ball` is 0.
+// Project the content of the lungs: a ball around each point, or vertices of meshes, whose `ball` is 0.
 layout(location = 0) in vec3 ball;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 moved;
-layout(location = 3) in vec3 origin; // what the colour measures from
-layout(location = 4) in float number; // of the part
+layout(location = 3) in vec3 origin; // position that the colour measures from
+layout(location = 4) in float number; // index of the part
 uniform mat4 toEye;
 uniform mat4 projection;
 uniform vec4 lens;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which part inside is under the pointer, as a number that is none, and where.
+// Write the part under the pointer as a NaN with the part in its low bits, and the position, as bits.
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

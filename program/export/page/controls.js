@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Pointer and keyboard on the two canvases, and the panel's controls.
+// Handle pointers, and write to the panel's controls and the colour bar.
 
 const $ = (id) => document.getElementById(id);
 
-/** Calls drag(dx, dy, moves) for one pointer, where `moves` says that it shifts rather than turns; for
- * two pinch(ratio, dx, dy, x, y); tap(event) for one that went nowhere. */
+/** Call drag(dx, dy, moves) when one pointer moves, where `moves` means to shift instead of turn;
+ * pinch(ratio, dx, dy, x, y) when two do; tap(event) when one is released without having moved. Distances
+ * are CSS pixels. Return a function that tells whether a drag is under way. */
 function onDrag(element, drag, pinch, tap) {
   const pointers = new Map();
   let far = 0; // CSS pixels that the pointers have moved since the first came down
@@ -40,7 +41,7 @@ function onDrag(element, drag, pinch, tap) {
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** Show the position of a slider. */
+/** Draw the filled part of a slider. */
 function fill(slider) {
   slider.style.setProperty('--filled', `${(100 * (slider.value - slider.min)) / (slider.max - slider.min)}%`);
 }
@@ -48,12 +49,12 @@ function fill(slider) {
 /** Set a text if it has changed. */
 function write(id, text) {
   const element = $(id);
-  if (element.written === text) return; // reading it from the page is slower
+  if (element.written === text) return; // reading textContent is slower
   element.written = text;
   element.textContent = text;
 }
 
-/** Set a slider, the number beside it, and its text. */
+/** Set a slider, the number beside it and its accessible text. */
 function setSlider(id, value, text, digits = 0) {
   const slider = $(id);
   if (slider.written === text) return;
@@ -65,7 +66,7 @@ function setSlider(id, value, text, digits = 0) {
   fill(slider);
 }
 
-/** Both of them act. */
+/** Call act(value) when a slider or the number beside it changes; the value is clamped to its range. */
 function onSlider(id, act) {
   const take = (input) => {
     const value = input.valueAsNumber;
@@ -121,7 +122,7 @@ function drawLegend(kind, range, title, colours) {
   write('range-unit', KINDS[kind].unit);
 }
 
-/** Return a position in the patient as text: L 97 P 12 H -45. */
+/** Return a position in the patient, mm, as text: "L 97  P 12  F 45 mm". */
 function placeText([x, y, z]) {
   const part = (v, plus, minus) => `${v >= 0 ? plus : minus} ${Math.abs(v).toFixed(0)}`;
   return `${part(x, 'L', 'R')}  ${part(y, 'P', 'A')}  ${part(z, 'H', 'F')} mm`;

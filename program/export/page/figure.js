@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The patient as a small figure of ellipsoids on a 2-D canvas: on the ball, and as the postures' icons.
+// Draw the patient as a small figure of ellipsoids on 2-D canvases: in the ball, and as icons of the postures.
 
-// Centre and half axes, patient's axes (x left, y back, z head), and a tone. Face, lungs and toes are
-// in front, hair behind.
+// Centres, half axes and tones of the ellipsoids, in the patient's axes (x left, y back, z head). Face,
+// lungs and toes are in front, hair is behind.
 const BODY = [
   { at: [0, 0, 0.2], size: [0.25, 0.145, 0.3], tone: 'body' },
   { at: [0, 0.01, -0.14], size: [0.2, 0.14, 0.17], tone: 'body' },
@@ -25,8 +25,8 @@ for (const part of BODY) part.squares = part.size.map((x) => x * x);
 /** The ends of the patient's axes. */
 const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
-/** The light on a ball of radius 1 of each tone, made once a canvas and theme. */
-const lights = new WeakMap();
+const lights = new WeakMap(); // gradients by context
+/** Return the gradients that shade a ball of radius 1 in each tone, made once for a canvas and theme. */
 function lightsOf(context, tones) {
   const made = lights.get(context);
   if (made?.tones === tones) return made;
@@ -40,7 +40,8 @@ function lightsOf(context, tones) {
   return fresh;
 }
 
-/** Draw the figure, turned by q into the eye's axes (x right, y up, z to the viewer). */
+/** Draw the figure at (x, y), `scale` CSS pixels per unit; q turns it into the eye's axes (x right, y up,
+ * z to the viewer). */
 function drawFigure(context, q, x, y, scale, tones) {
   const [ex, ey, ez] = AXES.map((axis) => rotate(q, axis));
   const light = lightsOf(context, tones);
@@ -51,13 +52,13 @@ function drawFigure(context, q, x, y, scale, tones) {
     xx: a * ex[0] * ex[0] + b * ey[0] * ey[0] + c * ez[0] * ez[0],
     xy: a * ex[0] * ex[1] + b * ey[0] * ey[1] + c * ez[0] * ez[1],
     yy: a * ex[1] * ex[1] + b * ey[1] * ey[1] + c * ez[1] * ez[1],
-    // The half axis that points most to the viewer decides what hides what.
+    // Parts are drawn in the order of this depth: of the centre, and half of the extent towards the viewer.
     front: at[0] * ex[2] + at[1] * ey[2] + at[2] * ez[2] + 0.5 * Math.sqrt(a * ex[2] * ex[2] + b * ey[2] * ey[2] + c * ez[2] * ez[2]),
   })).sort((a, b) => a.front - b.front);
   context.save();
-  const { a: ratio } = context.getTransform(); // the screen's pixels, of freshContext
+  const { a: ratio } = context.getTransform(); // device pixels per CSS pixel, from freshContext
   for (const part of parts) {
-    // The root of the ellipse's matrix takes the circle there, its light still from above.
+    // The symmetric square root of the ellipse's matrix maps the circle to it without rotating its light.
     const det = Math.sqrt(Math.max(part.xx * part.yy - part.xy * part.xy, 0));
     const by = (ratio * scale) / Math.sqrt(part.xx + part.yy + 2 * det);
     context.setTransform(by * (part.xx + det), -by * part.xy, -by * part.xy, by * (part.yy + det), ratio * (x + scale * part.x), ratio * (y - scale * part.y));
@@ -69,9 +70,9 @@ function drawFigure(context, q, x, y, scale, tones) {
   context.restore();
 }
 
-/** Return the size of a canvas, CSS pixels, measured only when it changes, because reading it lays the page out. */
 const sizes = new WeakMap();
 const measured = new ResizeObserver((entries) => entries.forEach(({ target }) => sizes.delete(target)));
+/** Return the size of a canvas, CSS pixels. It is measured only after a change, because that forces a layout. */
 function sizeOf(canvas) {
   if (!sizes.has(canvas)) {
     sizes.set(canvas, { width: canvas.clientWidth, height: canvas.clientHeight });
@@ -80,7 +81,7 @@ function sizeOf(canvas) {
   return sizes.get(canvas);
 }
 
-/** Size a canvas for the screen's pixels and return its context, in CSS pixels, cleared. */
+/** Fit a canvas to the screen's pixels, clear it, and return its context, scaled to CSS pixels. */
 function freshContext(canvas) {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   const { width, height } = sizeOf(canvas);
@@ -92,7 +93,7 @@ function freshContext(canvas) {
   return context;
 }
 
-/** The theme's colours, read once a theme. */
+/** Colours of the current theme, set by readTheme. */
 const theme = {};
 function readTheme() {
   const style = getComputedStyle(document.documentElement);
@@ -105,10 +106,11 @@ function readTheme() {
 }
 const css = (name) => theme[name.slice(2)];
 
-const GLYPH = 18; // CSS pixels of a letter's box
+const GLYPH = 18; // side of a letter's box, CSS pixels
 
-/** The ball's letters, those in front above those behind, drawn once a theme: text is slow. */
 let glyphsMade = null;
+/** Return a canvas with the ball's letters in two rows, front and back colours, drawn once for a theme
+ * because text is slow. */
 function glyphsOf() {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   if (glyphsMade?.tones === theme.tones && glyphsMade.ratio === ratio) return glyphsMade;
@@ -128,9 +130,9 @@ function glyphsOf() {
   return glyphsMade;
 }
 
-/** The ball: the patient inside, gravity as an arrow. `toEye` turns the patient's axes to the eye's. */
-let drawn = [];   // what the ball shows now
-let glass = null; // the ball's shading, made once for a size and theme
+let drawn = [];   // size, theme, rotation and gravity that the ball shows now
+let glass = null; // gradient of the ball, made once for a size and theme
+/** Draw the ball: the patient inside, gravity as an arrow. `toEye` turns the patient's axes to the eye's. */
 function drawBall(canvas, toEye, gravity) {
   const { width: size } = sizeOf(canvas);
   const now = [size, window.devicePixelRatio, theme.tones, ...toEye, ...gravity];
@@ -175,7 +177,7 @@ function drawBall(canvas, toEye, gravity) {
     context.globalAlpha = front ? 1 : 0.4;
     context.beginPath(); // one stroke for all three
     for (const n of [ends[0], ends[3], ends[4]]) { // L, P and H
-      // A circle about n is seen as an ellipse, the near half of which lies away from n.
+      // The great circle normal to n projects to an ellipse; its near half lies opposite to n.
       const begin = n[2] > 0 === front ? -radius : radius;
       const angle = Math.atan2(-n[0], -n[1]);
       context.moveTo(centre + begin * Math.cos(angle), centre + begin * Math.sin(angle));
@@ -208,13 +210,13 @@ function drawBall(canvas, toEye, gravity) {
   }
 }
 
-/** Return the lowest point of the figure turned by q: the height of its table. */
+/** Return the height of the lowest point of the figure turned by q, where its table is. */
 function lowestPart(q) {
   const up = rotate(inverse(q), [0, 1, 0]);
   return Math.min(...BODY.map((part) => dot(up, part.at) - Math.hypot(...part.size.map((s, i) => s * up[i]))));
 }
 
-/** The icon of a posture: the figure as it lies in the room on a table, seen from its side. */
+/** Draw the icon of a posture: the figure in the room, on a table, seen from its side. */
 function drawIcon(canvas, bodyToRoom) {
   const context = freshContext(canvas);
   const { width, height } = sizeOf(canvas);

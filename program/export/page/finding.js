@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Findings in words: what each lung gains or loses, and how far the surface moves.
+// Write findings in words: what each lung gains or loses, and how far the surface moves.
 
 const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.abs(value)}`;
 
-/** Published changes of volume at rest, % of supine: mean and standard deviation. */
+/** Published changes of each lung's volume at rest, % of supine: mean and standard deviation. */
 const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
 
-/** Return the mL that each lung holds. */
+/** Return the volume of each lung, mL, tissue included. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
-/** Compute the area of each vertex: a third of the triangles around it. */
+/** Return a weight of each vertex, proportional to the area of the triangles around it. */
 function areasOf({ rest, corners, vertices }) {
   const areas = new Float32Array(vertices);
   for (let t = 0; t < corners.length; t += 3) {
@@ -20,8 +20,8 @@ function areasOf({ rest, corners, vertices }) {
   return areas;
 }
 
-/** How far every `stride`th vertex is in one moment from where it is in another, mm: the mean over the
- * surface, what 95 % of it do not exceed, within a 2000th of the largest, and the largest. */
+/** Return statistics of the displacement between two moments, mm, over every `stride`th vertex: the mean
+ * over the area, its 95th percentile (rounded up to a 2000th of the largest) and the largest. */
 function moveBetween(basis, now, from, stride) {
   basis.areas ??= areasOf(basis);
   const { modes, coefficients, direction, areas } = basis;
@@ -49,7 +49,7 @@ function moveBetween(basis, now, from, stride) {
   return { mean: sum / area, p95: (bin / 2000) * largest, largest };
 }
 
-/** "On the left side", "Supine, 15 degrees head down," and so on. */
+/** Return how a sentence about a posture begins: "On the left side", "Supine, 15 degrees head down,". */
 function whereWords(gravity) {
   const text = postureText(gravity);
   const [, name, tilt] = /^([a-z]+)([+-]\d+)?$/.exec(text) ?? [];
@@ -58,7 +58,7 @@ function whereWords(gravity) {
   return `${name[0].toUpperCase()}${name.slice(1)},${tilt ? ` ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'},` : ''}`;
 }
 
-/** "the right lung gains 122 mL (+18 %)" of each lung, the largest change first. */
+/** Return a phrase for each lung, the largest change first: "the right lung gains 122 mL (+18 %)". */
 function lungWords(basis, held, before) {
   return held.map((ml, lung) => ({ name: basis.lungNames[lung], ml: Math.round(ml - before[lung]), percent: Math.round((100 * (ml - before[lung])) / before[lung]) }))
     .sort((a, b) => Math.abs(b.ml) - Math.abs(a.ml))
@@ -77,9 +77,10 @@ function findingOf(basis, moment, gravity, volume, stride) {
   return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, move.replace(/^t/, 'T')];
 }
 
-/** How far off the moves of one moment from `from` are expected to be, mm RMS over the vertices, as the
- * library has it: sigma^2 = |u| min(constant, RMS of u), and where rest is a guess, 5 % of full inflation
- * more. `fuller` are both moments with rest fuller by a hundredth of that; null where rest is known. */
+/** Return the expected error of the displacement u from one moment to another, mm RMS over the vertices, as
+ * the library computes it: sigma^2 = |u| min(constant, RMS of u), plus, where rest is assumed, the square
+ * of the effect of 5 % of full inflation more at rest. `fuller` holds both moments with 1 % more; null
+ * where rest is known. */
 function expectedError(basis, now, from, fuller) {
   const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
   const more = fuller?.map((moment) => placesOf(basis, moment));
@@ -99,8 +100,8 @@ function expectedError(basis, now, from, fuller) {
   return Math.sqrt((Math.min(Number(basis.metadata.expected_error_mm), Math.sqrt(squares / n)) * lengths + slopes * (0.05 / 0.01) ** 2) / n);
 }
 
-/** The same in words, of a posture `depth` mL above rest; empty where the basis states no error, or
- * displacements do not count from supine at rest. */
+/** Return the expected error in words for a posture `depth` mL above rest; empty if the basis states no
+ * error or displacements are not measured from supine at rest. */
 function errorWords(basis, moment, depth) {
   const { metadata, from } = basis;
   if (!metadata.expected_error_mm || !moment.held || from.name !== 'supine at rest') return '';
@@ -110,7 +111,7 @@ function errorWords(basis, moment, depth) {
   return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
 }
 
-/** "L \u22121 %, R +18 %, 6.9 mm": the answer of a moment, as short as a card. */
+/** Return the changes in a moment, short enough for a card: "L \u22121 %, R +18 %, 6.9 mm". */
 function answerOf(basis, moment) {
   const { mean, largest } = moveBetween(basis, moment, basis.from, 1);
   if (largest < 0.05) return 'reference';
@@ -119,7 +120,7 @@ function answerOf(basis, moment) {
   return `${lungs.join('')}${mean.toFixed(1)}\u00a0mm`;
 }
 
-/** Write a finding with the changes of volume emphasised. */
+/** Write a finding and emphasise the changes of volume. */
 function writeFinding(element, text) {
   if (element.written === text) return;
   element.written = text;
@@ -131,7 +132,7 @@ function writeFinding(element, text) {
   }));
 }
 
-/** Bars of what each lung holds: grey before, and what has been gained or lost since. */
+/** Bars of the volume of each lung: grey for that before, then what has been gained or lost. */
 class Holds {
   constructor(parent, { lungNames }) {
     this.rows = lungNames.map(() => {
@@ -149,8 +150,9 @@ class Holds {
     });
   }
 
-  /** `held` and `before` are mL of each lung, `most` is the longest bar to come, `heights` how high lungs lie,
-   * `measured` of PUBLISHED, where there is any. */
+  /** Show the volumes `held` and `before` of each lung, mL. `most`, mL, is the largest volume in any posture,
+   * for the scale; `heights`, mm, of the lungs say which is uppermost; `measured` is the entry of PUBLISHED
+   * for this posture, if any. */
   show({ lungNames }, held, before, most, heights, measured) {
     const full = 1.06 * Math.max(most, ...held, ...before.map((ml, lung) => ml * (1 + (measured?.[lungNames[lung]] ?? [0, 0]).reduce((sum, x) => sum + x, 0) / 100)));
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // mm

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What is inside the lungs: named points and meshes, which move by the weights and gains of their lung
-// along displacements of their own, [vertex][axis][mode].
+// Read and show the content of the lungs: named points and meshes, which move by the weights and gains of
+// their lung and a displacement field of their own, [vertex][axis][mode].
 
 const BALL_RADIUS = 4; // mm, of the ball drawn at a point
 
-/** Take the content out of the page, points before meshes, so that each kind is one draw call. */
+/** Take the content out of the page and sort points before meshes, so that each kind is one draw call. */
 function takeInside({ inside, modes: k, placeUnit, middle }) {
   const { vertices: n } = inside;
   inside.modes = k;
@@ -12,12 +12,12 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
     takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', inside.triangles)];
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
-  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // whose vertices stay together
+  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // keeps the vertices of rigid parts together
   const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || a - b);
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
   inside.points = meshed.indexOf(1) < 0 ? n : n - meshed.reduce((sum, x) => sum + x, 0);
-  inside.rest = new Float32Array(4 * n); // and the lung
+  inside.rest = new Float32Array(4 * n); // reference position, mm, and lung
   inside.fields = new Float32Array(3 * k * n);
   inside.part = new Float32Array(n);
   inside.members = inside.names.map(() => []); // vertices of each part
@@ -31,7 +31,7 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
   inside.normals = normalsOf(inside);
 }
 
-/** Compute the unit normals of the reference surface. */
+/** Return the vertices' unit normals in the reference state; 0 for points. */
 function normalsOf({ rest, vertices, corners }) {
   const normals = new Float32Array(3 * vertices);
   const at = (v) => [...rest.subarray(4 * v, 4 * v + 3)];
@@ -47,7 +47,7 @@ function normalsOf({ rest, vertices, corners }) {
   return normals;
 }
 
-/** Compute the position of a vertex by its own displacement field. */
+/** Return the position of a vertex by the displacement field, mm. */
 function fieldPlace({ rest, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
@@ -56,8 +56,9 @@ function fieldPlace({ rest, fields, modes: k }, { weights, gains }, vertex) {
   });
 }
 
-/** The rotation, rows, that fits `h`, sums of products of places before and after, counted from their
- * means: the largest eigenvector of a symmetric matrix, by powers (as runtime/rigid.c). */
+/** Return the rotation, by rows, that best maps positions before to positions after. `h` is the 3 x 3 sum of
+ * their products, both centred. The rotation's quaternion is the eigenvector of a symmetric matrix with the
+ * largest eigenvalue, found by power iteration (as in runtime/rigid.c). */
 function rotationOf(h) {
   const m = [[h[0] + h[4] + h[8], h[5] - h[7], h[6] - h[2], h[1] - h[3]], [h[5] - h[7], h[0] - h[4] - h[8], h[1] + h[3], h[6] + h[2]],
     [h[6] - h[2], h[1] + h[3], h[4] - h[0] - h[8], h[5] + h[7]], [h[1] - h[3], h[6] + h[2], h[5] + h[7], h[8] - h[0] - h[4]]];
@@ -72,7 +73,8 @@ function rotationOf(h) {
     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]];
 }
 
-/** Where the vertices of a part are: of a rigid one, moved by the rigid motion that fits the field best. */
+/** Return the positions of the vertices of a part, mm; a rigid part takes the rigid motion closest to its
+ * field. */
 function insidePlaces(inside, moment, part) {
   const members = inside.members[part];
   const to = members.map((vertex) => fieldPlace(inside, moment, vertex));
@@ -85,13 +87,13 @@ function insidePlaces(inside, moment, part) {
   return from.map((p) => rotation.map((row, axis) => after[axis] + row.reduce((sum, x, k) => sum + x * (p[k] - before[k]), 0)));
 }
 
-/** Compute the position of a vertex. */
+/** Return the position of a vertex, mm, in a rigid part or not. */
 function insidePlace(inside, moment, vertex) {
   return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
 }
 
-/** Where a part is in one moment, the middle of a mesh, and how far its vertices have moved since
- * another, in the mean. */
+/** Return the mean position of the vertices of a part in one moment and their mean distance from another,
+ * mm. */
 function insidePart(inside, part, now, from) {
   const [places, before] = [now, from].map((moment) => insidePlaces(inside, moment, part));
   const place = [0, 0, 0];
@@ -117,9 +119,9 @@ function insideNearest(inside, part, moment, place) {
 /** Largest number of rows shown; longer tables are searched by name. */
 const ROWS_SHOWN = 200;
 
-/** The table of what is inside: a button for each part, which keeps its name in the picture; where it
- * is, and how far it has moved. `state.named` are the parts whose names are kept; `look` asks for the
- * picture. */
+/** Table of the content, one row for each part: a button that toggles the part's name in the picture, its
+ * position and how far it has moved. `state.named` lists the parts with names in the picture; `look`
+ * requests a new picture. */
 class InsideTable {
   constructor(inside, state, look) {
     Object.assign(this, { inside, state, look, rows: [], pointed: -1, written: null });
@@ -168,7 +170,7 @@ class InsideTable {
     this.look();
   }
 
-  /** Writes what has changed since another moment, where that is not written yet. */
+  /** Write the positions now and the distances from another moment, unless the table shows them already. */
   show(now, from) {
     if (this.written?.now === now && this.written.from === from) return;
     this.written = { now, from };
@@ -190,12 +192,12 @@ class InsideNames {
     Object.assign(this, { parent, plates: [] });
   }
 
-  /** `names`: {text, at} in CSS pixels, at null where it is out of sight. Where two would lie on each
-   * other, the lower one goes down. */
+  /** Show names, {text, at}; `at` is in CSS pixels, and null for a hidden name. If two would overlap, the
+   * lower one moves down. */
   show(names) {
     const taken = [];
     for (const name of names.filter(({ at }) => at).sort((a, b) => a.at.y - b.at.y)) {
-      const half = 3.7 * name.text.length + 10; // about; to measure it takes the page a layout
+      const half = 3.7 * name.text.length + 10; // estimated, because measuring it forces a layout
       for (const other of taken) {
         if (Math.abs(other.at.x - name.at.x) < half + other.half && name.at.y < other.at.y + 20) name.at.y = other.at.y + 20;
       }

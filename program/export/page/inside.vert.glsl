@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Where each vertex inside goes; kept in a buffer by transform feedback. After this text come
-// `amount(axis)` and its attributes: the displacement's coefficients along each axis.
-layout(location = 0) in vec4 rest; // w: which lung
+// Compute the position of each vertex of the content, captured by transform feedback. The page appends
+// `amount(axis)` and its attributes, the coefficients of the displacement along each axis.
+layout(location = 0) in vec4 rest; // reference position, mm; w: lung
 out vec4 moved;
 
 float amount(int axis);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A link that holds the view, and the picture as a PNG.
+// Keep the view: in a link, or in a PNG of the picture.
 
 const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Text over the picture: the ends of the body's axes, and probes.
+// Place labels over the picture: the ends of the body's axes, probes, and names.
 
-/** Project a point of the body to a pane, CSS pixels; null behind the viewer. */
+/** Return where a point of the body, mm, is on the canvas, in CSS pixels; null behind the viewer. */
 function project(pane, [x, y, z], ratio) {
   const m = pane.toEye;
   const eye = [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
@@ -19,11 +19,11 @@ const placed = (element, at, shown) => {
   if (shown) element.style.transform = where;
 };
 
-const LETTER_RADIUS = 12; // CSS pixels, with some space around
-const ARROW_RADIUS = 13;  // of gravity's arrow, at its head
+const LETTER_RADIUS = 12; // of a letter and the space around it, CSS pixels
+const ARROW_RADIUS = 13;  // of the head of gravity's arrow, CSS pixels
 
-/** Out of a plate that it would overlap, the shortest way up, down, right or left that stays in the
- * picture. */
+/** Move a letter off a plate that it would overlap: up, down, right or left, whichever is shortest and
+ * stays in the picture. */
 function offPlate(at, plate, box) {
   const r = LETTER_RADIUS;
   if (at.x < plate.left - r || at.x > plate.right + r || at.y < plate.top - r || at.y > plate.bottom + r) return at;
@@ -33,7 +33,7 @@ function offPlate(at, plate, box) {
   return ways.reduce((best, way) => (far(way) < far(best) ? way : best), ways[0] ?? at);
 }
 
-/** Move a letter beside an arrow that it would overlap. */
+/** Move a letter to the side of an arrow, [from, to], that it would overlap. */
 function offArrow(at, [from, to], box) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   const along = Math.max(0, Math.min(1, ((at.x - from.x) * dx + (at.y - from.y) * dy) / Math.max(dx * dx + dy * dy, 1e-9)));
@@ -47,8 +47,8 @@ function offArrow(at, [from, to], box) {
   return inside(beside(side)) ? beside(side) : beside(-side);
 }
 
-/** L, R, A, P, H and F around the lungs of each pane, always within the picture and off what lies over
- * it; those that point at the viewer or away are left out. */
+/** The letters L, R, A, P, H and F around the lungs of each pane, kept within the picture and off the
+ * plates and the arrow; hidden on axes that point towards the viewer or away. */
 class Letters {
   constructor(parent, panes) {
     this.sets = Array.from({ length: panes }, () => Object.keys(ENDS).map((letter) => {
@@ -61,21 +61,21 @@ class Letters {
     }));
   }
 
-  show(panes, { centre, half }, ratio, plates) { // half: of the lungs' box
+  show(panes, { centre, half }, ratio, plates) { // half: half edges of the lungs' box, mm
     this.sets.forEach((set, i) => {
       const pane = panes[i];
       const middle = pane && project(pane, centre, ratio);
       const box = pane && { left: pane.box[0] / ratio, right: (pane.box[0] + pane.box[2]) / ratio, top: 0, bottom: pane.canvasHeight / ratio };
       const arrow = pane?.arrowEnds.map((end) => project(pane, end, ratio));
       Object.values(ENDS).forEach((end, j) => {
-        const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26; // past the arrow
+        const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26; // the one along gravity, past the arrow
         let at = middle && project(pane, centre.map((c, k) => c + end[k] * (half[k] + beyond * Math.max(...half))), ratio);
         const far = at && Math.hypot(at.x - middle.x, at.y - middle.y) > 0.16 * Math.min(pane.box[2], pane.box[3]) / ratio;
-        if (at) { // at the picture's edge where it would be beyond
+        if (at) { // clamp to the picture
           at.x = Math.max(box.left + 15, Math.min(box.right - 15, at.x));
           at.y = Math.max(15, Math.min(box.bottom - 15, at.y));
           const off = () => { for (const plate of plates) at = offPlate(at, plate, box); };
-          off(); // which may be onto the arrow, and beside that onto a plate again
+          off(); // this may move it onto the arrow, and moving off that onto a plate again
           if (arrow[0] && arrow[1]) at = offArrow(at, arrow, box);
           off();
         }

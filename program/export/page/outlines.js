@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Outlines of the lungs in an axial and a coronal plane of the patient, beside those that displacements
-// count from; turned so that gravity points down where it lies in the plane.
+// Draw the outlines of the lungs in an axial and a coronal plane over those in the state that displacements
+// are measured from, turned so that gravity points down unless it is nearly normal to the plane.
 
-/** Closed lines, [[u, v], ...] each, where the surface crosses the plane at `at` along an axis; u and v
- * are the other two axes, mm. A surface with a hole may leave open ones. */
+/** Return the closed lines, [[u, v], ...] each, where the surface crosses the plane at `at` mm along an
+ * axis; u and v are along the other two axes, mm. At a hole of the surface, lines end open. */
 function linesAcross({ corners, vertices }, places, axis, at) {
   const [first, second] = [0, 1, 2].filter((i) => i !== axis);
-  const links = new Map(); // an edge's number to the edges that its triangles lead to
-  const points = new Map();
+  const links = new Map(); // from an edge to the next edges across its triangles
+  const points = new Map(); // from an edge to where it crosses the plane
   for (let t = 0; t < corners.length; t += 3) {
     const over = [0, 1, 2].map((i) => places[3 * corners[t + i] + axis] > at);
     if (over[0] === over[1] && over[1] === over[2]) continue;
@@ -36,15 +36,15 @@ function linesAcross({ corners, vertices }, places, axis, at) {
   return lines;
 }
 
-/** The two planes: the axis across, 1 where its second axis points down on the paper and -1 where up,
- * the letters at the ends of its own axes. Each one's picture moves the other plane. */
+/** The two planes: the axis normal to it; the sign, 1 if its second axis points down in the picture and -1
+ * if up; and the letters at the ends of its axes. A drag in one picture moves the plane of the other. */
 const PLANES = [
   { name: 'axial', axis: 2, sign: 1, ends: { L: [1, 0], R: [-1, 0], P: [0, 1], A: [0, -1] } },
   { name: 'coronal', axis: 1, sign: -1, ends: { L: [1, 0], R: [-1, 0], H: [0, 1], F: [0, -1] } },
 ];
 
 class Outlines {
-  /** `look` asks for them to be drawn again. */
+  /** Make the canvases; `look` requests that they be drawn again. */
   constructor(parent, basis, state, look) {
     Object.assign(this, { basis, state, kept: {} });
     this.canvases = PLANES.map((plane, i) => {
@@ -68,7 +68,7 @@ class Outlines {
       parent.append(canvas);
       return canvas;
     });
-    this.across = [[0, 1], [0, 1]]; // where each picture's second axis points, of length 1
+    this.across = [[0, 1], [0, 1]]; // direction of each picture's second axis, unit vector
   }
 
   /** Return the position of a plane as text. */
@@ -77,7 +77,7 @@ class Outlines {
     return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm below the apices` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from the front`;
   }
 
-  /** Draw the surface at `now`, and dashed at `from`. */
+  /** Draw the outlines in the moment `now` and, dashed, in `from`. */
   show(now, from) {
     const { basis, state, kept } = this;
     if (kept.from !== from) Object.assign(kept, { from, before: placesOf(basis, from) });
@@ -105,7 +105,7 @@ class Outlines {
     const { scale } = this;
     const along = [gravity[others[0]], sign * gravity[others[1]]];
     const size = Math.hypot(...along);
-    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size); // where down is on the paper
+    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size); // direction of down, in the plane
     const turned = (u, v) => [u * b - sign * v * a, u * a + sign * v * b];
     const place = ([u, v]) => {
       const [x, y] = turned(u - middle[0], v - middle[1]);

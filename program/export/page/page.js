@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The page: connects the state, the picture and the controls.
+// Connect the state, the picture and the controls of the page.
 
 const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside', 'inside']; // options that a link lists under `show`
-const VIEW_ANGLE = 0.5; // radians, of the camera from top to bottom
+const VIEW_ANGLE = 0.5; // vertical field of view of the camera, radians
 const KIND_TEXT = {
   displacement: 'How far each place is from where it is FROM.',
   difference: 'How far each place is from where it is in the other posture at the same breath.',
@@ -21,7 +21,7 @@ function boundsOf(places) {
   return { centre, low, high, half: low.map((x, i) => (high[i] - x) / 2), radius: radius || 1 };
 }
 
-/** Return the rotation that turns -z to a direction. */
+/** Return the rotation that turns -z to a direction, a unit vector. */
 function arrowTurn(direction) {
   const axis = cross([0, 0, -1], direction);
   const w = 1 - direction[2];
@@ -50,17 +50,17 @@ function start() {
   const tangent = Math.tan(VIEW_ANGLE / 2);
   let stale = true;     // the vertices must be moved to the state
   let unseen = true;    // the picture must be drawn again
-  let pointer = null;   // position on the canvas, CSS pixels
-  let asked = true;     // the value under the pointer has been requested for this picture
+  let pointer = null;   // position of the pointer on the canvas, CSS pixels
+  let asked = true;     // whether the value under the pointer was requested since it or the picture changed
   let wanted = null;    // {at, then}: position of a click, and the callback for the result
   let question = null;  // {pane, then} of the request that the graphics card is working on
-  let before = null;    // time of the last frame, when frames follow each other
-  let streak = 0;       // frames that have followed each other
+  let before = null;    // time of the last frame, ms; null if that was not drawn
+  let streak = 0;       // number of frames drawn without a pause
   let frameTime = NaN;  // ms, smoothed
-  let idle = null;      // when the link is written
+  let idle = null;      // timer that writes the link
   let panes = [];
   const marks = [];
-  let tabled = -Infinity; // ms, when the sentences and the table of what is inside were written
+  let tabled = -Infinity; // time when the sentences and the table of the content were written, ms
 
   const ratio = () => canvas.width / Math.max(1, sizeOf(canvas).width);
   const blend = () => state.roomBlend * state.roomBlend * (3 - 2 * state.roomBlend);
@@ -68,8 +68,8 @@ function start() {
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-  /** How far the lungs reach along a direction, mm: all of their vertices where heights are shown; some are
-   * enough to know where to draw gravity and the table. */
+  /** Return the largest coordinate of the lungs along a direction, mm, over all vertices where heights are
+   * shown; some 400 are enough to place the arrow and the table. */
   function reachAlong(moment, way) {
     const { rest, direction, coefficients, modes } = basis;
     const { weights, gains } = moment;
@@ -97,7 +97,7 @@ function start() {
     const pivot = state.camera.pivot ?? centre;
     const toRoom = compose(cameraTurn(), modelTurn(q));
     const away = rotate(toRoom, pivot);
-    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // over the table
+    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // raised, to show the table
     const { gravity } = moment;
     const lowestAt = pane_lowest(name, moment);
     const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
@@ -115,25 +115,26 @@ function start() {
       arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
       pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
-      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // seen through from below
+      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // translucent from below
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), low[axis] + at * (high[axis] - low[axis])],
     };
   }
 
-  const depths = {}; // the lowest point of each state and its table, kept while it does not move
+  const depths = {}; // heights of the lowest point and the table of each state, kept until its moment changes
   function pane_depth(name, moment) {
     const { kind } = state;
     if (depths[name]?.moment !== moment || depths[name].kind !== kind) {
       const { gravity } = moment;
       const flat = Math.hypot(gravity[0], gravity[1]);
-      const down = flat > 0.4 ? [gravity[0] / flat, gravity[1] / flat, 0] : null; // out of the table; standing patients have none
+      const down = flat > 0.4 ? [gravity[0] / flat, gravity[1] / flat, 0] : null; // normal to the table, downwards; patients who stand have no table
       depths[name] = { moment, kind, value: reachAlong(moment, gravity), down, table: down && reachAlong(moment, down) };
     }
     return depths[name];
   }
   const pane_lowest = (name, moment) => pane_depth(name, moment).value;
 
-  /** The table of a posture, which tilts with the patient: from a box to the eye; null where there is none. */
+  /** Return the matrix from the unit box to the table of a posture, which tilts with the patient, in the
+   * eye's axes; null if there is no table. */
   function pane_table(name, moment, toRoom, offset) {
     const { down, table } = pane_depth(name, moment);
     if (!down) return null;
@@ -158,8 +159,8 @@ function start() {
     return { pane, x: (2 * (px - pane.box[0])) / pane.box[2] - 1, y: (2 * (py - pane.box[1])) / pane.box[3] - 1 };
   }
 
-  /** Shows what is under the pointer once the graphics card has said it, and asks again where the
-   * picture or the pointer has changed since. */
+  /** Show what is under the pointer once the graphics card has answered, and ask again if the picture or the
+   * pointer has changed since. */
   function point() {
     const found = picture.picked();
     if (found) found.pane = question.pane;
@@ -197,7 +198,7 @@ function start() {
     $('needle').style.left = `${100 * Math.min(1, Math.max(0, (found.value - range.begin) / (range.end - range.begin)))}%`;
   }
 
-  /* Probes: places of the tissue that stay marked. */
+  /* Probes: marked vertices. */
   const originMoment = () => (state.kind === 'difference' ? state.pinned : state.from);
   function probeValue(vertex) {
     const at = placeOf(basis, state.moment, vertex);
@@ -250,11 +251,12 @@ function start() {
     $('probes-clear').hidden = state.probes.length === 0;
   }
 
-  /* What is inside: its table, and its names in the picture. */
+  /* Content of the lungs: its table, and names in the picture. */
   const insideTable = inside && new InsideTable(inside, state, look);
   const insideNames = new InsideNames($('letters'));
 
-  /** What is pointed at inside: the vertex nearest there, how far it has moved, its colour's value. */
+  /** Return the position of the content's vertex nearest to the pointer, how far it has moved, and the value
+   * of its colour. */
   function insideAt({ part, at, pane }) {
     const moment = pane === 'pinned' ? state.pinned : state.moment;
     const vertex = insideNearest(inside, part, moment, at);
@@ -300,14 +302,14 @@ function start() {
   const outlines = new Outlines($('outlines'), basis, state, () => { told = null; look(); });
   $('holds-section').hidden = !basis.hasVolume;
 
-  /** Write the changes in each posture at a volume on its card; `most` is the largest volume of a lung. */
+  /** Write the changes in each posture on its card; `most` is the largest volume of a lung in them, mL. */
   let answered = { depth: null };
   function answerCards() {
     if (answered.depth === state.depth) return;
     answered = { depth: state.depth, most: 0 };
     for (const { posture, answer } of buttons) {
       const moment = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), state.depth);
-      answer.textContent = moment.folds ? 'none: it would fold' : answerOf(basis, moment);
+      answer.textContent = moment.folds ? 'would fold' : answerOf(basis, moment);
       answered.most = Math.max(answered.most, ...(moment.folds ? [] : moment.held ?? []));
     }
   }
@@ -315,8 +317,8 @@ function start() {
   /** Return the height of each lung's middle, mm. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
-  let told = null; // the moment that the sentences describe, and the number of vertices they use
-  /** Write the finding: from all vertices or, while the moment changes, from some thousand. */
+  let told = null; // the moment that the sentences describe, and the stride of the vertices they use
+  /** Write the finding from every `stride`th vertex: all, or about 3000 while the moment changes. */
   function tellFinding(stride) {
     if (told?.moment === state.moment && told.stride <= stride) return;
     told = { moment: state.moment, stride };
@@ -341,7 +343,8 @@ function start() {
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // as "rest + 500 mL"
 
   const last = {};
-  /** Act if a value has changed; the last one is kept, because reading it from the page is slower. */
+  /** Call `act` if a value has changed. The last one is kept here, because reading it from the page is
+   * slower. */
   const changed = (what, value, act) => {
     if (last[what] === value) return;
     last[what] = value;
@@ -433,7 +436,7 @@ function start() {
       $('message').hidden = good;
       if (!good) {
         $('message').className = 'trouble plate';
-        $('message').textContent = `No breath of ${amount(state.depth)} in this posture: the surface would fold.`;
+        $('message').textContent = `No breath of ${amount(state.depth)} in this posture: the surface would fold. Choose a smaller volume.`;
       }
       deform();
     }
@@ -455,7 +458,7 @@ function start() {
     idle = setTimeout(keepLink, 400);
   }
 
-  let kept = null; // the graphics card that holds what displacements count from
+  let kept = null; // the picture that holds the state `from`
   function deform() {
     if (!state.moment) return;
     if (kept !== picture) {
@@ -466,7 +469,7 @@ function start() {
     if (state.kind === 'difference' || state.beside) picture.deform('pinned', state.pinned);
   }
 
-  /* What lies over the picture, CSS pixels; measured when its size changes. */
+  /* Boxes of the elements over the picture, CSS pixels; measured when their sizes change. */
   let covers = null;
   const covered = new ResizeObserver(() => { covers = null; look(); });
   for (const plate of ['legend', 'ball']) covered.observe($(plate));
@@ -484,7 +487,7 @@ function start() {
   }
 
   let inHeadset = false;
-  /** Return the pane that a headset shows at a time, ms. */
+  /** Advance the state to a time, ms, and return the pane that a headset shows; null without a moment. */
   function headsetFrame(now) {
     if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
       state.compute();
@@ -502,7 +505,7 @@ function start() {
     try {
       history.replaceState(null, '', `#${linkOf(state)}`);
     } catch {
-      // some browsers allow none on pages from disk
+      // some browsers refuse this on pages from disk
     }
   }
 
@@ -576,7 +579,7 @@ function start() {
     look();
   };
 
-  /* The ball: what the hand does to the patient, or, with the patient still, to gravity. */
+  /* The ball: a drag turns the patient or, if the patient stays still, gravity. */
   const spin = (dx, dy) => {
     const sense = state.room ? 1 : -1;
     for (const [axis, angle] of [[[0, 1, 0], dx], [[1, 0, 0], dy]]) {
@@ -741,14 +744,14 @@ function start() {
     const pixels = Math.min(2, window.devicePixelRatio || 1);
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * pixels));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * pixels));
-    if (state.moment && picture && !inHeadset) draw(); // what was there is gone, and this is before it is seen
+    if (state.moment && picture && !inHeadset) draw(); // resizing clears the canvas; redraw before it is shown
     look();
   };
   new ResizeObserver(resize).observe(canvas);
   canvas.addEventListener('webglcontextlost', (event) => {
-    event.preventDefault(); // so that it may come back
+    event.preventDefault(); // lets the browser restore the context
     picture = null;
-    tell('The graphics card was taken away; waiting for it.');
+    tell('The browser took the graphics card away. Reload the page if it does not come back.');
   });
   canvas.addEventListener('webglcontextrestored', () => {
     picture = pictureOn(canvas, basis);
@@ -759,25 +762,26 @@ function start() {
   showLegend();
   requestAnimationFrame(frame);
 
-  /* For tests, benchmarks and the console: gravity in the patient's axes (x left, y back, z head), mL. */
+  /* For tests, benchmarks and the console. Gravity is in the patient's axes (x left, y back, z head), volumes
+   * are mL above rest. */
   return {
     get picture() { return picture; },
     panes: () => panes,
     /** Positions as the graphics card computes them: xyz of each vertex, mm LPS. */
     positions: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[0],
-    /** Unit normals, likewise. */
+    /** Unit normals from the graphics card, xyz of each vertex. */
     normals: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[1],
-    /** What is inside, likewise; its vertices are in the page's own order. */
+    /** Positions of the content from the graphics card, mm LPS, in the order of takeInside. */
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
     /** Weights, gains and volumes. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
-    /** Run the script of a frame, without the graphics card's part. */
+    /** Run the part of a frame that does not use the graphics card. */
     frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, state.body, ratio(), plates()); showState(); },
     findingOf, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }
 
-/** Return what draws on a canvas: WebGL 2 or, where it is missing, the poster. */
+/** Return what draws on a canvas: a Picture or, without WebGL 2, a Poster. */
 function pictureOn(canvas, basis) {
   try {
     return new Picture(canvas, basis);

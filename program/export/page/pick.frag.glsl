@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The value and the place under the pointer, bit by bit; the value's last four say which lung.
+// Write the value and the position under the pointer as bits; the lung replaces the value's lowest four.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Everything on the graphics card. A change of gravity or volume costs a pass over the vertices there,
-// whose positions and normals transform feedback keeps; turning the camera costs none.
+// Draw with WebGL 2. A change of gravity or volume costs one pass over the vertices, whose positions and
+// normals transform feedback stores on the graphics card; a change of the camera costs none.
 
 const source = (id) => document.getElementById(id).textContent;
 
@@ -31,13 +31,13 @@ class Picture {
     this.gpuTime = NaN;
   }
 
-  /** Return supine.glsl for this basis. */
+  /** Return the lines of supine.glsl with this basis' sizes. */
   sized() {
     const { basis } = this;
     return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, basis.words)}`, source('supine.glsl')];
   }
 
-  /** With the words of the normals as attributes from location 6 on. */
+  /** Return the shader that moves vertices, with the normal's words as attributes from location 6 on. */
   library() {
     const all = Array.from({ length: this.basis.words }, (_, j) => j);
     return [...this.sized(), source('vertex.vert.glsl'),
@@ -45,7 +45,8 @@ class Picture {
       `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(rest, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
   }
 
-  /** What moves vertices inside: an attribute for each axis and four modes, from location 1 on. */
+  /** Return the shader that moves the content, with an attribute for each axis and four modes from location 1
+   * on. */
   insideLibrary() {
     const vectors = Math.ceil(this.basis.modes / 4);
     const all = [0, 1, 2].flatMap((axis) => Array.from({ length: vectors }, (_, j) => ({ axis, j, name: `c${axis}_${j}` })));
@@ -85,7 +86,7 @@ class Picture {
     return made;
   }
 
-  /** A vertex array; each attribute is [buffer, size, stride, offset, instances each], null for none. */
+  /** Make a vertex array; each attribute is [buffer, size, stride, offset, divisor, integer], or null. */
   array(attributes) {
     const { gl } = this;
     const made = gl.createVertexArray();
@@ -103,8 +104,8 @@ class Picture {
     return made;
   }
 
-  /** Rest and lung, direction, up to 16 coefficients and the normal's words, of every vertex and of a few
-   * for arrows; missing coefficients read (0, 0, 0, 1) and get weight 0. */
+  /** Make the inputs of all vertices, and of a few for arrows: reference position and lung, direction, up to
+   * 16 coefficients, and the normal's words. Missing coefficients read as (0, 0, 0, 1) and have weight 0. */
   makeInputs() {
     const { basis } = this;
     const k = basis.modes;
@@ -138,7 +139,7 @@ class Picture {
     this.insideParts = this.buffer(inside.part);
     this.insideNormals = this.buffer(inside.normals);
     this.insideIndices = this.buffer(inside.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    const [rings, sides] = inside.points > 2000 ? [4, 6] : [9, 18]; // many are a cloud
+    const [rings, sides] = inside.points > 2000 ? [4, 6] : [9, 18]; // coarser balls for many points
     const at = (i, j) => {
       const [a, b] = [(Math.PI * i) / rings, (2 * Math.PI * j) / sides];
       return [Math.sin(a) * Math.cos(b), Math.sin(a) * Math.sin(b), Math.cos(a)];
@@ -164,7 +165,7 @@ class Picture {
   makeOutputs() {
     const { gl, basis } = this;
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // for normals that are not used
+    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives the normals of arrows, which are not used
     this.edges = null;
     this.states = {};
     this.arrays = {};
@@ -177,7 +178,7 @@ class Picture {
     return this.states[name];
   }
 
-  /** The vertex array of one state measured from another. */
+  /** Return the vertex array of one state whose colours measure from another. */
   shown(name, origin) {
     const { gl } = this;
     const key = `${name} ${origin}`;
@@ -188,7 +189,8 @@ class Picture {
     return this.arrays[key];
   }
 
-  /** List each edge of the triangles once, as pairs of vertices, lung by lung. */
+  /** Make the list of edges, as pairs of vertices, lung by lung: each edge once for closed surfaces; once for
+   * each of its triangles for open ones. */
   makeEdges() {
     const { gl, basis } = this;
     const { corners } = basis;
@@ -208,7 +210,7 @@ class Picture {
     this.edges = { buffer: this.buffer(pairs.subarray(0, count), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), begin: [...begin, count] };
   }
 
-  /** Make the pixel that picking draws to; it holds the bits of floats. */
+  /** Make the framebuffer of one pixel that picking draws to; it holds the bits of floats. */
   makePick() {
     const { gl } = this;
     this.picking = null;
@@ -298,7 +300,8 @@ class Picture {
     if (inside) this.captureInside(moment, inside);
   }
 
-  /** Deform the content by its field; then move rigid parts, each of whose vertices depends on all others. */
+  /** Deform the content by its field; then overwrite the rigid parts, whose motion depends on all of their
+   * vertices. */
   captureInside(moment, target) {
     const { gl, basis: { inside } } = this;
     this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
@@ -307,7 +310,7 @@ class Picture {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** Return uniformsOf a moment, computed once. */
+  /** Return the uniforms of a moment, computed once. */
   uniforms(moment) {
     if (this.uniformsMoment !== moment) {
       this.uniformsMoment = moment;
@@ -324,7 +327,7 @@ class Picture {
     return targets.map((target) => this.take(target, basis.vertices));
   }
 
-  /** Read back the positions of the content. */
+  /** Read back the positions of the content in a moment, mm LPS. */
   readInside(moment) {
     const { gl, basis: { inside } } = this;
     const target = this.buffer(16 * inside.vertices, gl.DYNAMIC_READ);
@@ -342,7 +345,7 @@ class Picture {
     return new Float32Array(3 * count).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
   }
 
-  /** Set a program up for a pane of the picture. */
+  /** Set the uniforms of a program for a pane of the picture. */
   usePane(program, pane, lens) {
     const { gl } = this;
     gl.useProgram(program.program);
@@ -360,7 +363,7 @@ class Picture {
     gl.drawElements(mode, begin[lung + 1] - begin[lung], gl.UNSIGNED_INT, 4 * begin[lung]);
   }
 
-  /** Draw the surface: opaque lungs, then transparent ones, only their nearest side. */
+  /** Draw the surface: opaque lungs first, then the nearest layer of translucent ones. */
   drawLungs(pane) {
     const { gl, surface } = this;
     const lungs = pane.opacity.map((opacity, lung) => ({ opacity, lung })).filter((l) => l.opacity > 0).sort((a, b) => b.opacity - a.opacity);
@@ -370,7 +373,7 @@ class Picture {
     set('spacing', pane.contours ? pane.range.step : 0);
     set('dark', pane.dark ? 1 : 0);
     set('flatly', 0);
-    /** Draw the reference surface: a shell behind the lungs, then an outline over them. */
+    /** Draw the state that displacements are measured from: 1 as a shell behind the lungs, 2 as an outline. */
     const ghost = (how) => {
       if (!pane.ghost) return;
       gl.bindVertexArray(this.shown('from', 'from'));
@@ -430,19 +433,19 @@ class Picture {
     }
   }
 
-  /** Draw the content in the colours of the lungs, or in grey if the quantity is not defined there. */
+  /** Draw the content in the colours of the lungs, or in grey for expansion, which points do not have. */
   drawContent(pane) {
     const { gl, content } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
     gl.bindTexture(gl.TEXTURE_2D, pane.measure === 1 ? this.plainMap : this.maps[pane.map]);
-    gl.uniform4fv(content.at.cut, NO_CUT); // whole behind a cut: that is what a cut is for
+    gl.uniform4fv(content.at.cut, NO_CUT); // the cut opens the lungs to show the content
     gl.uniform2f(content.at.range, pane.range.begin, pane.range.end);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
     gl.uniform1f(content.at.opacity, 1);
-    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // seen on small screens too
+    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // at least 4 pixels
   }
 
-  /** Draw some arrows from the reference surface to the deformed one. */
+  /** Draw some arrows from the state that the colour measures from to the state shown. */
   drawArrows(pane) {
     const { gl, solid } = this;
     const key = `arrows ${pane.state} ${pane.origin}`;
@@ -451,7 +454,7 @@ class Picture {
     this.usePane(solid, pane);
     gl.uniform1f(solid.at.thick, pane.radius * 0.09);
     gl.bindVertexArray(this.arrays[key]);
-    for (const [order, alpha] of [[gl.GREATER, 0.35], [gl.LEQUAL, 1]]) { // outward moves end on the surface
+    for (const [order, alpha] of [[gl.GREATER, 0.35], [gl.LEQUAL, 1]]) { // faint where the surface hides them
       gl.depthFunc(order);
       gl.depthMask(order === gl.LEQUAL);
       gl.uniform4fv(solid.at.tint, [...pane.ink.slice(0, 3), alpha]);
@@ -501,7 +504,7 @@ class Picture {
       gl.viewport(...pane.box);
       gl.depthFunc(gl.LEQUAL);
       if (pane.tableToEye) this.drawTable(pane);
-      if (pane.inside) this.drawContent(pane); // first: lungs that are seen through lie over it
+      if (pane.inside) this.drawContent(pane); // first, because translucent lungs are blended over it
       gl.bindTexture(gl.TEXTURE_2D, this.maps[pane.map]);
       this.drawLungs(pane);
       if (pane.arrows) this.drawArrows(pane);
@@ -513,8 +516,8 @@ class Picture {
     this.endTiming();
   }
 
-  /** Asks what is at a place of a pane, from -1 to 1 each way. The answer is `picked` a frame or two
-   * later, so that no frame waits for it. */
+  /** Ask what is at a position in a pane, -1 to 1 each way. picked() has the answer a frame or two later, so
+   * that no frame waits for it. */
   pick(pane, x, y) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
@@ -530,7 +533,7 @@ class Picture {
       if (opacity > 0) this.drawLung(lung, gl.TRIANGLES);
     });
     if (pane.inside) {
-      gl.clearBufferfv(gl.DEPTH, 0, [1]); // found through lungs where it is seen through them
+      gl.clearBufferfv(gl.DEPTH, 0, [1]); // translucent lungs do not hide the content
       gl.colorMask(false, false, false, false);
       pane.opacity.forEach((opacity, lung) => { if (opacity === 1) this.drawLung(lung, gl.TRIANGLES); });
       gl.colorMask(true, true, true, true);
@@ -538,7 +541,7 @@ class Picture {
       this.drawInside(this.contentPicker, pane, Math.max(BALL_RADIUS, 8 * pane.pixel));
     }
     gl.bindVertexArray(null);
-    this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a used one would be waited for
+    this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a new one: reading into the old one would wait
     gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -546,8 +549,8 @@ class Picture {
     gl.flush();
   }
 
-  /** {value, at, lung}, or {part, at} inside, null where nothing was, undefined where no answer has
-   * come. */
+  /** Return {value, at, lung} of the surface or {part, at} of the content; null if nothing was there, undefined
+   * if the answer has not arrived. `at` is mm LPS. */
   picked() {
     const { gl } = this;
     if (!this.picking || gl.getSyncParameter(this.picking, gl.SYNC_STATUS) !== gl.SIGNALED) return undefined;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Paint the surface without WebGL 2, farthest triangles first; without shading, lines, arrows, content and
-// picking, which Picture has.
+// Draw the surface on a 2-D canvas where WebGL 2 is missing, farthest triangles first. There is no shading
+// and there are no lines, arrows, content or picking, which Picture has.
 
 class Poster {
   constructor(canvas, basis) {
@@ -54,7 +54,7 @@ class Poster {
       for (let i = 0; i < 3; ++i) context[i ? 'lineTo' : 'moveTo'](screen[3 * corners[t + i]], screen[3 * corners[t + i] + 1]);
       context.closePath();
       context.fill();
-      context.stroke(); // no gaps between neighbours
+      context.stroke(); // closes the gaps between neighbours
     }
   }
 }

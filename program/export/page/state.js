@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What is shown: the patient's posture, the breath, the colours, the camera. A posture is a rotation
-// of the patient into a room whose z points up; gravity in the patient follows from it.
+// Keep the state of the page: posture, breath, colours, camera. A posture is a rotation of the patient into
+// a room whose z points up; gravity in the patient's axes follows from it.
 
 const RIGHT_ANGLE = Math.PI / 2;
 const LYING = compose(turn([0, 0, 1], RIGHT_ANGLE), turn([1, 0, 0], -RIGHT_ANGLE)); // on the back
@@ -22,8 +22,8 @@ const gravityOf = (q) => rotate(inverse(q), [0, 0, -1]);
 const near = (a, b) => dot(a, b) > Math.cos(0.004);
 const NAMED = [...POSTURES.slice(0, 5), INVERTED].map((p) => ({ name: p.name, gravity: gravityOf(p.q) }));
 
-/** A direction of gravity in the notation that the program reads: a name, a name and the degrees of
- * its tilt, or three numbers. */
+/** Return a direction of gravity in the notation of the program: a name, a name with a tilt in degrees, or
+ * three numbers. */
 function postureText(gravity) {
   const named = NAMED.find((p) => near(p.gravity, gravity));
   if (named) return named.name;
@@ -36,10 +36,10 @@ function postureText(gravity) {
   return gravity.map((x) => x.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
-/** The same for people. */
+/** Return a direction of gravity in words: as postureText, but "left side" for "left". */
 const postureWords = (gravity) => postureText(gravity).replace(/^(left|right)$/, '$1 side');
 
-/** {q, tilt} of what postureText writes and the program reads; null where it is neither. */
+/** Return {q, tilt} of a posture in the notation of the program, or null if it is not valid. */
 function postureFrom(text) {
   const word = text.trim().replaceAll('\u2212', '-');
   const numbers = word.split(/[:,]/).map((part) => (part.trim() === '' ? NaN : Number(part)));
@@ -55,11 +55,11 @@ function postureFrom(text) {
   return found && Number.isFinite(Number(tilt ?? 0)) ? { q: found.q, tilt: Number(tilt ?? 0) } : null;
 }
 
-const FADED = 0.35; // opacity of lungs that are seen through
+const FADED = 0.35; // opacity of translucent lungs
 
 const FIRST_CAMERA = { azimuth: -0.4, elevation: 0.16, zoom: 1, pan: [0, 0], pivot: null };
 
-/** Where the viewer stands, by the letter of what faces him. */
+/** Names of the views, by the letter of the axis that points to the viewer. */
 const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 'From the right', H: 'From the head', F: 'From the feet' };
 
 class State {
@@ -85,14 +85,14 @@ class State {
     this.inside = Boolean(basis.inside);           // shown
     this.named = [];                               // parts inside whose names are kept in the picture
     this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
-    this.cut = { axis: -1, at: 0.5 };              // across x, y or z, at a share of the body
-    this.ownRanges = {};                           // {begin, end} by kind, where typed
+    this.cut = { axis: -1, at: 0.5 };              // normal to axis 0, 1 or 2, or -1 for none; at a fraction of the lungs' extent
+    this.ownRanges = {};                           // {begin, end} that the user typed, by kind
     this.probes = [];                              // vertices
     this.room = true;
-    this.roomBlend = 1; // 0: the patient stands still; 1: the room does
+    this.roomBlend = 1; // 0: the patient stays still; 1: the room does
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
-    this.from = basis.from;                        // what displacements count from: weights and gains
+    this.from = basis.from;                        // weights and gains that displacements are measured from
     this.measure();
     this.slices = [this.body.high[2] - 80, (this.body.low[1] + this.body.high[1]) / 2]; // axial z, coronal y
   }
@@ -155,8 +155,8 @@ class State {
     return true;
   }
 
-  /** What the colours go through, at a kind: typed, or what 95 % of the surface stay within in six
-   * postures at the deepest volume in use. */
+  /** Range of the colours: as typed, or that of 95 % of the surface in each of six postures at the largest
+   * volume in use. */
   get range() {
     const own = this.ownRanges[this.kind];
     if (!own) return this.ranges[this.kind];
@@ -196,7 +196,7 @@ class State {
     this.ranges = Object.fromEntries(Object.keys(found).map((kind) => {
       const value = Math.max(...found[kind], 0);
       const end = rangeEnd(value > 1e-3 ? value : 0);
-      const begin = kind === 'expansion' ? -end : 0; // less is as telling as more
+      const begin = kind === 'expansion' ? -end : 0; // shrinking has the same range as growing
       return [kind, { begin, end, step: tickStep(end - begin), beyond: most[kind] > end, most: most[kind] }];
     }));
     this.body = boundsOf(all.flat());

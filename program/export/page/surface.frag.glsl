@@ -8,15 +8,15 @@ uniform sampler2D colours;
 uniform vec2 range;    // values at the ends of the colours
 uniform float spacing; // of contour lines; 0: none
 uniform float dark;    // 1 on a dark background
-uniform vec4 cut;      // where dot(body, xyz) > w nothing is
+uniform vec4 cut;      // plane of the cut: nothing is drawn where dot(body, xyz) > w
 uniform float opacity;
-uniform float ghost;   // 1: a shell without colours; 2: its outline alone
-uniform float flatly;  // 1: no light, for lines
+uniform float ghost;   // 1: a translucent shell without colours; 2: its outline alone; 0: neither
+uniform float flatly;  // 1: colours without shading, for the wireframe
 out vec4 colour;
 
 void main() {
   if (dot(body, cut.xyz) > cut.w) discard;
-  // A basis without normals is shown by its triangles'.
+  // Without normals in the basis, use those of the triangles.
   vec3 n = normalize(dot(facing, facing) > 0.0 ? facing : cross(dFdx(eye), dFdy(eye)));
   vec3 view = normalize(-eye);
   n = dot(n, view) < 0.0 ? -n : n;
@@ -33,10 +33,10 @@ void main() {
     colour = vec4(mix(base, base * 0.7, 1.0 - dark), 1.0);
     return;
   }
-  if (!gl_FrontFacing && cut.w < 1e9) base = mix(base, vec3(0.55), 0.55); // looked into
+  if (!gl_FrontFacing && cut.w < 1e9) base = mix(base, vec3(0.55), 0.55); // the inner side, seen through the cut
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, -0.1, 0.45));
-  // So little light that a colour can be found on the bar; the edge, which darkens, shows the form.
+  // Shade weakly, so that colours match the bar; darker outlines show the shape.
   float diffuse = 0.93 + 0.06 * max(dot(n, key), 0.0) + 0.02 * max(dot(n, fill), 0.0);
   vec3 lit = base * diffuse * (1.0 - 0.5 * pow(edge, 7.0));
   colour = vec4(clamp(lit, 0.0, 1.0) * opacity, opacity);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The deformed surface on the screen, or on the one pixel under the pointer.
+// Project the deformed surface to the screen, or to the single pixel under the pointer.
 layout(location = 0) in vec3 moved;
-layout(location = 1) in vec4 turned; // normal; area around, beside that of the basis' own surface
-layout(location = 2) in vec3 origin; // what the colour measures from: rest, or the reference posture
-layout(location = 3) in vec4 before; // as `turned`, in that state
+layout(location = 1) in vec4 turned; // unit normal; w: area relative to the reference surface
+layout(location = 2) in vec3 origin; // position that the colour measures from: in the reference state or the other posture
+layout(location = 3) in vec4 before; // `turned` in that state
 uniform mat4 toEye;
 uniform mat4 projection;
-uniform vec4 lens;    // part of the picture that is drawn: centre, magnification
+uniform vec4 lens;    // drawn part of the picture: centre, -1 to 1 each way, and magnification
 uniform int kind;     // 0: mm from origin; 1: % that the area has grown; 2: mm above the lowest point
-uniform vec4 gravity; // direction, and how far the lowest point is along it
+uniform vec4 gravity; // unit vector; w: coordinate of the lowest point along it, mm
 out vec3 eye;
 out vec3 facing;
 out vec3 body;

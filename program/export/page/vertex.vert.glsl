@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Where each vertex goes, and its normal; kept in buffers by transform feedback. After this text come
-// the normal's words as attributes, and `turned_by_words()`, their sum, as many as the basis has.
-layout(location = 0) in vec4 rest; // w: which lung
+// Compute the position and the normal of each vertex, captured by transform feedback. The page appends
+// the normal's words as attributes and `turned_by_words()`, which sums them.
+layout(location = 0) in vec4 rest; // reference position, mm; w: lung
 layout(location = 1) in vec3 direction;
 layout(location = 2) in vec4 c0;
 layout(location = 3) in vec4 c1;
 layout(location = 4) in vec4 c2;
 layout(location = 5) in vec4 c3;
 out vec4 moved;
-out vec4 turned; // normal; the area around, beside that of the basis' own surface
+out vec4 turned; // unit normal; w: area relative to the reference surface
 
 vec3 turned_by_words();
 

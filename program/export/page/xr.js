@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// The lungs in a headset, at their own size, where the browser has WebXR.
+// Show the lungs in a headset, at life size, if the browser has WebXR.
 
 const XR_AWAY = 0.7; // metres in front of the viewer's first position
 
-/** Multiply 4 x 4 matrices, by columns. */
+/** Return the product of column-major 4 x 4 matrices. */
 const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
   let sum = 0;
   for (let k = 0; k < 4; ++k) sum += a[4 * k + (i % 4)] * b[4 * Math.floor(i / 4) + k];
   return sum;
 });
 
-/** What an eye of the headset sees of a pane of the page: the pane's millimetres in front of its
- * viewer become metres in the room. */
+/** Return a pane as one eye of the headset sees it: the pane's millimetres in front of the viewer become
+ * metres in the room. */
 function xrPane(pane, view, { x, y, width, height }) {
   const room = Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * pane.distance - XR_AWAY, 1]);
   const toEye = product(view.transform.inverse.matrix, room);
@@ -21,8 +21,8 @@ function xrPane(pane, view, { x, y, width, height }) {
   };
 }
 
-/** Shows `button` where headsets are. `frame(time)` moves the state on and says what one pane of the
- * page would show; `over()` comes after the session. */
+/** Show `button` if the browser supports a headset. `frame(time)` advances the state and returns the pane to
+ * draw, or null; `over()` is called after the session. */
 async function offerXr(button, getPicture, frame, over) {
   if (!(await navigator.xr?.isSessionSupported('immersive-vr').catch(() => false))) return;
   button.hidden = false;
@@ -36,7 +36,7 @@ async function offerXr(button, getPicture, frame, over) {
     try {
       session = await navigator.xr.requestSession('immersive-vr');
       await gl.makeXRCompatible();
-    } catch { // the viewer declined, or this graphics card has no headset
+    } catch { // the user declined, or the graphics card cannot serve the headset
       session?.end();
       session = null;
       return;
@@ -51,7 +51,7 @@ async function offerXr(button, getPicture, frame, over) {
       over();
     });
     const draw = (time, seen) => {
-      if (!session) return; // over since this was asked for
+      if (!session) return; // the session ended after this frame was requested
       session.requestAnimationFrame(draw);
       const views = seen.getViewerPose(space)?.views ?? [];
       const pane = views.length ? frame(time) : null;
