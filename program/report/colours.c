@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Colours of the HTML report, and their bar. */
+/* Choose the colours of the HTML report, and build its colour bar. */
 #include "program/render/render.h"
 #include "program/report/comparison_parts.h"
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compares postures of a basis, pair by pair and over the whole sphere. */
+/* Compare postures of a basis, pair by pair and over all directions of gravity. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "program/report/comparison.h"
 
-/* Compute the ventilation of a breath that starts at the comparison's volume. */
+/* Compute how a breath from the comparison's volume is distributed over lungs and slabs. */
 static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
                                  float *xyz[2], supine_compared_posture *posture,
                                  supine_error *error) {
@@ -81,7 +81,7 @@ static supine_status find_energy(supine_comparison *c, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Compute the expected error of the displacement from one state to another; 0 where unknown. */
+/* Compute the expected error of the displacement between two states, mm RMS; 0 if unknown. */
 static supine_status find_error(const supine_comparison *c, const supine_state *state,
                                 const supine_state *from, double *rms, supine_error *error) {
   supine_expected expected = {0};
@@ -111,7 +111,7 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
 }
 
 supine_status supine_report_find(supine_comparison *c, supine_error *error) {
-  supine_state supine = c->state; /* the search starts there */
+  supine_state supine = c->state; /* the search measures distances from it */
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   const size_t count = c->postures.count;
   supine_status status = SUPINE_ERROR_MEMORY;
@@ -185,7 +185,7 @@ void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   }
   char whole[160];
   (void)supine_state_describe(&c->state, whole, sizeof whole);
-  const char *space = strchr(whole, ' '); /* after the posture, supine */
+  const char *space = strchr(whole, ' '); /* the posture, supine, ends there */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Results of 'supine compare', and their output forms. */
+/* Compute the results of 'supine compare', and print them as text, JSON, CSV and HTML. */
 #ifndef SUPINE_COMPARISON_H
 #define SUPINE_COMPARISON_H
 
@@ -16,51 +16,57 @@ enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
 /* Results for one posture at the volume of the comparison. */
 typedef struct supine_compared_posture {
   supine_pose pose;
-  supine_distance_statistics displacement; /* from the comparison's reference */
-  double expected_error;           /* expected error of the displacement, mm RMS; 0 where unknown */
-  double volume[SUPINE_LUNGS_MAX]; /* mL that each lung holds, tissue included; closed */
-  double gain[SUPINE_LUNGS_MAX];   /* mL that each takes of the breath; closed */
-  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* both lungs together, uppermost first; closed */
+  supine_distance_statistics displacement; /* from the comparison's reference, mm */
+  double expected_error; /* expected error of the displacement, mm RMS; 0 if unknown */
+  /* Closed surfaces only: */
+  double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, tissue included, mL */
+  double gain[SUPINE_LUNGS_MAX];             /* share of each lung in the breath, mL */
+  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* all lungs together, uppermost first */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
-  const char *path;    /* of the basis, for showing */
-  const char *command; /* that compares, for what it says */
+  const char *path;    /* file of the basis, for output */
+  const char *command; /* name of the running command, for messages */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* its volume is that of every posture */
-  double rms;         /* mm, instead of the volume where above 0 */
+  supine_state state; /* holds the volume of every posture; its gravity is supine */
+  double rms;         /* if > 0: RMS displacement of every posture, mm, instead of a volume */
   supine_from from;
-  double breath; /* mL, on top of the volume */
+  double breath; /* volume that a breath adds, mL */
   supine_posture_list postures;
   supine_reference_pose reference; /* displacements are measured from this pose */
   supine_compare *compare;
   supine_compared_posture *posture; /* [count] */
-  supine_distance_statistics *pair; /* [count, count], symmetric, zero on the diagonal */
-  double *pair_error;               /* [count, count] expected error of it, mm RMS, likewise */
-  double constant, odd, even;       /* shares of energy: l = 0, odd bands, even bands beyond 0 */
-  supine_extremes extremes;         /* farthest: from supine */
+  supine_distance_statistics *pair; /* [count, count] distances, mm: symmetric, diagonal 0 */
+  double *pair_error;               /* [count, count] their expected errors, mm RMS: likewise */
+  double constant, odd, even;       /* shares of energy, 0 to 1: l = 0, odd l, even l > 0 */
+  supine_extremes extremes;         /* over all directions; `farthest` is the one from supine */
 } supine_comparison;
 
-/* Fills in everything after `postures`. Release with supine_report_free also after failure. */
+/* Compute all members after `postures`. Call supine_report_free in the end, also after failure. */
 supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
+
+/* Free what supine_report_find allocated. */
 void supine_report_free(supine_comparison *comparison);
 
-/* "at rest", "at rest + 300 mL" or "5 mm RMS displacement". */
+/* Print the volume of all postures: "at rest", "at rest + 300 mL" or "5 mm RMS displacement". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
-/* Are expected errors known? */
+/* Return whether expected errors are known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* Return the share of a breath that all lungs take in a posture, mL. */
+/* Return the volume that all lungs together gain by the breath in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
-/* The forms. They leave errors of writing to be found when the file is closed. */
+/* Print the comparison. Write errors stay in the stream; supine_report_json returns false if
+ * jansson fails. */
 void supine_report_text(const supine_comparison *comparison, FILE *file);
 bool supine_report_json(const supine_comparison *comparison, FILE *file);
 void supine_report_csv(const supine_comparison *comparison, FILE *file);
 
-/* Print without pictures where nothing can draw; print the reason. */
+/* Print the comparison as HTML. If pictures cannot be drawn, print the reason in their place. Write
+ * errors stay in the stream.
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
                                  supine_error *error);
 

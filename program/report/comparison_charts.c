@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Charts of the report: coordinates of lines and dots for profile.html and map.html, colours, bars.
+/* Build the charts of the report: coordinates of lines, dots and cells for profile.html and
+ * map.html.
  */
 #include <math.h>
 #include <string.h>
@@ -13,7 +14,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Returns the value of a profile at a slab, %. */
+/* Return the value of a profile in a slab, %. */
 typedef double slab_value(const supine_comparison *c, size_t posture, size_t slab);
 
 static double expansion(const supine_comparison *c, size_t posture, size_t slab) {
@@ -26,7 +27,7 @@ static double share(const supine_comparison *c, size_t posture, size_t slab) {
   return gain != 0.0 ? 100.0 * c->posture[posture].slab[slab].gain / gain : 0.0;
 }
 
-/* The plot's box in profile.html. */
+/* Box of the plot in profile.html, SVG units. */
 enum { LEFT = 46, RIGHT = 404, TOP = 14, BOTTOM = 286 };
 
 static double across(double value, double low, double high) {
@@ -80,7 +81,8 @@ json_t *supine_report_profiles(const supine_comparison *c) {
                    profile(c, "share of the volume gained, %", true, share));
 }
 
-/* Compute the RMS distance from supine, mm, or NaN where the volume cannot be reached. */
+/* Return the RMS distance of a direction of gravity from supine, mm; NaN if the volume cannot be
+ * reached. */
 static double from_supine(const supine_comparison *c, const double g[3]) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const double *direction[2] = {supine, g};
@@ -95,13 +97,14 @@ static double from_supine(const supine_comparison *c, const double g[3]) {
   return supine_compare_rms(c->compare, &pose[1], &pose[0]);
 }
 
-/* The map of map.html. */
+/* Size and place of the map in map.html: cells, and SVG units. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
-/* Compute the place of a direction on the map: across, roll from right over supine and left to
- * prone; down, tilt from head down to feet down. */
+/* Compute the position of a direction of gravity on the map. To the right: roll, from prone over
+ * the right side, supine and the left side to prone. Downwards: tilt, from head down to feet down.
+ */
 static void place(const double g[3], double *x, double *y) {
-  const double roll = atan2(g[0], g[1]) / pi; /* supine 0, left 1/2 */
+  const double roll = atan2(g[0], g[1]) / pi; /* in half turns: supine 0, left 1/2 */
   const double tilt = asin(fmin(1.0, fmax(-1.0, g[2]))) / pi;
   *x = MAP_LEFT + COLUMNS * CELL * (0.5 + roll / 2.0);
   *y = MAP_TOP + ROWS * CELL * (0.5 - tilt);
@@ -151,8 +154,7 @@ json_t *supine_report_direction(const double g[3]) {
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
     if (cosine >
-        nearest +
-            1e-9) { /* of equally near postures take the first: names come before DICOM codes */
+        nearest + 1e-9) { /* of equally near postures, the first: a name, not its DICOM code */
       nearest = cosine;
       name = supine_posture_name(i);
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A comparison for spreadsheets: one number a row. */
+/* Print a comparison as CSV, one number per row. */
 #include "program/options/basis_input.h"
 #include "program/report/comparison.h"
 
@@ -61,7 +61,7 @@ static void extreme(FILE *file, const char *quantity, const char *part, const do
   row(file, quantity, "all", other, "rms", rms, "mm");
 }
 
-/* Print the number of vertices with the name of the file, quoted as [RFC 4180] asks. */
+/* Print the number of vertices with the path of the basis, quoted by RFC 4180. */
 static void vertices_row(const supine_comparison *c, FILE *file) {
   (void)fputs("vertices,rest,,\"", file);
   for (const char *at = c->path; *at != '\0'; ++at) {

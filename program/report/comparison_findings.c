@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What a comparison found, in sentences and in the first table. */
+/* Build the findings of a comparison: the first sentences and table, and the titles of the
+ * profiles. */
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -7,7 +8,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* Published measurements, shown in the row of their posture. */
+/* Published measurements, shown in the row of their posture; report.html names their sources. */
 static const struct {
   const char *posture, *words;
 } published[] = {
@@ -99,18 +100,17 @@ json_t *supine_report_findings(const supine_comparison *c) {
   enum { SENTENCES = 3 };
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count && json_array_size(list) < SENTENCES; ++i) {
-    if (c->posture[i].displacement.max >=
-        0.05) { /* not the state that displacements are measured from */
+    if (c->posture[i].displacement.max >= 0.05) { /* else it is the reference */
       (void)json_array_append_new(list, printed(c, i, print_finding));
     }
   }
   return list;
 }
 
-/* Print the title of a profile for the postures up to `most`. */
+/* Print the title of a profile for the postures 0 to `most`. */
 static void print_profile(const supine_comparison *c, size_t most, bool share, FILE *to) {
-  (void)fputs(share ? "Of a breath the lower half takes:"
-                    : "The lowest third expands so many times as much as the uppermost:",
+  (void)fputs(share ? "Share of the lower half in a breath:"
+                    : "Expansion of the lowest 30 % of the height over that of the uppermost:",
               to);
   for (size_t i = 0; i <= most; ++i) {
     double gain = 0;

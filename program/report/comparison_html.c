@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The comparison as one self-contained HTML file: the data of report.html. */
+/* Print a comparison as one self-contained HTML file by filling report.html. */
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@
 #include "program/report/comparison_parts.h"
 
 extern const supine_asset
-    supine_report_assets[]; /* the .html and .css files, put in by the build */
+    supine_report_assets[]; /* the .html and .css files, embedded by the build */
 
 static json_t *lungs(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
@@ -26,7 +26,7 @@ static json_t *lungs(const supine_comparison *c) {
   return list;
 }
 
-/* Say which two postures differ most. */
+/* Return which two postures differ most, in words. */
 static json_t *farthest_pair(const supine_comparison *c) {
   const size_t count = c->postures.count;
   size_t most = 0;
@@ -39,12 +39,12 @@ static json_t *farthest_pair(const supine_comparison *c) {
                       c->pair[most].rms);
 }
 
-/* Format a share in %; what rounds to nothing is 0. */
+/* Format a share in %; "0 %" instead of "0.00 %". */
 static json_t *percent(double share) {
   return fabs(100.0 * share) < 0.005 ? json_string("0 %") : json_sprintf("%.2f %%", 100.0 * share);
 }
 
-/* Return today's date, or that of SOURCE_DATE_EPOCH, for reports that are equal byte for byte. */
+/* Return today's date, or that of SOURCE_DATE_EPOCH, which makes reports reproducible. */
 static json_t *date(void) {
   const char *epoch = getenv("SOURCE_DATE_EPOCH");
   const time_t now = epoch != NULL ? (time_t)strtoll(epoch, NULL, 10) : time(NULL);
@@ -60,7 +60,7 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
   (void)json_array_append_new(list, json_pack("{s:s, s:o}", "name", name, "value", value));
 }
 
-/* Print the command that makes this report again, cut to `size`. */
+/* Print the command that repeats this comparison, truncated to `size` bytes. */
 static void write_command(const supine_comparison *c, const char *file, char *command,
                           size_t size) {
   FILE *to = fmemopen(command, size, "w");
@@ -72,7 +72,7 @@ static void write_command(const supine_comparison *c, const char *file, char *co
   (void)fprintf(to, "supine compare %s ", file);
   if (c->rms > 0.0) {
     (void)fprintf(to, "--rms %.9g", c->rms);
-  } else if (strchr(state, ':') != NULL) { /* after the posture, supine */
+  } else if (strchr(state, ':') != NULL) { /* the posture, supine, ends there */
     (void)fprintf(to, "--volume %s", strchr(state, ':') + 1);
   }
   if (c->from.given) {
@@ -88,7 +88,7 @@ static void write_command(const supine_comparison *c, const char *file, char *co
   command[size - 1] = '\0';
 }
 
-/* Return what made the report, in ten lines at most. */
+/* Return {{provenance}}: the command, the program, the basis and its metadata. */
 static json_t *provenance(const supine_comparison *c, json_t *file) {
   static const char *const keys[] = {"made_by", "assumed",           "scanned",     "law",
                                      "patient", "error_rms_percent", "attribution", "checksum"};
@@ -104,14 +104,14 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
     const char *value = supine_basis_metadata(c->basis, keys[i]);
     json_t *text = value == NULL ? NULL : json_string(value);
-    if (text != NULL) { /* it is UTF-8 */
+    if (text != NULL) { /* NULL also if the value is not UTF-8 */
       add_fact(list, keys[i], text);
     }
   }
   return list;
 }
 
-/* Make the facts of the page's head and foot. */
+/* Return the data of the report's header, of its section on all directions, and its provenance. */
 static json_t *facts(const supine_comparison *c) {
   const supine_extremes *e = &c->extremes;
   const char *slash = strrchr(c->path, '/');

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A comparison for programs. */
+/* Print a comparison as JSON. */
 #include <jansson.h>
 #include <limits.h>
 

@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Outlines of the lungs in slices for the HTML report, each posture over the reference. */
+/* Build the outlines of the lungs in slices for the HTML report, each posture over the reference.
+ */
 #include <math.h>
 #include <stdlib.h>
 
 #include "program/report/comparison_parts.h"
 
-/* A slice across `axis` at a share of the lungs' extent. Its picture has x to the right and `down`,
- * times `sign`, downwards: seen from the feet or from the front, the patient's left on the right.
- */
+/* A slice normal to `axis` at a share of the lungs' extent. In its picture, x points to the right
+ * and the axis `down`, times `sign`, downwards: it is seen from the feet or from the front. */
 typedef struct slice {
   const char *name;
   size_t axis;
   double share;
-  size_t down;
-  double sign; /* of `down` */
+  size_t down; /* an axis */
+  double sign; /* 1 or -1 */
 } slice;
 
 static const slice slices[] = {{"Axial, upper third", 2, 2.0 / 3, 1, 1},
@@ -21,14 +21,14 @@ static const slice slices[] = {{"Axial, upper third", 2, 2.0 / 3, 1, 1},
                                {"Coronal, front third", 1, 1.0 / 3, 2, -1},
                                {"Coronal, back third", 1, 2.0 / 3, 2, -1}};
 
-/* Find where an edge crosses the plane. */
+/* Compute where an edge crosses the plane, in the axes of the picture, mm. */
 static void cross(const slice *s, double at, const float *a, const float *b, double point[2]) {
   const double t = (at - (double)a[s->axis]) / ((double)b[s->axis] - (double)a[s->axis]);
   point[0] = (double)a[0] + t * ((double)b[0] - (double)a[0]);
   point[1] = s->sign * ((double)a[s->down] + t * ((double)b[s->down] - (double)a[s->down]));
 }
 
-/* Print the outline as an SVG path of one line a triangle; return what it encloses, mm^2. */
+/* Print the outline as an SVG path, one line for each triangle; return the enclosed area, mm^2. */
 static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
                     FILE *path) {
   double twice = 0;
@@ -51,7 +51,7 @@ static double trace(const supine_basis_info *info, const slice *s, double at, co
   return fabs(twice) / 2;
 }
 
-/* Return the outline in a pose as text, and what it encloses. */
+/* Return the outline in a pose as an SVG path; set the enclosed area, mm^2. */
 static json_t *outline(const supine_comparison *c, const slice *s, double at,
                        const supine_pose *pose, float *xyz, double *area) {
   char *text = NULL;
@@ -72,7 +72,7 @@ static json_t *letter(double x, double y, const char *name) {
                    "letter", name);
 }
 
-/* Make the chart of a slice; its title says what each posture does to the area. */
+/* Return the chart of a slice; its title states how each posture changes the area. */
 static json_t *chart(const supine_comparison *c, const slice *s, const double low[3],
                      const double high[3], float *xyz) {
   enum { MARGIN = 18, SCALE = 50 /* mm */ };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Data of the HTML report's templates. */
+/* Build the data of the HTML report's templates. */
 #ifndef SUPINE_COMPARISON_PARTS_H
 #define SUPINE_COMPARISON_PARTS_H
 
@@ -8,44 +8,46 @@
 #include "program/render/render.h"
 #include "program/report/comparison.h"
 
-/* Return "#rrggbb" of a colour map at 0 <= t <= 1. */
+/* Return the colour of a map at 0 <= t <= 1 as "#rrggbb". */
 json_t *supine_report_hex(supine_colours map, double t);
 
 /* Return the colour of a posture's line in charts. */
 const char *supine_report_line(size_t posture);
 
-/* Return a colour bar from 0 to `largest`, with a pointed end if there are larger values:
- * {{stops}},
- * {{ticks}}, {{beyond}} and {{words}}. */
+/* Return a colour bar from 0 to `largest`, with a pointed end if `beyond`, that is, if there are
+ * larger values: {{stops}}, {{ticks}}, {{beyond}} and {{words}}. */
 json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const char *words);
 
 /* Return a direction of gravity in words: a posture's name, or the angle from the nearest posture
  * and the vector in the notation of --posture. */
 json_t *supine_report_direction(const double g[3]);
 
-/* Return the first sentences: the change in each posture. */
+/* Return {{findings}}: sentences on the change in each of the first three postures that differ from
+ * the reference. */
 json_t *supine_report_findings(const supine_comparison *comparison);
 
-/* Return {{postures}}: a row each, with volumes, changes, moves and published values. */
+/* Return {{postures}}: for each a table row of volumes, their changes, displacements and published
+ * values. */
 json_t *supine_report_postures(const supine_comparison *comparison);
 
 /* Return the regional expansion of the lowest three slabs over that of the uppermost three. */
 double supine_report_lowest_over_uppermost(const supine_comparison *comparison, size_t posture);
 
-/* Return the title of a profile, for up to four postures: the lower half's share of a breath, or
- * the ratio above. */
+/* Return the title of a profile, for up to four postures: if `share`, the share of the breath in
+ * the lower half of the lungs, else supine_report_lowest_over_uppermost. */
 json_t *supine_report_profile_finding(const supine_comparison *comparison, bool share);
 
-/* Return {{profiles}}: regional expansion and share of the volume gained, by height. */
+/* Return {{profiles}}: two charts over the height, regional expansion and share of the breath. */
 json_t *supine_report_profiles(const supine_comparison *comparison);
 
-/* Return {{map}}: distance from supine for every direction of gravity. */
+/* Return {{map}}: RMS distance from supine for every direction of gravity. */
 json_t *supine_report_map(const supine_comparison *comparison);
 
-/* Return {{outlines}}: slices of the lungs, each posture over the reference. */
+/* Return {{outlines}}: for each slice, the outlines in all postures over that of the reference. */
 json_t *supine_report_outlines(const supine_comparison *comparison);
 
-/* Return {{pictures}}: {{cells}} from the front; NULL, with `error` set, if none can be drawn. */
+/* Return {{pictures}}: {{cells}}, a picture of each posture from the front, and a colour bar; NULL,
+ * with `error` set, if they cannot be drawn. */
 json_t *supine_report_pictures(const supine_comparison *comparison, supine_error *error);
 
 #endif

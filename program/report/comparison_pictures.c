@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Pictures of the postures from the front for the HTML report. */
+/* Draw the postures from the front for the HTML report. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -18,7 +18,7 @@ static supine_scene make_scene(const supine_comparison *c, size_t posture, const
                         .extent = extent};
 }
 
-/* Draw a scene as PNG in base64; NULL on failure. */
+/* Draw a scene and return it as PNG in base64, or NULL on failure. */
 static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine_error *error) {
   char *bytes[2] = {NULL, NULL}; /* PNG, base64 */
   size_t size[2] = {0, 0};
@@ -38,8 +38,8 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
   return made;
 }
 
-/* Describe gravity relative to the viewer: an arrow at `along` degrees, `towards` the viewer, or
- * `away`. */
+/* Describe gravity in a picture: an arrow at `along` degrees, clockwise from the right, and the
+ * `turn`, degrees, that makes it point down; else `towards` the viewer or `away`. */
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};
@@ -49,7 +49,7 @@ static void set_gravity(const double g[3], json_t *shot) {
       seen[row] += axes[row][axis] * g[axis];
     }
   }
-  if (hypot(seen[0], seen[1]) > 0.35) { /* turn the picture so that gravity points down */
+  if (hypot(seen[0], seen[1]) > 0.35) {
     (void)json_object_set_new(
         shot, "turn", json_sprintf("%.1f", 90 + atan2(seen[1], seen[0]) * 180.0 / acos(-1.0)));
     (void)json_object_set_new(shot, "along",
@@ -79,7 +79,7 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
 }
 
 json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) {
-  enum { PER_ROW = 6 }; /* so that a row fits a sheet */
+  enum { PER_ROW = 6 }; /* a row fits on a printed page */
   const size_t count = c->postures.count;
   const size_t rows = (count + PER_ROW - 1) / PER_ROW;
   double extent[4] = SUPINE_EXTENT_NONE;
@@ -108,7 +108,7 @@ json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) 
   char words[192];
   (void)snprintf(words, sizeof words, "displacement from %s, mm; lines at the ticks%s",
                  c->reference.name,
-                 most > largest ? "; the last colour also shows what lies beyond" : "");
+                 most > largest ? "; the last colour also stands for larger values" : "");
   pictures = supine_report_bar(SUPINE_COLOURS_DISPLACEMENT, largest, most > largest, words);
   (void)json_object_set(pictures, "cells", cells);
   (void)json_object_set_new(pictures, "widest", json_integer(WIDTH));

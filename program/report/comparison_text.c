@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A comparison for the terminal. */
+/* Print a comparison as text for the terminal. */
 #include <math.h>
 #include <string.h>
 
@@ -70,7 +70,7 @@ static void print_pairs(const supine_comparison *c, int width, FILE *file) {
   }
 }
 
-/* Print the share of each lung in the breath. */
+/* Print the share of each lung in the breath, mL. */
 static void print_gains(const supine_comparison *c, int width, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   (void)fprintf(file, "\nOf a breath of %.4g mL each lung takes, mL\n%-*s",
@@ -112,7 +112,7 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
   }
 }
 
-/* Print a share in %; what rounds to nothing is 0. */
+/* Format a share in %; "0 %" instead of "0.000 %". */
 static const char *percent(double share, char text[32]) {
   if (fabs(share) < 5e-6) {
     return "0 %";
@@ -151,6 +151,6 @@ void supine_report_text(const supine_comparison *c, FILE *file) {
                 e->pair[1][1], e->pair[1][2], e->pair_rms, e->farthest[0], e->farthest[1],
                 e->farthest[2], e->farthest_rms);
   (void)fprintf(file,
-                "  energy                constant %s, odd %s (turns over with gravity), even %s\n",
+                "  energy                constant %s, odd %s (reverses with gravity), even %s\n",
                 percent(c->constant, text[0]), percent(c->odd, text[1]), percent(c->even, text[2]));
 }
