@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Animations as WebP files. */
+/* Write animations as WebP files. */
 #include <stdlib.h>
 
 #include <webp/encode.h>
@@ -7,7 +7,7 @@
 
 #include "program/render/render.h"
 
-/* WebP quality, 0 to 100: letters stay sharp, at a third of the lossless size. */
+/* WebP quality, 0 to 100: letters stay sharp, and files are a third of the lossless size. */
 static const float quality = 90.0F;
 enum { EFFORT = 2, SIDE_MAX = 16383 };
 

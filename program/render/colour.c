@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Colour maps: paths through OKLab in equal steps of its distance, lightness rising all the way, so
- * that they also read in grey and for the colour-blind. B. Ottosson, "A perceptual color space for
- * image processing", 2020. */
+/* Compute the colour maps: paths through OKLab, divided into equal distances, on which lightness
+ * rises, so that the colours can be ordered in grey and with any colour vision. B. Ottosson, "A
+ * perceptual color space for image processing", 2020. */
 #include <math.h>
 #include <pthread.h>
 #include <string.h>
@@ -12,7 +12,7 @@
 
 enum { KNOTS = 6, FINE = 4096, COLOURS = 256 };
 
-/* Lightness, chroma and hue (degrees) along the paths. */
+/* Lightness, chroma and hue (degrees) at the knots of the paths. */
 static const double paths[SUPINE_COLOURS_COUNT][KNOTS][3] = {
     {{0.42, 0.14, 288},
      {0.51, 0.125, 258},

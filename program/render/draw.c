@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Draw the lungs: project the vertices, find the nearest triangle of each sample, light it. */
+/* Draw the lungs: project the vertices, find the nearest triangle at each sample, shade it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "program/render/render.h"
 #include "sh/base/parallel.h"
 
-/* Rotations of the views from body axes (LPS). */
+/* Names of the views, and rotations from body axes (LPS) to the viewer's. */
 static const struct {
   const char *name;
   double axes[3][3]; /* right, up, towards the viewer */
@@ -18,7 +18,7 @@ static const struct {
     {"right", {{0, -1, 0}, {0, 0, 1}, {-1, 0, 0}}},
     {"head", {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},
     {"feet", {{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
-    /* 35 degrees to the left, 18 up */
+    /* from the front, 35 degrees to the patient's left and 18 degrees up */
     {"oblique",
      {{0.8191520442889918, 0.57357643635104605, 0},
       {-0.17724486640549356, 0.25313190266227803, 0.95105651629515353},
@@ -38,13 +38,13 @@ enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GR
 
 static const double distance_in_radii = 5.0; /* from the viewer to the centre of the lungs */
 static const double depth_in_radii = 3.0;    /* depth range on either side of the centre */
-static const double margin = 1.03;
+static const double margin = 1.03;           /* size of the frame relative to the extent */
 static const float gamma_exponent = 2.2F;
 
 typedef struct corner {
   float x, y;      /* samples, from the left and upper edge */
-  float nearness;  /* 1 / distance along the view; 0: not drawn */
-  float normal[3]; /* right, up, towards the viewer */
+  float nearness;  /* 1 / distance from the viewer along the view, 1/mm; 0: not drawn */
+  float normal[3]; /* unit normal: right, up, towards the viewer */
   float eye[3];    /* from the vertex to the viewer, mm */
   float value;
 } corner;
@@ -81,11 +81,12 @@ void supine_render_destroy(supine_renderer *renderer) {
   }
 }
 
-/* A viewer in front of the centre of the reference surface, whatever the state drawn. */
+/* A viewer in front of the centre of the reference surface, the same for every state drawn. */
 typedef struct camera {
   double axes[3][3];
   double centre[3];
-  double radius, away; /* of the lungs, and from the viewer to the centre, mm */
+  double radius; /* half diagonal of the box of the reference surface, mm */
+  double away;   /* distance from the viewer to the centre, mm */
 } camera;
 
 static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
@@ -112,7 +113,7 @@ static void turn(const camera *c, const double v[3], double seen[3]) {
   }
 }
 
-/* Transform a position to the viewer's axes, from the centre. */
+/* Transform a position to the viewer's axes, with the centre as the origin. */
 static void place(const camera *c, const float xyz[3], double seen[3]) {
   const double from[3] = {(double)xyz[0] - c->centre[0], (double)xyz[1] - c->centre[1],
                           (double)xyz[2] - c->centre[2]};
@@ -134,7 +135,8 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   }
 }
 
-/* Fit the extent into the picture: find its centre, mm, and the scale in half sides per mm. */
+/* Fit the extent into the picture: compute its centre, mm, and the scales in x and y, half sides of
+ * the picture per mm. */
 static void find_frame(supine_renderer *r, const supine_scene *scene, double frame[4]) {
   double extent[4] = SUPINE_EXTENT_NONE;
   if (scene->extent != NULL) {
@@ -152,7 +154,7 @@ static void find_frame(supine_renderer *r, const supine_scene *scene, double fra
   frame[3] = 1 / tall;
 }
 
-/* Project a point in the viewer's axes to a picture of `size` pixels, the first row on top. */
+/* Project a point in the viewer's axes to a picture of `size` pixels or samples, y downwards. */
 static void project(const camera *c, const double frame[4], const double p[3], const double size[2],
                     double at[2]) {
   for (int side = 0; side < 2; ++side) {
@@ -180,9 +182,9 @@ typedef struct canvas {
   const supine_scene *scene;
   size_t width, height;             /* samples */
   uint32_t *nearest;                /* [height, width] triangle nearest to the viewer, or NOTHING */
-  float *nearness;                  /* [height, width] its nearness */
-  float colours[SHADES + 1][3];     /* of the map, linear */
-  unsigned char encode[SHADES + 1]; /* linear to sRGB, 0 to 255 */
+  float *nearness;                  /* [height, width] its nearness, 1/mm */
+  float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
+  unsigned char encode[SHADES + 1]; /* table from linear, 0 to 1, to encoded, 0 to 255 */
   uint32_t *pixels;
 } canvas;
 
@@ -215,7 +217,7 @@ static void find_corners(const canvas *c) {
   }
 }
 
-/* A projected triangle: its corners, and twice its area in samples, negative when seen from behind.
+/* A projected triangle: its corners, and twice its area, samples^2, negative if seen from behind.
  */
 typedef struct face {
   const corner *at[3];
@@ -227,11 +229,11 @@ static face face_of(const canvas *c, size_t triangle) {
   const corner *all = c->renderer->corners;
   face f = {{&all[v[0]], &all[v[1]], &all[v[2]]}, 0.0F};
   f.area = (f.at[2]->x - f.at[0]->x) * (f.at[1]->y - f.at[0]->y) -
-           (f.at[1]->x - f.at[0]->x) * (f.at[2]->y - f.at[0]->y); /* rows go down */
+           (f.at[1]->x - f.at[0]->x) * (f.at[2]->y - f.at[0]->y); /* y points down */
   return f;
 }
 
-/* Compute the barycentric coordinates of a place in the picture. */
+/* Compute the barycentric coordinates of a position in the picture, samples. */
 static void shares_at(const face *f, float x, float y, float share[3]) {
   for (int k = 0; k < 3; ++k) {
     const corner *a = f->at[(k + 1) % 3];
@@ -245,7 +247,7 @@ static float nearness_at(const face *f, const float share[3]) {
          share[2] * f->at[2]->nearness;
 }
 
-/* Draw a triangle's part in the rows from `begin` to `end`. */
+/* Draw the part of a triangle in the sample rows from `begin` up to `end`. */
 static void draw_face(const canvas *c, size_t triangle, size_t begin, size_t end) {
   const face f = face_of(c, triangle);
   const float left = fminf(f.at[0]->x, fminf(f.at[1]->x, f.at[2]->x));
@@ -299,7 +301,7 @@ static float value_at(const face *f, float x, float y) {
          nearness_at(f, share);
 }
 
-/* Compute the coverage of a contour line, as in contour.glsl. */
+/* Return the coverage by contour lines at a sample, 0 to 1, as in contour.glsl. */
 static float contour(const face *f, float x, float y, float value, float spacing) {
   const float steps = value / spacing;
   const float width =
@@ -311,7 +313,8 @@ static float contour(const face *f, float x, float y, float value, float spacing
              : (1.0F - smoothstep(0.5F, 1.7F, away)) * (1.0F - smoothstep(0.3F, 0.8F, width));
 }
 
-/* Compute the diffuse light from a direction of any length on a surface of unit normal n. */
+/* Return the diffuse light from a direction, a vector of any length, on a surface with unit normal
+ * n. */
 static float lambert(const float n[3], const float from[3]) {
   float to[3] = {from[0], from[1], from[2]};
   normalise(to);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Postures side by side, composed by cairo. */
+/* Compose pictures of postures side by side with cairo. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,13 +27,13 @@
   EACH(cairo_, text_extents) EACH(cairo_, text_path)
 /* clang-format on */
 
-/* Loaded at the first use, because cairo depends on the X11 libraries. */
+/* Functions of cairo, loaded at the first use because cairo depends on the X11 libraries. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
 typedef struct theme {
-  double top[3], bottom[3]; /* ground */
+  double top[3], bottom[3]; /* ends of the background gradient */
   double card[3], edge[3];
   double text[3], faint[3];
 } theme;
@@ -52,16 +52,16 @@ static const theme themes[2] = {
      {0.94, 0.955, 0.97},
      {0.6, 0.655, 0.71}},
 };
-static const double accent[3] = {0.91, 0.33, 0.17}; /* gravity */
+static const double accent[3] = {0.91, 0.33, 0.17}; /* colour of the arrow of gravity */
 
 /* Layout of the picture, pixels. */
 typedef struct layout {
   double font;
   double margin;
-  double top; /* below the heading */
+  double top; /* y of the first cells, below the heading */
   double cell_width, cell_height;
   double strip; /* height of the head of a cell, above its lungs */
-  double bar;   /* height of the foot with the bar of colours */
+  double bar;   /* height of the foot, which holds the colour bar */
 } layout;
 
 typedef struct bar_scale {
@@ -91,7 +91,7 @@ static void text(cairo_t *cr, double x, double y, double align, const char *word
   cairo.show_text(cr, words);
 }
 
-/* Draw text, scaled down where it is wider than `room`. */
+/* Draw text, scaled down if it is wider than `room`, pixels. */
 static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
                         const char *words) {
   font(cr, size, bold);
@@ -120,8 +120,8 @@ static void ground(cairo_t *cr, const supine_picture *picture, const theme *look
   cairo.pattern_destroy(fade);
 }
 
-/* Draw gravity as an arrow from the centre of the ball; towards the viewer as a dot, away as a
- * cross. */
+/* Draw gravity, `seen` in the viewer's axes, on the ball: an arrow, or a dot in a circle if it
+ * points towards the viewer, or a cross in a circle if it points away. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
   cairo.new_path(cr);
@@ -195,8 +195,8 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   gravity_arrow(cr, x, y, radius * 0.66, seen);
 }
 
-/* Move a name down until it overlaps none of the `count` placed before it. `box` holds the left
- * end, the baseline and the width of each name. */
+/* Move the name `count` down until it overlaps none of those before it. `box` holds the left end,
+ * the baseline and the width of each name, pixels. */
 static void place_name(double (*box)[3], size_t count, double line) {
   double *own = box[count];
   for (size_t i = 0; i < count; ++i) {
@@ -208,8 +208,8 @@ static void place_name(double (*box)[3], size_t count, double line) {
   }
 }
 
-/* Draw discs and specks at the marks, then the names over them. Eight parameters: where, what, and
- * in which colours. */
+/* Draw discs and dots at the marks, then the labels over them. The scene is drawn at (x, y); `size`
+ * is that of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y,
                                 const theme *look) {
@@ -261,7 +261,7 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
   return SUPINE_OK;
 }
 
-/* Draw a scene on a new surface, which the caller destroys. */
+/* Draw a scene on a new surface, which the caller destroys, also after failure. */
 static supine_status draw_scene(supine_renderer *renderer, const supine_scene *scene,
                                 cairo_surface_t **image, supine_error *error) {
   *image = cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
@@ -276,8 +276,8 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
   return status;
 }
 
-/* Draw the lungs of a panel. Thirteen parameters: the panel, its view, and its place in the
- * picture, computed by cell(). */
+/* Draw the lungs of a panel, and its marks, in the box of `width` x `height` pixels at (x, y),
+ * which cell() computes. `size` is that of the font, pixels. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -308,7 +308,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   return status;
 }
 
-/* Draw one posture from one view. Nine parameters: the picture, and which part of it. */
+/* Draw the cell of one posture, `column`, from one view, `row`. */
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
@@ -400,7 +400,7 @@ static layout make_layout(const supine_picture *picture) {
   return at;
 }
 
-/* Widen an extent to what one view of a picture shows. */
+/* Enlarge an extent to contain all postures of a picture in one view. */
 static void widen(supine_renderer *renderer, const supine_picture *picture, size_t row,
                   double extent[4]) {
   for (size_t column = 0; column < picture->panel_count; ++column) {
@@ -461,7 +461,7 @@ static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_erro
                                                             cairo.status_to_string(written));
 }
 
-/* Draw the picture on a surface of the caller's. */
+/* Draw the picture on a surface. */
 static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
                              const supine_picture *picture, supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Pictures of deformed lungs, composed by cairo. Where cairo is not installed, functions that draw
- * return SUPINE_ERROR_UNSUPPORTED. */
+ * Draw pictures of deformed lungs. Functions that compose pictures or write PNG use cairo and
+ * return SUPINE_ERROR_UNSUPPORTED if it is not installed. */
 #ifndef SUPINE_RENDER_H
 #define SUPINE_RENDER_H
 
@@ -29,7 +29,8 @@ typedef enum supine_view {
 /** Return the name of a view, or NULL beyond the last. */
 const char *supine_render_view_name(supine_view view);
 
-/** Compute the rotation from body axes to the viewer's; its rows are right, up, towards the viewer.
+/** Compute the rotation from body axes (LPS) to the viewer's; its rows are right, up, towards the
+ * viewer.
  */
 void supine_render_view_axes(supine_view view, double axes[3][3]);
 
@@ -40,59 +41,61 @@ typedef enum supine_colours {
   SUPINE_COLOURS_COUNT
 } supine_colours;
 
-/** Compute a colour of a map, sRGB 0 to 1, for 0 <= t <= 1. Lightness in OKLab [Ottosson2020] rises
- * in perceptually equal steps, so that grey copies keep the order. Pictures, report and page use
- * the same maps. */
+/** Compute a colour of a map, sRGB 0 to 1, at 0 <= t <= 1. Colours lie at equal distances in OKLab
+ * [Ottosson2020] and their lightness rises, so that grey copies keep the order. Pictures, report
+ * and page use the same maps. */
 void supine_render_colour(supine_colours map, double t, double rgb[3]);
 
-/** Buffers to draw one basis; one thread at a time may use them. */
+/** Buffers to draw one basis; only one thread at a time may use them. */
 typedef struct supine_renderer supine_renderer;
 
-/** @param basis  must outlive the renderer
+/** Create a renderer; supine_render_destroy frees it.
+ * @param basis  must outlive the renderer
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
                                    supine_error *error);
-/** Destroy it; NULL is legal. */
+/** Destroy a renderer; NULL is legal. */
 void supine_render_destroy(supine_renderer *renderer);
 
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
   const supine_pose *pose;
-  const float *value; /**< [N] what colours show, mm */
-  double largest;     /**< value at the end of the colours, > 0 */
-  double line_step;   /**< thin lines at multiples of this; 0: none */
+  const float *value; /**< [N] values that colours show, mm */
+  double largest;     /**< value at the end of the colours, mm, > 0 */
+  double line_step;   /**< distance of contour lines, mm; 0: none */
   supine_colours colours;
   supine_view view;
-  bool dark;            /**< lit for a dark page */
+  bool dark;            /**< shade for a dark background */
   bool shell;           /**< draw a grey, transparent shell with a dark outline, without colours */
   size_t width, height; /**< pixels */
   const double *extent; /**< [4] by supine_render_extent; NULL: that of this scene */
 } supine_scene;
 
-/** Extent to begin supine_render_extent with. */
+/** Empty extent, the initial value for supine_render_extent. */
 #define SUPINE_EXTENT_NONE                                                                         \
   { INFINITY, -INFINITY, INFINITY, -INFINITY }
 
-/** Widen an extent (least and greatest x, then y, on the picture plane, mm) to what a scene shows,
- * so that several states can be drawn to one scale. The scenes must share the view. */
+/** Enlarge an extent (smallest and largest x, then y, on the picture plane, mm) to contain a scene,
+ * so that several states can be drawn at one scale. The scenes must share the view. */
 void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
-/** Draw on a transparent ground, with all cores.
- * @param pixels  [height, width] premultiplied ARGB as cairo has it, top row first; written
- * @retval SUPINE_ERROR_ARGUMENT  0 or more than 16384 pixels a side
+/** Draw a scene on a transparent background, with all cores.
+ * @param pixels  [height, width] premultiplied ARGB as in cairo, top row first; output
+ * @retval SUPINE_ERROR_ARGUMENT  a side of 0 or more than 16384 pixels
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *scene,
                                  uint32_t *pixels, supine_error *error);
 
-/** Draw the same as a PNG file. */
+/** Draw a scene and write it as PNG.
+ * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
                                 supine_error *error);
 
-/** Something inside the lungs. */
+/** A point, or a vertex of a mesh, inside the lungs. */
 typedef struct supine_mark {
-  float xyz[3];      /**< mm, where it is */
-  float value;       /**< mm, what its colour shows */
-  bool point;        /**< drawn as a disc; else as a speck: the vertices of a mesh */
+  float xyz[3];      /**< position, mm */
+  float value;       /**< value that its colour shows, mm */
+  bool point;        /**< a point, drawn as a disc; else a vertex of a mesh, drawn as a dot */
   const char *label; /**< written beside it, or NULL */
 } supine_mark;
 
@@ -101,8 +104,7 @@ typedef struct supine_marks {
   const supine_mark *mark;
 } supine_marks;
 
-/** Compute where marks lie on the drawing of a scene: pixels [count, 2] from its left and upper
- * edge. */
+/** Project marks to the drawing of a scene: pixels, [count, 2], from its left and upper edge. */
 void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
                            const supine_marks *marks, double (*pixel)[2]);
 
@@ -118,7 +120,7 @@ typedef struct supine_panel {
 
 enum { SUPINE_PANELS_MAX = 8, SUPINE_VIEWS_MAX = 7 };
 
-/** Postures side by side, views below each other, a bar of colours. */
+/** A picture: postures side by side, views below each other, a colour bar at the foot. */
 typedef struct supine_picture {
   const supine_panel *panel;
   size_t panel_count; /**< 1 to SUPINE_PANELS_MAX */
@@ -126,11 +128,12 @@ typedef struct supine_picture {
   size_t view_count;   /**< 1 to SUPINE_VIEWS_MAX */
   const char *heading; /**< or NULL */
   const char *bar_label;
-  double largest;            /**< mm at the end of the colours */
+  double largest;            /**< value at the end of the colours, mm */
   double transparency;       /**< of the lungs, 0 to 1 */
-  const double (*extent)[4]; /**< [view_count] supine_render_picture_extent; NULL: its own */
+  const double (*extent)[4]; /**< [view_count] by supine_render_picture_extent; NULL: that of this
+                                  picture */
   supine_colours colours;
-  bool beyond; /**< some values are larger: the bar ends in a point */
+  bool beyond; /**< some values exceed `largest`: draw the bar with a pointed end */
   bool dark;
   size_t width, height; /**< pixels */
 } supine_picture;
@@ -141,21 +144,21 @@ double supine_render_bar_step(double value);
 /** Return the end of a colour bar: `value`, below which most values lie, rounded up to a tick. */
 double supine_render_bar_end(double value);
 
-/** Widen an extent for each view, as supine_render_extent, to what a picture shows, so that
- * several pictures can be drawn to one scale.
- * @param extent  [view_count] */
+/** Enlarge an extent for each view, as supine_render_extent does, to contain a picture, so that
+ * several pictures can be drawn at one scale.
+ * @param extent  [view_count, 4] */
 void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
                                   double (*extent)[4]);
 
 /** Compose a picture.
- * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; written
- * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels
+ * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; output
+ * @retval SUPINE_ERROR_ARGUMENT  too large, or too small for so many panels
  * @retval those of supine_render_draw */
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
 /** Compose a picture and write it as PNG.
- * @retval SUPINE_ERROR_ARGUMENT  too small for so many panels
+ * @retval SUPINE_ERROR_ARGUMENT  too large, or too small for so many panels
  * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
 supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
                                           FILE *file, supine_error *error);
@@ -163,12 +166,12 @@ supine_status supine_render_picture_write(supine_renderer *renderer, const supin
 /** An animation for a WebP file that repeats forever. */
 typedef struct supine_animation supine_animation;
 
-/** @retval SUPINE_ERROR_ARGUMENT     larger than WebP's 16383 pixels a side
- * @retval SUPINE_ERROR_UNSUPPORTED  no libwebp in the build
+/** Create an animation; supine_render_animation_close frees it.
+ * @retval SUPINE_ERROR_ARGUMENT  a side exceeds the 16383 pixels of WebP
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_animation_open(size_t width, size_t height,
                                            supine_animation **animation, supine_error *error);
-/** Append a picture of that size, shown for some milliseconds.
+/** Append a picture of that size, shown for `milliseconds`.
  * @retval SUPINE_ERROR_MEMORY, and those of supine_render_picture_draw */
 supine_status supine_render_animation_add(supine_animation *animation, supine_renderer *renderer,
                                           const supine_picture *picture, int milliseconds,
@@ -177,7 +180,7 @@ supine_status supine_render_animation_add(supine_animation *animation, supine_re
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_render_animation_write(supine_animation *animation, FILE *file,
                                             supine_error *error);
-/** Releases it; NULL is legal. */
+/** Free an animation; NULL is legal. */
 void supine_render_animation_close(supine_animation *animation);
 
 #endif
