@@ -208,8 +208,8 @@ static void place_name(double (*box)[3], size_t count, double line) {
   }
 }
 
-/* Draw discs and dots at the marks, then the labels over them. The scene is drawn at (x, y); `size`
- * is that of the font, pixels. */
+/* Draw discs and dots at the marks, then the labels over them. Eight parameters: what to draw, and
+ * where: the scene lies at (x, y), and `size` is that of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y,
                                 const theme *look) {
@@ -276,8 +276,9 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
   return status;
 }
 
-/* Draw the lungs of a panel, and its marks, in the box of `width` x `height` pixels at (x, y),
- * which cell() computes. `size` is that of the font, pixels. */
+/* Draw the lungs of a panel and its marks. Thirteen parameters: what to draw, and where: the box of
+ * `width` x `height` pixels at (x, y), which cell() computes; `size` is that of the font, pixels.
+ */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -308,7 +309,8 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   return status;
 }
 
-/* Draw the cell of one posture, `column`, from one view, `row`. */
+/* Draw the cell of one posture, `column`, from one view, `row`. Nine parameters: the picture, its
+ * layout and scales, and the cell. */
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
