@@ -8,7 +8,7 @@
 
 #include "program/breath/breath_frames.h"
 
-enum { RUN_MAX = 128 };
+enum { RUN_MAX = 128 }; /* largest number of steps of a run */
 
 static const double tolerance = 0.01; /* largest error of a volume within a run, mL */
 
@@ -48,7 +48,7 @@ static supine_status find_gains(breath_frames *frames, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* gains = first + share (last - first) */
+/* Mix the gains of two frames: gains = first + share (last - first). */
 static void mix_gains(const breath_frames *frames, size_t first, size_t last, double share,
                       double (*gains)[3]) {
   for (size_t i = 0; i < 3 * frames->lungs; ++i) {
@@ -65,8 +65,8 @@ static void stepped_volumes(const breath_frames *frames, supine_pose *pose, size
   supine_basis_volumes(frames->basis, pose, volumes);
 }
 
-/* Return whether equal steps from frame `first` to `last` keep the volumes of the frames between.
- */
+/* Return whether equal steps from frame `first` to `last` keep the volumes of the frames between
+ * within the tolerance. */
 static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t first, size_t last) {
   const size_t lungs = frames->lungs;
   for (size_t t = first + 1; t < last; ++t) {
@@ -83,8 +83,8 @@ static bool run_holds(const breath_frames *frames, supine_pose *pose, size_t fir
   return true;
 }
 
-/* Find runs greedily, and replace the gains and volumes within a run by those of equal steps. There
- * are none with rigid parts, whose rotations are not equal steps. */
+/* Find runs greedily, and replace the gains and volumes within a run by those of equal steps. A
+ * basis with rigid parts has no runs, as rotations are not equal steps. */
 static void find_runs(breath_frames *frames) {
   supine_pose pose;
   for (size_t t = 0; t < frames->count; ++t) {
@@ -101,7 +101,7 @@ static void find_runs(breath_frames *frames) {
            run_holds(frames, &pose, first, last + 1)) {
       ++last;
     }
-    if (last == first + 1) { /* one step does not pay for computing its displacement */
+    if (last == first + 1) { /* a run of one step costs more than evaluating its frame */
       last = first;
     }
     for (size_t t = first + 1; t <= last; ++t) {
@@ -109,7 +109,7 @@ static void find_runs(breath_frames *frames) {
       stepped_volumes(frames, &pose, first, last, t, frames->volumes + t * frames->lungs);
       ++frames->stepped;
     }
-    if (last > first) { /* keep the gains of the first frame, and the step in the second */
+    if (last > first) { /* the second frame takes the gains one step after the first */
       mix_gains(frames, first, last, 1.0 / (double)(last - first), frames->gains[first + 1]);
     }
     first = last + 1;

@@ -16,7 +16,7 @@ enum { SUPINE_PV_UNKNOWNS = SUPINE_PV_CONTROLS + 2 };
 typedef struct supine_pv_sample {
   double pressure; /**< cmH2O */
   double volume;   /**< mL */
-  size_t line;     /**< of the file, for messages */
+  size_t line;     /**< line of the file, for messages */
 } supine_pv_sample;
 
 /** Quality of the fit of one limb. */
@@ -26,7 +26,7 @@ typedef struct supine_pv_report {
   double volume_interval[2];                   /**< half-widths for V_low and V_high, mL */
   double rms;                                  /**< root mean square residual, mL */
   double rms_percent; /**< the same as a percentage of the samples' range of volumes */
-  double condition;   /**< of the Jacobian with its columns scaled to unit length */
+  double condition;   /**< condition number of the Jacobian with columns of unit length */
 } supine_pv_report;
 
 /** Fit a limb to samples:
@@ -46,7 +46,7 @@ typedef struct supine_pv_report {
  * @param name        the samples' file, for messages
  * @param count       at least SUPINE_PV_UNKNOWNS + 1
  * @param samples     [count] finite
- * @param confidence  of the intervals, between 0 and 1
+ * @param confidence  confidence level of the intervals, between 0 and 1
  * @retval SUPINE_ERROR_FORMAT     too few samples, repeated or unordered pressures, falling volumes
  * @retval SUPINE_ERROR_NUMERICAL  no minimum was found
  * @retval SUPINE_ERROR_MEMORY */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Files of samples and of parameters. */
+/* Read samples of a pressure-volume relation, and read and write its parameters, as CSV. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The limb that fits samples best, and how well the samples determine it. */
+/* Fit a limb to samples by least squares, with the confidence intervals of its parameters. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -14,9 +14,9 @@
 #include "program/breath/pv.h"
 
 enum {
-  LOW = SUPINE_PV_CONTROLS, /* V_low and V_high among the unknowns */
+  LOW = SUPINE_PV_CONTROLS, /* indices of V_low and V_high among the unknowns */
   HIGH,
-  NOISE_KNOWN = 15 /* number of samples from which noise is estimated beside the unknowns */
+  NOISE_KNOWN = 15 /* least number of samples that also determine their noise */
 };
 
 /* Sorted samples, and the workspace of their fit. */
@@ -40,10 +40,10 @@ static supine_status refuse(const problem *limb, const supine_pv_sample *sample,
 
 static supine_status refuse_fall(const problem *limb, const supine_pv_sample *sample, double larger,
                                  supine_error *error) {
-  char why[160];
+  char why[192];
   (void)snprintf(why, sizeof why,
-                 "volume %g mL where a lower pressure already has %g mL: volume must rise with "
-                 "pressure, but for noise",
+                 "volume %g mL is below the %g mL at a lower pressure: volume must rise with "
+                 "pressure, except for noise; correct or remove the sample",
                  sample->volume, larger);
   return refuse(limb, sample, why, error);
 }
@@ -101,7 +101,7 @@ static bool find_shape(const problem *limb, const double *control, double *q) {
   return supine_breath_curve_evaluate(&curve, limb->count, limb->x, q, NULL, NULL) == SUPINE_OK;
 }
 
-/* V(x) - V_j with V = (1 - q) V_low + q V_high. */
+/* Compute the residuals V(x_j) - V_j, where V = (1 - q) V_low + q V_high. */
 static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector *residual) {
   static const double wall = 1e6; /* residual beyond the bounds, so that the search steps back */
   const problem *limb = context;
@@ -117,8 +117,8 @@ static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector 
   return GSL_SUCCESS;
 }
 
-/* dV/dc_i by central differences, which are accurate to about 1e-10; V is linear in V_low and
- * V_high. */
+/* Compute dV/dc_i by central differences, which are accurate to about 1e-10, and the derivatives by
+ * V_low and V_high, in which V is linear. */
 static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *jacobian) {
   static const double step = 1e-5;
   const problem *limb = context;
@@ -192,7 +192,7 @@ static void describe(const problem *limb, double span, double confidence, supine
       span * normal * gsl_stats_median(limb->scratch, 1, count) * sqrt((double)count / freedom);
 }
 
-/* Levenberg-Marquardt from the straight line between the end samples. */
+/* Minimise by Levenberg-Marquardt, from the straight line between the end samples. */
 static supine_status minimise(problem *limb) {
   enum { STEPS_MAX = 300 };
   static const double tolerance = 1e-13;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The direction of gravity during a turn of the body. */
+/* Compute the direction of gravity during a turn of the body. */
 #include <math.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 
 #include "program/breath/turn.h"
 
-/* Return the direction 90 degrees from `from`, towards `to`. */
+/* Compute the direction 90 degrees from `from`, towards `to`. */
 static void find_quarter(const breath_turn *turn, double quarter[3]) {
   static const double left[3] = {1.0, 0.0, 0.0};
   static const double back[3] = {0.0, 1.0, 0.0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The direction of gravity during a turn of the body. */
+/* Compute the direction of gravity during a turn of the body. */
 #ifndef SUPINE_TURN_H
 #define SUPINE_TURN_H
 

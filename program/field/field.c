@@ -44,7 +44,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   }
   double axes[3] = {0.0, 0.0, 0.0};
   if (well) {
-    supine_image_locate(nodes, axes, axes); /* not finite where the grid's steps are dependent */
+    supine_image_locate(nodes, axes,
+                        axes); /* not finite where the steps of the grid are linearly dependent */
   }
   if (!well || !isfinite(axes[0] + axes[1] + axes[2])) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -147,8 +148,8 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
     for (size_t i = 0; i < count; ++i) {
       below[i] = (float)-fade; /* where the basis has no node */
     }
-    for (size_t i = 0; i < n;
-         ++i) { /* from the node in the scan; the basis has it at full inflation */
+    /* The displacement starts at the node in the scan; info->vertices has it at full inflation. */
+    for (size_t i = 0; i < n; ++i) {
       double node[3];
       supine_image_place(&made.nodes, part[i], node);
       for (size_t k = 0; k < 3; ++k) {

@@ -9,11 +9,11 @@
 
 #include "mesh/io/image.h"
 
-/** u(x) at the nodes x of a grid, mm. */
+/** Displacement u(x) at the nodes x of a grid, mm. */
 typedef struct supine_field {
   supine_image nodes; /**< F32, three channels */
   supine_image depth; /**< F32, one channel: mm below the surface of the lungs, negative outside;
-                           without values in an inverse */
+                           values NULL in an inverse */
 } supine_field;
 
 /** Compute the field from the scan to a pose. Beyond the nodes of the basis, outside the lungs, it
@@ -28,7 +28,7 @@ void supine_field_free(supine_field *field);
 /** Interpolate the field at a point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
-/** How well an inverse inverts. */
+/** Residual of a field followed by its inverse. */
 typedef struct supine_field_residual {
   double rms, largest; /**< |u(x) + v(x + u(x))| over the nodes x inside the lungs, mm */
   size_t lost;         /**< nodes whose inverse is not found to 0.01 mm, because the field folds */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Invert a field node by node, and measure the residual of the two together. */
+/* Invert a field node by node, and measure the residual of the field followed by its inverse. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,8 +12,8 @@
 static const double tolerance = 1e-5;   /* residual at which iteration stops, mm */
 static const double lost_beyond = 0.01; /* residual above which a node counts as lost, mm */
 
-/* Compute x + u(x) - y and its derivative with respect to x, in steps of the grid; return its
- * length. */
+/* Compute the residual x + u(x) - y, mm, and its derivative with respect to x in steps of the grid
+ * (NULL: not computed); return the length of the residual. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
                      double residual[3], double (*slope)[3]) {
   supine_field_cell cell;
@@ -75,7 +75,7 @@ static double solve(const supine_field *field, const double y[3], double x[3]) {
 typedef struct inversion {
   const supine_field *field;
   supine_field *inverse;
-  unsigned char *lost; /* of each row's nodes */
+  unsigned char *lost; /* [nodes] 1: the residual at the node exceeds lost_beyond */
 } inversion;
 
 static void invert_rows(void *context, size_t begin, size_t end, size_t thread) {

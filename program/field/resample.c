@@ -24,14 +24,14 @@ typedef struct resampling {
   bool labels;
 } resampling;
 
-/* The cells of a run of points: the index of each cell's first value, and the point's place in the
- * cell by axis, 0 to 1. */
+/* Cells of a run of points: index of each cell's first value, and position of the point in the
+ * cell, 0 to 1 along each axis. */
 typedef struct cells {
   size_t first[RUN];
   double share[3][RUN];
 } cells;
 
-/* Find the cells of points, mm: the operations of supine_field_find_cell in the same order. */
+/* Find the cells of points, mm, by the operations of supine_field_find_cell in the same order. */
 INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *found) {
   const supine_image frame = *image; /* a local copy, so that stores cannot alias it */
   double at[3][RUN];
@@ -58,8 +58,8 @@ INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *f
   const double row = (double)frame.size[0];
   const double slice = row * (double)frame.size[1];
   for (size_t i = 0; i < RUN; ++i) {
-    found->first[i] =
-        frame.channels * (size_t)(at[0][i] + row * at[1][i] + slice * at[2][i]); /* exact */
+    found->first[i] = frame.channels * (size_t)(at[0][i] + row * at[1][i] +
+                                                slice * at[2][i]); /* exact: all are whole */
   }
 }
 
@@ -83,7 +83,7 @@ INLINE void weigh_corners(const supine_image *image, const cells *in, double (*w
   }
 }
 
-/* Add the displacements at points to them: the operations of supine_field_interpolate in the same
+/* Add to each point its displacement, mm, by the operations of supine_field_interpolate in the same
  * order. */
 INLINE void displace(const supine_image *nodes, const cells *in, double (*point)[RUN]) {
   double weight[8][RUN];
@@ -103,7 +103,7 @@ INLINE void displace(const supine_image *nodes, const cells *in, double (*point)
   }
 }
 
-/* Interpolate an image at points. */
+/* Interpolate an image of one channel at points. */
 INLINE void interpolate(const supine_image *image, const cells *in, double *values) {
   double weight[8][RUN];
   double value[RUN];
@@ -118,19 +118,19 @@ INLINE void interpolate(const supine_image *image, const cells *in, double *valu
   }
 }
 
-/* Take the nearest voxels. */
+/* Take the value of the voxel nearest to each point. */
 INLINE void take_nearest(const supine_image *image, cells in, double *values) {
   size_t stride = 1;
   for (size_t a = 0; a < 3; ++a) {
     for (size_t i = 0; i < RUN; ++i) {
-      in.first[i] += in.share[a][i] > 0.5 ? stride : 0; /* as rint has it */
+      in.first[i] += in.share[a][i] > 0.5 ? stride : 0; /* a tie takes the lower voxel */
     }
     stride *= image->size[a];
   }
   supine_image_gather(image, 0, in.first, RUN, values);
 }
 
-/* Compute det(dv/dy + 1) at a voxel. */
+/* Compute det(dv/dy + 1) at a voxel; 0 where the field folds. */
 static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
   double point[3];
   double v[3];
@@ -148,8 +148,9 @@ static double volume_ratio(const supine_image *nodes, const supine_image *image,
 }
 
 /* Interpolate densities over voxels on the same side of the lungs' surface as the nearest one, so
- * that the wall lends the lungs no mass, and multiply those inside by the ratio of volumes.
- * @param first  voxel that the run goes to */
+ * that no mass of the chest wall is added to the lungs, and multiply those inside by the ratio of
+ * volumes.
+ * @param first  index of the first voxel of the run in the moved image */
 INLINE void interpolate_density(const resampling *work, const cells *in, size_t first,
                                 double *values) {
   double weight[8][RUN];

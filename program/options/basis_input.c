@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Shared by commands that read a basis. */
+/* Open a basis and copy its surface, for the commands that read one. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -39,10 +39,12 @@ int supine_options_fail(const char *command, supine_status status, const supine_
 /* Flush standard output; return SUPINE_EXIT_OUTPUT where the disk is full or the pipe closed. */
 int supine_options_finish(const char *command);
 
-/* Write the command line as one line for the metadata of a file, without the folders of files. */
+/* Write the command line into `text` [size], for the metadata of a file; of each path only the part
+ * after its last slash. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
-/* Read a finite number, or a whole one, that takes up the whole text. */
+/* Read a finite number, or a number without sign and fraction, that takes up the whole text; false
+ * where the text is none. */
 bool supine_options_parse_number(const char *text, double *value);
 bool supine_options_parse_count(const char *text, size_t *value);
 
@@ -56,9 +58,9 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
  * supine_progress_function; it returns false after an interruption. */
 typedef struct supine_progress {
   const char *label;
-  double start;  /* seconds */
-  double shown;  /* when last rewritten */
-  bool terminal; /* stderr is one */
+  double start;  /* when the work began, s of supine_clock_seconds */
+  double shown;  /* when the line was last written, s */
+  bool terminal; /* stderr is a terminal */
 } supine_progress;
 
 supine_progress supine_options_progress_begin(const char *label);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors of a state, for the output of commands. */
+/* Compute and print the expected errors of the vertices in a state. */
 #include <math.h>
 #include <stdlib.h>
 

@@ -14,7 +14,7 @@ enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* long options are FIRST_LO
 
 typedef struct row {
   const supine_option *option;
-  char *begin; /* its struct within the request */
+  char *begin; /* struct within the request that the option fills */
   bool given;
   const char *value;
 } row;
@@ -24,7 +24,7 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
-  char standard[16]; /* "-" and the first ending of an output */
+  char standard[16]; /* replaces the output "-": "-" and its first ending, as "-.ply" */
   int help;          /* 0, 'h' or HELP_ALL */
 } reading;
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A command and the table of its options, from which parsing, --help, suggestions, manual pages and
- * completions follow. A whole command:
+/* Declare a command and the table of its options, from which parsing, --help, suggestions, manual
+ * pages and completions are derived. A complete command:
  *
  *     typedef struct request { const char *output; size_t vertices; } request;
  *
@@ -32,7 +32,7 @@
 
 /* Kind of a value; SUPINE_FILLS derives it from the type of the field. */
 typedef enum supine_option_kind {
-  SUPINE_OPTION_OWN,     /* the option has a reader */
+  SUPINE_OPTION_OWN,     /* read by the reader of the option */
   SUPINE_OPTION_FLAG,    /* bool: no value; true where given */
   SUPINE_OPTION_NUMBER,  /* double: a finite number within the range */
   SUPINE_OPTION_NUMBERS, /* double[n]: n numbers separated by commas */
@@ -41,8 +41,8 @@ typedef enum supine_option_kind {
   SUPINE_OPTION_CHOICE   /* enum: the index of the word among the choices */
 } supine_option_kind;
 
-/* Role of a file that an option names. Before the command runs, each output is checked not to be an
- * input, and tried. */
+/* Role of a file that an option names. Before the command runs, each output is checked to be
+ * writable, and not to be an input. */
 typedef enum supine_option_file {
   SUPINE_FILE_NONE,
   SUPINE_FILE_IN,
@@ -51,8 +51,8 @@ typedef enum supine_option_file {
 
 /* Read `text` into `field`, the option's field; for an option without one, the struct that its
  * table fills.
- * @retval SUPINE_ERROR_ARGUMENT  without a message for "--NAME takes WANTS, not 'TEXT'"; with one
- *                                for "--NAME: MESSAGE" */
+ * @retval SUPINE_ERROR_ARGUMENT  an invalid text; printed as "--NAME: MESSAGE", or where the reader
+ *                                sets no message, as "--NAME takes WANTS, not 'TEXT'" */
 typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
 static inline supine_status supine_options_fits(bool fits) {
   return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
@@ -65,7 +65,7 @@ typedef struct supine_option {
   const char *argument; /* name of its value in the help; NULL: it has no value */
   const char *help;     /* wrapped to the terminal; "\n" begins a line. Without a name: heading */
   supine_option_kind kind;
-  size_t offset, size; /* of the field */
+  size_t offset, size; /* of the field within its struct, bytes */
   size_t given;        /* 1 + offset of a bool set where the option was given; 0: none */
   supine_option_reader *read;
   const char *standard;       /* default, read like a value and shown in the help; NULL: zero */
@@ -74,7 +74,7 @@ typedef struct supine_option {
   const char *wants;          /* valid values, for messages; NULL: derived from kind and range */
   const char *const *choices; /* ends with NULL; only for completion where there is a reader */
   const char *alias;          /* another long name, not shown */
-  const char *rivals;         /* of the options with the same word at most one may be given, once */
+  const char *rivals;         /* name of a group, of whose options at most one may be given, once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
@@ -98,7 +98,7 @@ typedef struct supine_option {
 
 /* Input of a command besides its request. */
 typedef struct supine_arguments {
-  char **operand; /* [count] in order */
+  char **operand; /* [count] in the order given */
   size_t count;
   const char *made_by; /* the command line, for the metadata of a file */
 } supine_arguments;
@@ -117,7 +117,7 @@ typedef struct supine_command {
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
 
-/* For commands that read surfaces, and those that read one basis. */
+/* Operands of commands that read surfaces, and of those that read one basis. */
 #define SUPINE_SURFACES                                                                            \
   .operands_least = 1, .operands_most = SIZE_MAX,                                                  \
   .operands_missing = "which surface? Name one or more mesh files"
@@ -129,8 +129,8 @@ typedef struct supine_command {
  * command's name. */
 int supine_options_run(const supine_command *command, int argc, char **argv);
 
-/* Refuse an output that is an input, also by link (SUPINE_ERROR_ARGUMENT). For inputs that other
- * inputs name: those of the command line are checked already. */
+/* Refuse an output that is the same file as an input (SUPINE_ERROR_ARGUMENT). Call it for inputs
+ * that are named within other inputs: those of the command line are checked before. */
 supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 

@@ -7,7 +7,7 @@
 
 #include "program/options/orientation.h"
 
-/* Normalise a vector and return its length; 0 where it has none. */
+/* Normalise a vector and return its length; leave the null vector unchanged and return 0. */
 static double make_unit(double g[3]) {
   const double largest = fmax(fabs(g[0]), fmax(fabs(g[1]), fabs(g[2])));
   double square = 0.0;

@@ -9,11 +9,12 @@
 
 #include "program/options/command.h"
 
+/* 1: the command stops by itself after a signal; 1: that signal was received. */
 static volatile sig_atomic_t orderly, interrupted;
-static volatile time_t interrupted_at; /* s */
+static volatile time_t interrupted_at; /* when it was received, s since 1970 */
 
-/* Ask for an orderly end. A further signal ends the program at once, but not one that comes right
- * after the first: timeout(1) sends each signal twice. */
+/* Ask the command to stop where it does so by itself; else end the program. A further signal ends
+ * the program at once, but not within a second of the first: timeout(1) sends each signal twice. */
 static void on_signal(int number) {
   const time_t now = time(NULL);
   if (orderly != 0 && interrupted == 0) {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* States on the command line: --volume, --from, and the pose that follows. */
+/* Options --volume and --from, and the poses computed from them. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
-/* Plausible volumes, as shares of full inflation; the least is that of tissue alone. */
+/* Range of plausible volumes, as shares of full inflation; the lowest is that of tissue alone. */
 static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
 /* Share of turned-over triangles above which the surface is implausible. */

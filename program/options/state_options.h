@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* States on the command line: --volume, --from, and the pose that follows. */
+/* Options --volume and --from, and the poses computed from them. */
 #ifndef SUPINE_OPTIONS_STATE_H
 #define SUPINE_OPTIONS_STATE_H
 
@@ -17,7 +17,7 @@ supine_status supine_options_read_volume(const char *text, void *field, supine_e
 extern const supine_option supine_options_folds[];
 
 typedef struct supine_volume_options {
-  supine_state state; /* its volume is the default where none was given */
+  supine_state state; /* volume of kind SUPINE_VOLUME_DEFAULT: none was given */
   bool allow_folds;
 } supine_volume_options;
 

@@ -41,7 +41,8 @@ const supine_option supine_options_landmarks[] = {
     {"landmarks", 0, "FILE",
      "matched points, in mm and LPS: CSV with the columns x,y,z,to_x,to_y,to_z (first state, "
      "other state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled; "
-     "motion is from 2 to 1). Of several states, they are for the first",
+     "motion is from 2 to 1). Where several states are given, the points belong to the "
+     "first",
      FILLS(path), .file = SUPINE_FILE_IN},
     {"reverse", 0, NULL, "exchange the two states of the landmarks", FILLS(reverse)},
     {"translation", 0, NULL, "also fit a translation between the frames of the scans",

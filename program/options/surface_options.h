@@ -12,13 +12,14 @@
 /* --axes and --units, a table that fills a supine_mesh_load_options. */
 extern const supine_option supine_options_surface_frame[];
 
-/* Points known in two scans of one person, and the motion between the frames to be fitted. */
+/* Matched points of two scans of one person, and which motion between the scans is fitted. */
 typedef struct supine_landmark_options {
   const char *path; /* CSV; NULL: none */
   bool reverse, translation, rigid;
 } supine_landmark_options;
 
-/* --landmarks, --reverse, --translation and --rigid, a table that fills one. */
+/* --landmarks, --reverse, --translation and --rigid, a table that fills a supine_landmark_options.
+ */
 extern const supine_option supine_options_landmarks[];
 
 /* Print the findings about an input, one per line. */
