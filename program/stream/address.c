@@ -36,7 +36,9 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   struct addrinfo *found = NULL;
   const int failure = getaddrinfo(host, port, &wanted, &found);
   if (failure != 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s: %s", host, gai_strerror(failure));
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT, "%s: %s: give %s", host, gai_strerror(failure),
+        numeric ? "a numeric address, as 127.0.0.1" : "the name or the numeric address of a host");
   }
   memcpy(&address->where, found->ai_addr, found->ai_addrlen);
   address->size = found->ai_addrlen;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Addresses of the command line, and sockets of them. */
+ * Parse the addresses of the command line, and open their sockets. */
 #ifndef SUPINE_STREAM_ADDRESS_H
 #define SUPINE_STREAM_ADDRESS_H
 
@@ -17,7 +17,7 @@ typedef struct supine_stream_address {
 } supine_stream_address;
 
 /** Parse "PORT" (of this machine, 127.0.0.1), "HOST:PORT" or "[HOST]:PORT".
- * @param numeric  refuse names, which would be looked up
+ * @param numeric  refuse host names, which need a look-up
  * @retval SUPINE_ERROR_ARGUMENT  no such address */
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error);

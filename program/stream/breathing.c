@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The volume of the lungs at a moment: a fixed one, or that of a breath. */
+/* Compute the volume of the lungs at a time: a fixed one, or rest in the posture plus a breath. */
 #include <string.h>
 
 #include "program/stream/breathing.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The volume of the lungs at a moment: a fixed one, or rest in the posture plus a breath. */
+ * Compute the volume of the lungs at a time: a fixed one, or rest in the posture plus a breath. */
 #ifndef SUPINE_STREAM_VOLUME_H
 #define SUPINE_STREAM_VOLUME_H
 
@@ -15,11 +15,12 @@ typedef struct supine_stream_volume {
   supine_pv_breath breath;
 } supine_stream_volume;
 
-/** Breathe from now on. Statuses as supine_breath_evaluate. */
+/** Set the volume to that of a breath, which starts at time 0. Statuses as supine_breath_evaluate.
+ */
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error);
 
-/** Keep a volume as supine_state_parse_volume reads it: rest, rest+500, full-300, 2600mL.
+/** Set a fixed volume, in the form of supine_state_parse_volume: rest+500, full-300, 2600mL.
  * @retval SUPINE_ERROR_ARGUMENT  none of these; `volume` is unchanged */
 supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
                                        supine_error *error);

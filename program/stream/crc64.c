@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* CRC-64 by carry-less multiplication, 64 bytes per step, where the processor has it; else by
- * bytes.
- */
+/* Compute CRC-64 by carry-less multiplication, 64 bytes per step, where the processor supports it;
+ * else byte by byte. */
 #include <pthread.h>
 
 #if defined(__x86_64__)
@@ -68,7 +67,7 @@ static uint64_t by_bytes(uint64_t crc, const unsigned char *at, size_t size) {
 }
 
 #ifdef CRC64_CARRY_LESS
-typedef __m128i lane; /* 128 bits of the message, the first in front */
+typedef __m128i lane; /* 16 bytes of the message, the first most significant */
 
 #define CARRY_LESS __attribute__((target("pclmul,ssse3")))
 
@@ -83,7 +82,7 @@ CARRY_LESS static lane fold(lane a, lane powers, lane next) {
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
 }
 
-/* At least 64 bytes, a multiple of 16. */
+/* Compute the CRC of at least 64 bytes, a multiple of 16. */
 CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, size_t size) {
   const lane far = _mm_set_epi64x((long long)known.far[0], (long long)known.far[1]);
   const lane near = _mm_set_epi64x((long long)known.near[0], (long long)known.near[1]);
@@ -101,7 +100,7 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   for (; size != 0; at += 16, size -= 16) {
     sum = fold(sum, near, take(at));
   }
-  unsigned char rest[16]; /* congruent to the whole message */
+  unsigned char rest[16]; /* congruent to the whole message mod P */
   const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   _mm_storeu_si128((lane *)(void *)rest, _mm_shuffle_epi8(sum, front));
   return by_bytes(0, rest, sizeof rest);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make messages of frames. */
+/* Compute frames, and build their messages. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,8 +9,8 @@
 #include "program/stream/strips.h"
 #include "sh/base/parallel.h"
 
-/* Vertices whose positions, bytes and checksum are computed together, in the first cache. A thread
- * is worth starting for 64 such pieces. */
+/* PIECE: number of vertices whose positions, bytes and checksum are computed together, within the
+ * L1 cache. GRAIN: least number of vertices for which a thread is worth starting. */
 enum { PIECE = 1024, GRAIN = 64 * PIECE, THREADS_MAX = 256 };
 
 struct supine_stream_frames {
@@ -20,9 +20,9 @@ struct supine_stream_frames {
   bool ras;
   uint64_t number;
   supine_stream_strips triangles;
-  uint64_t triangles_crc, triangles_power;
-  uint64_t points_power;
-  supine_stream_frame *unused;
+  uint64_t triangles_crc;
+  uint64_t triangles_power, points_power; /* supine_stream_crc64_power of their sizes */
+  supine_stream_frame *unused;            /* list of frames without users */
 };
 
 const char *supine_stream_what_name(supine_stream_what what) {
@@ -41,8 +41,8 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
   f->points_power = supine_stream_crc64_power(12 * f->info->vertex_count);
-  /* Compute now: 0.1 s for a million triangles would delay every peer at the first request of a
-   * surface. */
+  /* Compute the strips now: at the first request of a surface, their 0.1 s for a million triangles
+   * would delay every peer. */
   if (supine_stream_strips_make(supine_basis_triangles(basis), f->info->triangle_count,
                                 f->info->vertex_count, &f->triangles) != SUPINE_OK) {
     free(f);
@@ -96,8 +96,9 @@ void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame
   }
 }
 
-/* Compute positions and errors of lungs located from observed points. Where they cannot be
- * computed, the positions of the law remain. Return false where memory is short. */
+/* Compute positions and expected errors of lungs located from observed points. Where that fails,
+ * clear the location: the caller then computes the positions of the pose. Return false where memory
+ * is short. */
 static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *xyz = malloc(3 * count * sizeof *xyz + 1);
@@ -125,7 +126,7 @@ static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
   return good;
 }
 
-/* The parts of the points that threads compute, and their checksums. */
+/* Checksum and size of the part of the points that each thread computes. */
 typedef struct placing {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
@@ -146,11 +147,11 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Compute the points of a frame, once for all peers. */
+/* Compute the points of a frame, once for all peers; false where memory is short. */
 static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   if (frame->points == NULL) {
-    frame->points = aligned_alloc(64, (12 * count + 64) / 64 * 64); /* for stores of 64 bytes */
+    frame->points = aligned_alloc(64, (12 * count + 64) / 64 * 64); /* padded for 64-byte stores */
     if (frame->points == NULL) {
       return false;
     }

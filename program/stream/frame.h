@@ -33,14 +33,15 @@ typedef struct supine_stream_moment {
   double volume;     /**< mL of all lungs together, gas and tissue */
   double above;      /**< mL above rest in the posture, or above the scan where rest is unknown */
   uint64_t stamp;    /**< time of the pose, as in headers */
-  double received;   /**< s of supine_clock_seconds, when the pose was received; < 0: none */
+  double received;   /**< s of supine_clock_seconds, when the newest pose was received; < 0: neither
+                          pose nor volume since the previous frame */
   supine_pose pose;
   const supine_location *location; /**< NULL: no points were observed */
 } supine_stream_moment;
 
 /** A frame that peers share. */
 typedef struct supine_stream_frame {
-  size_t users;
+  size_t users;    /**< peers that send it, and the server while it is the newest */
   uint64_t number; /**< 1, 2, ... */
   supine_stream_moment moment;
   bool placed;           /**< `points` are computed */
@@ -53,27 +54,31 @@ typedef struct supine_stream_frame {
 /** Data shared by the frames of a basis. */
 typedef struct supine_stream_frames supine_stream_frames;
 
-/** @param device  device name of the messages, up to 20 characters
- * @param ras      points in RAS instead of LPS
+/** Create the data shared by the frames of a basis.
+ * @param basis   must outlive it
+ * @param device  device name of the messages, up to 20 characters
+ * @param ras     points in RAS instead of LPS
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_frames_create(const supine_basis *basis, const char *device, bool ras,
                                           supine_stream_frames **frames, supine_error *error);
-/** Release it and every frame. */
+/** Release the data and every frame; NULL is legal. */
 void supine_stream_frames_destroy(supine_stream_frames *frames);
 
-/** Begin a frame of a moment, with one user; NULL where memory is short. Reuses frames without
- * users. */
+/** Return a frame of a moment, with one user; NULL where memory is short. Reuse one without users
+ * if there is one. */
 supine_stream_frame *supine_stream_frame_take(supine_stream_frames *frames,
                                               const supine_stream_moment *moment);
+/** Remove one user of a frame; NULL is legal. */
 void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame *frame);
 
-/** Largest number of pieces of a message, and of bytes before its points: a whole weights frame. */
+/** Largest number of pieces of a message, and largest size of the first: of a weights frame, the
+ * whole message. */
 enum {
   SUPINE_STREAM_PIECES = 4,
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + 40 + 4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX)
 };
 
-/** A message: pieces, the first of them in `front`. */
+/** A message in pieces, the first of which is `front`. */
 typedef struct supine_stream_parcel {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];
@@ -84,7 +89,7 @@ typedef struct supine_stream_parcel {
 /** Make the message of a frame, with a header of version 1, which all peers read. The first message
  * with points computes them.
  * @param what       not SILENCE
- * @param triangles  of a message with points: with its triangles
+ * @param triangles  whether a message with points also holds the triangles
  * @return false where memory is short */
 bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame *frame,
                               supine_stream_what what, bool triangles,

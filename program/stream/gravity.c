@@ -8,8 +8,8 @@
 #include "program/breath/turn.h"
 #include "program/stream/gravity.h"
 
-/* Deviation from a rotation that is accepted silently: 32-bit floats give 1e-6, trackers' own
- * arithmetic up to about 1e-4. */
+/* Largest deviation from a rotation that is accepted without a warning: 32-bit floats cause 1e-6,
+ * trackers' own arithmetic up to about 1e-4. */
 static const double slack = 1e-3;
 static const double uneven_max = 0.1; /* largest stretch that is repaired */
 
@@ -45,7 +45,7 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
     apply_transpose(rotation, column, product + 3 * i);
   }
   const double square = (product[0] + product[4] + product[8]) / 3.0; /* of the scale */
-  *why = "it is not finite, or zero";
+  *why = "its matrix is zero or not finite; send a rotation";
   if (!(square > 1e-12) || !isfinite(square)) {
     return SUPINE_STREAM_REFUSED;
   }
@@ -53,11 +53,11 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
   for (int i = 0; i < 9; ++i) {
     uneven = fmax(uneven, 0.5 * fabs(product[i] / square - (i % 4 == 0 ? 1.0 : 0.0)));
   }
-  *why = "it shears";
+  *why = "its matrix shears; send a rotation";
   if (!(uneven <= uneven_max)) {
     return SUPINE_STREAM_REFUSED;
   }
-  *why = "it mirrors";
+  *why = "its matrix mirrors; send a rotation";
   if (supine_triple(rotation, rotation + 3, rotation + 6) < 0.0) {
     return SUPINE_STREAM_REFUSED;
   }
@@ -67,7 +67,7 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
   if (verdict != SUPINE_STREAM_EXACT || (uneven <= slack && fabs(sqrt(square) - 1.0) <= slack)) {
     return verdict;
   }
-  *why = uneven <= slack ? "it scales" : "it shears a little";
+  *why = uneven <= slack ? "its matrix scales" : "its matrix shears slightly";
   return SUPINE_STREAM_REPAIRED;
 }
 
@@ -76,7 +76,7 @@ supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup
                                                        double gravity[3], const char **why) {
   const double size = sqrt(quaternion[0] * quaternion[0] + quaternion[1] * quaternion[1] +
                            quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3]);
-  *why = "its quaternion is zero or not finite";
+  *why = "its quaternion is zero or not finite; send a rotation";
   if (!isfinite(size) || !(size > 1e-6)) {
     return SUPINE_STREAM_REFUSED;
   }
@@ -99,7 +99,7 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
                                                  const double down[3], double gravity[3],
                                                  const char **why) {
   const double size = supine_length(down);
-  *why = "it points nowhere";
+  *why = "its direction is zero or not finite; send a vector along gravity";
   if (!isfinite(size) || !(size > 1e-9)) {
     return SUPINE_STREAM_REFUSED;
   }

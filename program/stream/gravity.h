@@ -11,7 +11,7 @@
 /** How the tracker is set up. */
 typedef struct supine_stream_setup {
   double down[3]; /**< direction of gravity in the tracker's world; unit */
-  double body[9]; /**< B, by rows */
+  double body[9]; /**< rotation B from tracker to body axes, by rows */
 } supine_stream_setup;
 
 /** Return the default setup: z of the world points up, and the marker's axes are the body's. */

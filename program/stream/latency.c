@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A histogram of latencies. */
+/* Count latencies in a histogram, and compute quantiles. */
 #include <math.h>
 
 #include "program/stream/latency.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The page follows: moments come by WebSocket from the server that sent the page; this device's own
-// tilt goes back, where someone asks for it.
+// Show the states that the server of this page sends by WebSocket, and send this device's tilt back
+// where the user asks for it.
 
 window.supineLive = (() => {
   const said = document.createElement('p');
@@ -20,25 +20,25 @@ window.supineLive = (() => {
 
   let socket = null;
   let moments = 0;
-  let posed = NaN; // ms of the page's clock, when the newest pose came; NaN: none did
+  let posed = NaN; // when the newest pose was received, ms of performance.now(); NaN: none
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  /** Turns the patient, x, y, z, w, by the shortest way to where gravity points along `gravity`. */
+  /** Return orientation q (x, y, z, w) turned by the least angle that makes gravity `gravity`. */
   function turned(q, gravity) {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
-    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // over, about the long axis
-    const u = cross(q, axis); // q, then this turn of the body: a product of quaternions
+    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite: turn about the long axis
+    const u = cross(q, axis); // part of the quaternion product q * (axis, w)
     const product = [0, 1, 2].map((i) => q[3] * axis[i] + w * q[i] + u[i]);
     const all = [...product, q[3] * w - dot(q, axis)];
     const length = Math.hypot(...all);
     return all.map((x) => x / length);
   }
 
-  /** Shows a moment: gravity in the patient's axes (x left, y back, z head), mL above rest, s since
-   * the newest pose came, below 0 where none did. */
+  /** Show a state: gravity in the patient's axes (x left, y back, z head), volume above rest in mL,
+   * age of the newest pose in s, below 0 where there is none. */
   function show({ gravity, above, age }) {
     posed = age < 0 ? NaN : performance.now() - 1000 * age;
     tellAge();
@@ -58,8 +58,8 @@ window.supineLive = (() => {
   }
   setInterval(tellAge, 500);
 
-  /** Where things fall, in the patient's axes, of a phone that lies on the breastbone. Its own axes
-   * are x right of the screen, y up it, z out of it: left, head, front. DeviceOrientation turns it
+  /** Return the direction of gravity in the patient's axes from the tilt of a phone on the
+   * breastbone. Its axes are x right, y up and z out of the screen: left, head, front. DeviceOrientation turns it
    * by alpha about z, beta about x, gamma about y; the world's z is up. */
   function gravityOfTilt(beta, gamma) {
     const [b, c] = [beta, gamma].map((degrees) => (degrees * Math.PI) / 180);
@@ -71,7 +71,7 @@ window.supineLive = (() => {
     socket.addEventListener('open', () => { said.textContent = 'live'; });
     socket.addEventListener('message', (event) => show(JSON.parse(event.data)));
     socket.addEventListener('close', () => {
-      said.textContent = 'waiting for the server'; // what is shown grows old meanwhile
+      said.textContent = 'waiting for the server'; // the age on the page keeps growing
       setTimeout(connect, 1000);
     });
   }

@@ -11,8 +11,9 @@
 
 extern const supine_asset supine_stream_assets[]; /* live.js, embedded by the build */
 
-/* The content security policy lets the page connect to its own server only. Not every browser
- * counts WebSockets under 'self'. */
+/* Content security policies of the exported page, which may connect nowhere, and of the live page,
+ * which may connect to its server and to WebSockets. Not every browser counts WebSockets under
+ * 'self', so that they are listed. */
 static const char silent[] = "default-src 'none';";
 static const char talking[] = "default-src 'none'; connect-src 'self' ws: wss:;";
 

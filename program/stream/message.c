@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read and write headers; write the beginnings of contents, and points. */
+/* Read and write headers of messages; write points, and the beginning of each content. */
 #include <ctype.h>
 #include <string.h>
 
@@ -57,8 +57,8 @@ void supine_stream_put32(unsigned char *bytes, uint32_t value) {
 }
 
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
-  bytes[0] = 10; /* 32-bit floats */
-  bytes[1] = 1;  /* dimension */
+  bytes[0] = 10; /* type: 32-bit floats */
+  bytes[1] = 1;  /* number of dimensions */
   put(bytes + 2, 2, count);
   return 4;
 }
@@ -74,7 +74,8 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 }
 
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
-  static const char text[] = "expected_error_mm"; /* length with the NUL, made even */
+  static const char text[] =
+      "expected_error_mm"; /* its length with the NUL is even, as the protocol requires */
   _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "type, components, count, name");
   put(bytes, 2, 1); /* a scalar of one component */
   put(bytes + 2, 4, points);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * OpenIGTLink messages as bytes: read without trust, written in place.
+ * Read OpenIGTLink messages from untrusted bytes, and write them. Fields, with their sizes in
+ * bytes:
  *
  *     header 58   version 2, type 12, device 20, time 8, body's size 8, body's CRC 8; big-endian
  *     body        version 1: content. Version 2: extension, content, metadata
@@ -32,8 +33,9 @@ typedef struct supine_stream_header {
   uint64_t crc;   /**< of the body */
 } supine_stream_header;
 
-/** @retval SUPINE_ERROR_FORMAT  not version 1 or 2, or a type that is not text: the messages that
- *                               follow cannot be found */
+/** Read a header.
+ * @retval SUPINE_ERROR_FORMAT  not version 1 or 2, or a type that is not text: the messages that
+ *                              follow cannot be found */
 supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_HEADER],
                                         supine_stream_header *header, supine_error *error);
 void supine_stream_header_write(const supine_stream_header *header,
@@ -44,7 +46,7 @@ typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< ignored: another type or device */
   SUPINE_STREAM_ROTATION,    /**< number [9]: rows of the matrix from tracker to world axes, then
                                   [3]: position, mm; text: device */
-  SUPINE_STREAM_PLACE,       /**< the same of another device than the one that is followed */
+  SUPINE_STREAM_PLACE,       /**< as ROTATION, of another device than the one followed */
   SUPINE_STREAM_PLACES,      /**< points: supine_stream_message_point */
   SUPINE_STREAM_QUATERNION,  /**< number [4]: the rotation as W, X, Y, Z */
   SUPINE_STREAM_DOWN,        /**< number [3]: direction of gravity in the tracker's axes */

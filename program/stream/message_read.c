@@ -49,7 +49,7 @@ static double real64(cursor *c) {
   return value;
 }
 
-/* X, Y, Z, W on the wire. */
+/* Read a quaternion, which is X, Y, Z, W on the wire. */
 static void quaternion(cursor *c, supine_stream_message *m) {
   m->kind = SUPINE_STREAM_QUATERNION;
   for (int i = 1; i < 4; ++i) {
@@ -71,7 +71,7 @@ static void transform(cursor *c, const char *device, int ours, supine_stream_mes
   }
 }
 
-/* Name 64, group 32, colour 4, position 12, diameter 4, owner 20. */
+/* Layout of a point, in bytes: name 64, group 32, colour 4, position 12, diameter 4, owner 20. */
 enum { POINT_NAME = 64, POINT_PLACE = 100, POINT_SIZE = 136 };
 
 static void points(cursor *c, supine_stream_message *m) {
@@ -92,7 +92,8 @@ void supine_stream_message_point(const supine_stream_message *message, size_t po
   }
 }
 
-/* A position of 12 bytes has no orientation; one of 24 omits W, which is then not negative. */
+/* Read the orientation of a POSITION. One of 12 bytes has none; one of 24 omits W, which is then
+ * not negative. */
 static void position(cursor *c, supine_stream_message *m) {
   const size_t size = c->left;
   if (size == 12) {
@@ -112,7 +113,8 @@ static void position(cursor *c, supine_stream_message *m) {
   m->number[0] = sqrt(fmax(0.0, 1.0 - square));
 }
 
-/* Find the instrument of that name; the last where there are several. */
+/* Read the quaternion of the instrument `device`, or of any where the message itself is of that
+ * device; the last where there are several. */
 static void instruments(cursor *c, const char *device, const supine_stream_header *header,
                         supine_stream_message *m) {
   const int all = device == NULL || strcmp(header->device, device) == 0;
@@ -159,7 +161,7 @@ static void sensor(cursor *c, supine_stream_message *m) {
 }
 
 static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind) {
-  (void)pass(c, 2); /* the encoding: all of them write these words alike */
+  (void)pass(c, 2); /* encoding: ASCII words are the same in all */
   const size_t length = (size_t)whole(c, 2);
   const unsigned char *text = pass(c, length);
   if (c->short_of == 0 && length < sizeof m->text) {
@@ -184,7 +186,7 @@ int supine_stream_message_wanted(const supine_stream_header *header) {
   return type_of(header) != TYPES;
 }
 
-/* Remove extension and metadata from a body of version 2. */
+/* Remove extension and metadata from a body of version 2; return 0 where their sizes are wrong. */
 static int unwrap(cursor *c) {
   const size_t all = c->left;
   const uint64_t extension = whole(c, 2);
@@ -208,7 +210,8 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
   }
   cursor c = {body, size, 0};
   if (header->version == 2 && !unwrap(&c)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: extension and metadata do not fit",
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: the sizes of extension and metadata do not match that of the body",
                             header->type);
   }
   const int type = type_of(header);
@@ -235,8 +238,9 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
   }
   if (c.short_of != 0) {
     message->kind = SUPINE_STREAM_NOTHING;
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu bytes are too few for its content",
-                            header->type, size);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: a body of size %zu is too short for its content", header->type,
+                            size);
   }
   return SUPINE_OK;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read and write the socket of a peer without waiting. */
+/* Read and write the socket of a peer without blocking. */
 #include <errno.h>
 #include <linux/sockios.h>
 #include <netinet/in.h>
@@ -68,7 +68,8 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
   }
   const uint64_t size = peer->header.size;
   if (size > body_most) {
-    (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "it sent a message of %llu bytes",
+    (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
+                           "it sent a message of %llu bytes: send at most 256 MiB",
                            (unsigned long long)size);
     return false;
   }

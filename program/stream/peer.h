@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * One peer: messages received from it, and the frame being sent to it. Nothing here waits.
+ * Receive messages from one peer, and send frames to it, without blocking.
  *
  * A slow peer misses frames: after each frame it is sent the newest one, never one of a queue. */
 #ifndef SUPINE_STREAM_PEER_H
@@ -12,22 +12,22 @@
 typedef struct supine_stream_peer {
   int socket;        /**< socket; -1: no peer */
   bool connecting;   /**< not yet connected */
-  double took, said; /**< when the peer last took data, and last sent some, s */
+  double took, said; /**< when the peer last received and last sent data, s of the clock */
   /* received data */
   unsigned char raw[SUPINE_STREAM_HEADER];
-  size_t got; /**< of the header, then of the body */
+  size_t got; /**< bytes received of the header, or where in_body of the body */
   bool in_body;
   supine_stream_header header;
-  uint64_t skip;       /**< bytes of a body that is not read */
+  uint64_t skip;       /**< bytes left of a body that is not read */
   unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] */
-  double heard;        /**< s, when the socket was last found empty */
+  double heard;        /**< when the socket was last found empty, s of the clock */
   /* data to send */
   supine_stream_what what;
-  bool knows_triangles;
-  uint64_t begun;             /**< number of the last frame */
+  bool knows_triangles;       /**< the next POINTS frame omits them */
+  uint64_t begun;             /**< number of the last frame given to it */
   supine_stream_frame *frame; /**< being sent; NULL: none */
   supine_stream_parcel parcel;
-  size_t sent; /**< of the parcel */
+  size_t sent; /**< bytes sent of the parcel */
 } supine_stream_peer;
 
 /** Result of reading or sending. */
@@ -42,7 +42,7 @@ typedef enum supine_stream_outcome {
  * @retval SUPINE_ERROR_MEMORY  the caller still owns the socket */
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_what what, double now, supine_error *error);
-/** Close the socket and release the frame. */
+/** Close the socket and release the frame and the body. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
 /** Called for each message of a known type; its body is in `peer->body`. */

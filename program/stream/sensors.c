@@ -8,10 +8,10 @@
 
 struct supine_stream_sensors {
   const supine_stream_sensor_list *list;
-  supine_observation *last; /* [count] of each sensor; NaN: not seen */
-  supine_observation *seen; /* [count] those that were seen */
+  supine_observation *last; /* [count] last position of each sensor; NaN: not seen */
+  supine_observation *seen; /* [count] workspace: the sensors that are seen */
   supine_locate_residual *residuals;
-  double *space;
+  double *space; /* workspace of supine_locate */
   supine_location location;
 };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Points inside the lungs that are observed live: their last positions, and the lungs located from
- * them (supine/locate.h). */
+ * Store the last positions of points observed inside the lungs, and locate the lungs from them
+ * (supine/locate.h). */
 #ifndef SUPINE_STREAM_SENSORS_H
 #define SUPINE_STREAM_SENSORS_H
 
@@ -11,17 +11,18 @@
 
 /** The sensors; owned by the caller. */
 typedef struct supine_stream_sensor_list {
-  const supine_basis *inside; /**< of 'supine embed' */
+  const supine_basis *inside; /**< basis made by 'supine embed' */
   size_t count;               /**< at most SUPINE_LOCATE_POINTS_MAX */
   const char **names;         /**< [count] */
   size_t *vertices;           /**< [count] of `inside` */
-  double noise;               /**< mm per axis */
+  double noise;               /**< standard deviation, mm per axis */
   bool ras;                   /**< positions come in RAS */
 } supine_stream_sensor_list;
 
 typedef struct supine_stream_sensors supine_stream_sensors;
 
-/** @param list  kept by the caller
+/** Create sensors of which none is seen yet.
+ * @param list  must outlive them
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_sensors_create(const supine_stream_sensor_list *list,
                                            supine_stream_sensors **sensors, supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Main loop: read messages, compute a frame for the newest pose, send it. */
+/* Run the main loop: read messages, compute a frame for the newest pose, send it. */
 #include <errno.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -32,18 +32,18 @@ struct supine_stream_server {
   int listener;  /* -1: none */
   int port;
   supine_stream_address target;
-  double connect_at; /* s of the clock, of the next attempt; INFINITY while there is one */
-  double accept_at;
-  double shown;
+  double connect_at; /* when to connect next, s of the clock; INFINITY: not */
+  double accept_at;  /* when to accept peers again, s of the clock */
+  double shown;      /* when `shown` was last called, s of the clock */
   supine_stream_peer *connected;
-  supine_stream_peer *peer;   /* [options->peers] */
-  struct pollfd *polled;      /* [peers + 2] */
-  supine_stream_peer **owner; /* of each polled */
-  size_t replayed;
+  supine_stream_peer *peer;       /* [options->peers] */
+  struct pollfd *polled;          /* [peers + 2] */
+  supine_stream_peer **owner;     /* [peers + 2] of each polled socket; NULL: none */
+  size_t replayed;                /* number of recorded poses taken so far */
   double replay_begun;            /* s of the clock; < 0: not yet */
-  double waited;                  /* s of the clock when poll() began, and */
-  double woke;                    /* when it ended */
-  supine_stream_latency *latency; /* weights, surfaces */
+  double waited;                  /* when poll() was last called, s of the clock */
+  double woke;                    /* when it returned, s of the clock */
+  supine_stream_latency *latency; /* [2] of weights, of surfaces */
 };
 
 static bool lagging(const supine_stream_server *s, const supine_stream_peer *peer) {
@@ -75,7 +75,8 @@ static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool 
   }
   (void)close(socket);
   ++s->counts.turned_away;
-  supine_stream_patient_warn(&s->patient, s->woke, "a peer is turned away: there are %zu",
+  supine_stream_patient_warn(&s->patient, s->woke,
+                             "a peer is turned away: %zu is the most; raise --peers",
                              s->options->peers);
   return NULL;
 }
@@ -278,7 +279,7 @@ static struct timespec find_timeout(const supine_stream_server *s, double end) {
       next = fmin(next, s->woke + retry_time);
     }
   }
-  const double left = fmax(0.0, next - supine_clock_seconds()); /* below asked_time */
+  const double left = fmax(0.0, next - supine_clock_seconds()); /* at most asked_time, below 1 s */
   return (struct timespec){0, (long)(1e9 * left)};
 }
 
@@ -326,7 +327,7 @@ static void listen_round(supine_stream_server *s, nfds_t count) {
   replay_poses(s);
 }
 
-/* Return whether a replay has ended and was sent. */
+/* Return whether a replay ended long enough ago for its last frame to be sent. */
 static bool replay_over(const supine_stream_server *s) {
   const supine_stream_poses *poses = s->options->replay;
   return poses != NULL && s->replayed == poses->count &&

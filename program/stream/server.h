@@ -34,8 +34,9 @@ typedef struct supine_stream_counts {
 typedef struct supine_stream_server supine_stream_server;
 
 typedef struct supine_stream_options {
-  const char *listen;  /**< "PORT" (this machine alone) or "ADDRESS:PORT"; port 0: any; NULL: not */
-  const char *connect; /**< "HOST:PORT", tried until it accepts; NULL: not */
+  const char *listen;  /**< "PORT" (this machine alone) or "ADDRESS:PORT"; port 0: any; NULL: do not
+                          listen */
+  const char *connect; /**< "HOST:PORT", tried until it accepts; NULL: do not connect */
   const char *device;  /**< device whose poses are followed; NULL: any */
   const char *name;    /**< device name of messages sent */
   supine_stream_setup setup;
@@ -52,12 +53,13 @@ typedef struct supine_stream_options {
   FILE *record;                      /**< each pose is written to it; NULL: none */
   supine_stream_web *web;            /**< NULL: none */
   void (*warn)(void *context, const char *text);
-  bool (*stop)(void *context); /**< called at least every 100 ms; true ends the run */
-  void (*shown)(void *context, supine_stream_server *server); /**< each second; NULL */
+  bool (*stop)(void *context); /**< called about every 100 ms; true ends the run */
+  void (*shown)(void *context,
+                supine_stream_server *server); /**< called each second; NULL: never */
   void *context;
 } supine_stream_options;
 
-/** Open the sockets.
+/** Create a server and open its sockets.
  * @param options  kept by the caller until the server is destroyed
  * @retval SUPINE_ERROR_ARGUMENT  an invalid address or port
  * @retval SUPINE_ERROR_WRITE     the port is taken
@@ -70,7 +72,9 @@ void supine_stream_server_destroy(supine_stream_server *server);
 /** Return the port that it listens on; 0: none. */
 int supine_stream_server_port(const supine_stream_server *server);
 
-/** Run until `stop`, the end of the duration or of the replay. Nothing that a peer does ends it. */
+/** Run until `stop`, the end of the duration or of the replay. Nothing that a peer does ends it.
+ * @retval SUPINE_ERROR_WRITE  the system cannot wait for the sockets
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error);
 
 const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);

@@ -8,8 +8,8 @@
 
 static const uint32_t none = 0xFFFFFFFFu;
 
-/* Largest number of edges examined at a vertex. Real lungs have fewer; a strip may end there, and
- * time stays proportional to the triangles. */
+/* Largest number of edges examined at a vertex. Scanned lungs have fewer; at a vertex with more, a
+ * strip may end early, so that time stays proportional to the number of triangles. */
 enum { LOOKS = 64 };
 
 /* Edge 3 t + k leaves corner k of triangle t, towards the next. */
@@ -72,7 +72,8 @@ static size_t longest(walk *w, uint32_t triangle) {
   return most;
 }
 
-/* Write the length, two corners, and for each triangle the corner opposite its edge. */
+/* Write the strip in w->best: its length, two corners, and for each triangle the corner opposite
+ * its edge. */
 static void put_strip(const walk *w, size_t count, supine_stream_strips *strips) {
   unsigned char *at = strips->bytes + strips->size;
   supine_stream_put32(at, (uint32_t)count + 2);
@@ -94,7 +95,7 @@ supine_status supine_stream_strips_make(const uint32_t *triangles, size_t count,
             .used = calloc(count + 1, 1),
             .strip = malloc(count * sizeof *w.strip + 1),
             .best = malloc(count * sizeof *w.best + 1)};
-  /* At most one strip per triangle: 16 bytes. */
+  /* Space for one strip per triangle, 16 bytes each, the longest result. */
   *strips = (supine_stream_strips){.bytes = malloc(16 * count + 1)};
   if (w.first == NULL || w.next == NULL || w.used == NULL || w.strip == NULL || w.best == NULL ||
       strips->bytes == NULL) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Triangle strips of a surface for POLYDATA: a third of the bytes of its triangles. */
+ * Make triangle strips of a surface for POLYDATA: a third of the bytes of its triangles. */
 #ifndef SUPINE_STREAM_STRIPS_H
 #define SUPINE_STREAM_STRIPS_H
 
@@ -14,7 +14,7 @@
 typedef struct supine_stream_strips {
   unsigned char *bytes; /**< [size]; the caller frees them */
   size_t size;
-  size_t count; /**< of strips */
+  size_t count; /**< number of strips */
 } supine_stream_strips;
 
 /** Make strips that contain each triangle once, in its orientation, in another order.

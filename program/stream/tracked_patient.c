@@ -183,7 +183,7 @@ static double held(const supine_basis *basis, const supine_pose *pose) {
   return sum;
 }
 
-/* Compute the gains of the state, or keep the last valid ones; compute the volumes. */
+/* Compute the gains of the state, or keep the last ones that could be computed, and the volumes. */
 static void find_gains(supine_stream_patient *patient, double now, supine_stream_moment *moment) {
   const supine_basis *basis = patient->basis;
   const supine_state state = supine_stream_volume_at(patient->options->volume, basis,
@@ -239,7 +239,7 @@ void supine_stream_patient_moment(supine_stream_patient *patient, double now,
                                    patient->options->smooth, patient->smooth);
   *moment = (supine_stream_moment){0};
   patient->smoothed = now;
-  patient->turning = left > 1e-6; /* moves points by less than a micrometre */
+  patient->turning = left > 1e-6; /* a smaller angle moves points by less than 1 um */
   memcpy(moment->gravity, patient->smooth, sizeof moment->gravity);
   moment->received = patient->fresh ? patient->received : -1.0;
   moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The newest pose and volume of the patient, and the state of the lungs that follows from them. */
+ * Store the newest pose and volume of the patient, and compute the state of the lungs from them. */
 #ifndef SUPINE_STREAM_PATIENT_H
 #define SUPINE_STREAM_PATIENT_H
 
@@ -10,10 +10,10 @@ typedef struct supine_stream_patient {
   const supine_basis *basis;
   const supine_stream_options *options;
   supine_stream_counts *counts;
-  double begun;                      /* s of the clock */
+  double begun;                      /* s of the clock; time 0 of the breath */
   bool posed;                        /* at least one pose was received */
   bool fresh;                        /* no frame has the newest pose or volume yet */
-  double first;                      /* s of the clock, of the first pose: start of a record */
+  double first;                      /* s of the clock, of the first pose: time 0 of a record */
   double received;                   /* s of the clock, of the newest pose */
   uint64_t stamp;                    /* of the newest pose; 0: none */
   double gravity[3];                 /* of the newest pose */
@@ -34,7 +34,7 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
 void supine_stream_patient_warn(supine_stream_patient *patient, double now, const char *format, ...)
     SUPINE_PRINTF(3, 4);
 
-/* Store a pose or volume; ignore other messages. */
+/* Store a pose, a volume or the position of an observed point; ignore other messages. */
 void supine_stream_patient_receive(supine_stream_patient *patient,
                                    const supine_stream_message *message, double received,
                                    uint64_t stamp);

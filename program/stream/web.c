@@ -26,7 +26,8 @@
   EACH(lws_, service) EACH(lws_, set_log_level) EACH(lws_, write)
 /* clang-format on */
 
-/* libwebsockets, which brings OpenSSL and three event loops. */
+/* Functions of libwebsockets, loaded at run time: linking it would need OpenSSL and three event
+ * loops. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
 enum { TEXT = 256, RECEIVED = 512, CHUNK = 65536 };
@@ -42,17 +43,18 @@ struct supine_stream_web {
   atomic_size_t viewers;
   pthread_mutex_t lock; /* for the fields below */
   uint64_t number;      /* of the state in `text` */
-  char text[TEXT];      /* JSON without the age of the pose and the end */
+  char text[TEXT];      /* JSON of the state; its age and the final brace are added when sent */
   double posed_at;      /* s of the clock, when the newest pose was received; 0: none */
-  bool posed;
-  double gravity[3], received;
+  bool posed;           /* a pose was received that is not taken yet */
+  double gravity[3];    /* of that pose */
+  double received;      /* s of the clock, of that pose */
 };
 
 /* A connection: of a browser that loads the page, or of a viewer. */
 typedef struct session {
-  size_t sent;
-  uint64_t number;
-  bool counted;
+  size_t sent;     /* bytes of the page */
+  uint64_t number; /* of the last state sent */
+  bool counted;    /* it is one of the viewers */
 } session;
 
 static supine_stream_web *web_of(struct lws *wsi) {
@@ -75,7 +77,7 @@ static bool is_ours(struct lws *wsi) {
   return from != NULL && strcmp(from + 3, host) == 0;
 }
 
-/* Read {"gravity":[x,y,z]}. */
+/* Store the pose in {"gravity":[x,y,z]}; ignore other messages. */
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
@@ -98,7 +100,7 @@ static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   }
 }
 
-/* Send the newest state where the viewer has not received it; 0, or -1 to end. */
+/* Send the newest state to a viewer that has not received it; return 0, or -1 to disconnect it. */
 static int send_state(supine_stream_web *web, struct lws *wsi, session *s) {
   enum { AGE = 32 };
   unsigned char bytes[LWS_PRE + TEXT + AGE];
@@ -233,11 +235,11 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   info.gid = -1;
   info.uid = -1;
   info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
-  if (strchr(info.iface, ':') ==
-      NULL) { /* by default it would listen on every address, IPv4 and IPv6 */
+  /* With IPv6 enabled, it would listen on every address instead of an IPv4 one. */
+  if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
-  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* pages on their way, too */
+  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* and connections that load the page */
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.ssl_cert_filepath = site->certificate;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * A server of the live page, which sends each state to viewers by WebSocket. It has a thread of its
- * own, so that no browser delays the peers.
+ * Serve the live page, and send each state to its viewers by WebSocket, in a thread of their own,
+ * so that no browser delays the peers.
  *
  * To viewers, the newest state:  {"gravity":[x,y,z],"volume":mL,"above":mL,"age":s}
- *   (above the posture's rest; age of the pose)
+ *   (above: mL above rest in the posture; age: of the newest pose, -1: none)
  * From viewers, a pose (of a phone): {"gravity":[x,y,z]} */
 #ifndef SUPINE_STREAM_WEB_H
 #define SUPINE_STREAM_WEB_H
@@ -15,7 +15,7 @@
 
 typedef struct supine_stream_web supine_stream_web;
 
-/** Where and what it serves. There is no access control. */
+/** Address and content of the server. There is no access control. */
 typedef struct supine_stream_site {
   const char *address;           /**< numeric */
   int port;                      /**< 0: any that is free */
@@ -44,7 +44,8 @@ int supine_stream_web_descriptor(const supine_stream_web *web);
  * @param received  s of supine_clock_seconds */
 bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *received);
 
-/** Send a state to the viewers as soon as each can receive; overtaken states are dropped. */
+/** Send a state to each viewer as soon as it can receive; where a newer one comes first, it is sent
+ * instead. */
 void supine_stream_web_send(supine_stream_web *web, const supine_stream_moment *moment);
 
 /** Return the number of viewers. */
