@@ -13,25 +13,25 @@
 
 static const char name[] = "fit";
 
-/* The options: two scans or their landmarks, and the posture and volume of each. */
+/* Options: scans or landmarks of a person, and the posture and volume of each. */
 typedef struct request {
   const char *path, *name;
   supine_landmark_options landmarks;
   bool has_law, has_gain, expandability, json;
   int law;
   double gain, reach;
-  supine_source_options source; /* of all surfaces */
+  supine_source_options source; /* for all surfaces */
 
-  supine_state rest, state;
-  size_t count; /* number of `further`; all states where no --other was named */
+  supine_state rest, state; /* states of the first and of the second scan */
+  size_t count;             /* number of further states */
   supine_state further[SUPINE_PATIENT_OTHERS_MAX];
   const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
-  const char *rest_path, *state_path; /* surfaces; NULL: none */
+  const char *rest_path, *state_path; /* surfaces of the first and the second scan; NULL: none */
 } request;
 
 /* Evidence about the person. */
 typedef struct evidence {
-  supine_lungs lungs[2]; /* at the fuller state, at the emptier one */
+  supine_lungs lungs[2]; /* in the fuller state, in the emptier one (once ordered) */
   supine_patient_pairs pairs;
   bool swapped; /* the state named second is the fuller one */
 } evidence;
@@ -44,7 +44,7 @@ static void begin(void *chosen) {
   memcpy(wanted->state.gravity, supine, sizeof supine);
 }
 
-/* "supine", "prone:rest", "supine:rest+500", "2600mL" */
+/* Read "supine", "prone:rest", "supine:rest+500" or "2600mL". */
 static supine_status read_state(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
   const supine_status status = supine_state_parse(text, state, error);
@@ -56,7 +56,7 @@ static supine_status read_state(const char *text, void *field, supine_error *err
              : status;
 }
 
-/* "prone:PAIRS.csv", "prone:rest:PRONE.ply", into the whole request. */
+/* Read "prone:PAIRS.csv" or "prone:rest:PRONE.ply" into the whole request. */
 static supine_status read_further(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   const char *colon = strrchr(text, ':');
@@ -122,7 +122,8 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* Gain of the law deep: it empties the lowest parts about 1.5 times as far as the uppermost. */
+/* Gain of the law deep: with its base, the force on the lowest parts is 1.4 times that on the
+ * uppermost. */
 static const double usual_gain = 0.4;
 
 static void print_scores(const supine_patient_record *record) {
@@ -228,14 +229,14 @@ static void print_expandability(const supine_patient_expand_report *expand,
 static void print_applied(const supine_patient_record *record) {
   const supine_patient_applied *applied = &record->applied;
   const double *c = record->patient.power.powers + 3;
-  (void)printf("the force that the displacement shows, back through the operator, means of %zu "
-               "blocks:\n"
-               "  correlation with height along gravity %.2f; it varies by %.0f %% RMS, of which "
-               "(18) leaves %.0f %%\n"
-               "  c7 to c9 of that force %.2f %.2f %.2f, of the displacement %.2f %.2f %.2f\n",
-               applied->blocks, applied->correlation, 100.0 * applied->spread,
-               100.0 * applied->left, applied->slopes[0], applied->slopes[1], applied->slopes[2],
-               c[0], c[1], c[2]);
+  (void)printf(
+      "force that explains the displacement (by the inverse of the operator), means of %zu "
+      "blocks:\n"
+      "  correlation with height along gravity %.2f; it varies by %.0f %% RMS, of which "
+      "(18) of Santhanam 2008 does not explain %.0f %%\n"
+      "  c7 to c9 of that force %.2f %.2f %.2f, of the displacement %.2f %.2f %.2f\n",
+      applied->blocks, applied->correlation, 100.0 * applied->spread, 100.0 * applied->left,
+      applied->slopes[0], applied->slopes[1], applied->slopes[2], c[0], c[1], c[2]);
 }
 
 static void print_gain(const supine_patient_record *record, bool given) {
@@ -243,20 +244,22 @@ static void print_gain(const supine_patient_record *record, bool given) {
     const supine_patient_told *told = &record->told[k];
     char text[SUPINE_PATIENT_STATE_TEXT];
     (void)supine_state_describe(&told->state, text, sizeof text);
-    (void)printf("%s: breath scale %.2f, leaves %.1f mm RMS, %.1f were no force to turn\n", text,
-                 told->scale, told->left, told->left_without);
+    (void)printf(
+        "%s: breath scale %.2f, residual %.1f mm RMS, %.1f without gravity-dependent part\n", text,
+        told->scale, told->left, told->left_without);
   }
   if (record->gain_open) {
-    (void)printf("gain not determined: the states in other postures do not tell what turns with\n"
-                 "gravity; %.2g is the deep law's\n",
-                 record->force.gain);
+    (void)printf(
+        "gain not determined by the states in other postures: %.2g is that of the law deep\n",
+        record->force.gain);
   } else if (record->gain_told) {
-    (void)printf("gain %.2f +- %.2f turns with gravity, by the states in other postures\n",
+    (void)printf("gain %.2f +- %.2f (gravity-dependent part), from the states in other postures\n",
                  record->force.gain, record->gain_error);
   } else if (!given) {
-    (void)printf("one posture cannot tell what turns with gravity from what stays with the body:\n"
-                 "gain %.2g is the deep law's, or --gain, or of a --state in another posture\n",
-                 record->force.gain);
+    (void)printf(
+        "scans in one posture do not determine the gravity-dependent part of the force:\n"
+        "gain %.2g is that of the law deep. Give a --state in another posture, or --gain\n",
+        record->force.gain);
   }
 }
 
@@ -305,14 +308,14 @@ static void evidence_free(evidence *of) {
   supine_patient_pairs_free(&of->pairs);
 }
 
-/* mL; 0: the surface is not there or not closed. */
+/* Return the volume of lungs, mL; 0 without a surface, or for an open one. */
 static double volume_of(const supine_lungs *lungs) {
   return lungs->mesh.vertex_count > 0 && lungs->topology.closed
              ? 1e-3 * supine_mesh_volume(&lungs->mesh)
              : 0.0;
 }
 
-/* Which lung each landmark lies in, by the surface of its scan. */
+/* Find the lung that each landmark lies in, by the surface of the first scan. */
 static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs *pairs,
                                 supine_error *error) {
   supine_inside_surface *tree = NULL;
@@ -371,9 +374,11 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Choose the fuller state, by the volumes of the surfaces or the spread of the landmarks. */
+/* Find the fuller state, by the volumes of the surfaces or the spread of the landmarks, and swap
+ * the evidence where it is the second one. */
 static supine_status order_states(const request *wanted, evidence *of, supine_error *error) {
-  static const double doubt = 0.02; /* of a volume: cutting alone explains less */
+  static const double doubt =
+      0.02; /* relative difference of volumes that is not yet a contradiction */
   const double volume[2] = {volume_of(&of->lungs[0]), volume_of(&of->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
                         : of->pairs.count > 0              ? supine_patient_pairs_growth(&of->pairs)
@@ -471,7 +476,7 @@ static supine_status find_gain(const request *wanted, evidence *of, supine_patie
   further_work work = {.pairs = {{.count = 0}}};
   supine_lungs *from = &of->lungs[0];
   supine_status status = load_further(wanted, of, record, &work, error);
-  if (from->mesh.vertex_count == 0) { /* the first scan alone, which is the emptier one */
+  if (from->mesh.vertex_count == 0) { /* only the emptier scan has a surface */
     from = &of->lungs[1];
     supine_patient_refer(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_mesh_box(&from->mesh, from->minimum, from->maximum);
@@ -487,7 +492,8 @@ static supine_status find_gain(const request *wanted, evidence *of, supine_patie
   return status;
 }
 
-/* Describe a state; where it has no volume, with that of the surfaces. */
+/* Set the volume of a state without one to that of its surface: relative to the other state where
+ * that is known, else absolute. */
 static void complete_state(supine_patient_record *record, size_t k) {
   supine_volume *of = &record->state[k].volume;
   const supine_state *other = &record->state[1 - k];
@@ -527,10 +533,10 @@ static void keep_states(const request *wanted, const evidence *of, supine_patien
   }
 }
 
-/* Warn where the two scans show another volume at rest than is assumed of healthy people. */
+/* Warn where the volume at rest that the two scans show differs from that of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
   static const double apart_least =
-      0.07; /* share of full inflation: the standard deviation in healthy people is 0.04 */
+      0.07; /* share of full inflation; the standard deviation in healthy people is 0.04 */
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
   supine_resting shown = usual;
@@ -612,7 +618,8 @@ static supine_status arrange(request *wanted, const supine_arguments *given, sup
   wanted->rest_path = given->count > 0 ? given->operand[0] : NULL;
   if (given->count > 1) {
     wanted->state_path = given->operand[next++];
-  } else if (wanted->landmarks.path == NULL && wanted->count > 0) { /* the first state is the one */
+  } else if (wanted->landmarks.path == NULL &&
+             wanted->count > 0) { /* the first further state replaces it */
     *(is_landmarks(wanted->further_path[0]) ? &wanted->landmarks.path : &wanted->state_path) =
         wanted->further_path[0];
     wanted->state = wanted->further[0];
@@ -621,7 +628,7 @@ static supine_status arrange(request *wanted, const supine_arguments *given, sup
     memmove(wanted->further_path, wanted->further_path + 1,
             wanted->count * sizeof *wanted->further_path);
   }
-  for (; next < given->count; ++next) { /* more in the same posture */
+  for (; next < given->count; ++next) { /* further surfaces, in the same posture */
     if (wanted->count == SUPINE_PATIENT_OTHERS_MAX) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "more than %d further states: give fewer --state",
@@ -667,7 +674,7 @@ static supine_status arrange(request *wanted, const supine_arguments *given, sup
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  static supine_patient_record record; /* about 100 kB, too large for the stack */
+  static supine_patient_record record; /* about 74 kB, too large for the stack */
   supine_status status = arrange(wanted, given, error);
   if (status == SUPINE_OK) {
     status = fit(wanted, given, &record, error);
@@ -695,7 +702,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_fit = {
     name,
-    "a person's own law, from scans and landmarks",
+    "fit a model to a person's scans and landmarks",
     .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
              "SCAN SCAN... [--state STATE:FILE]... -o patient.json [OPTIONS]",
     .about = "Fits a model to one person's lungs in two scans: a law of motion, and its residual "
@@ -715,7 +722,7 @@ const supine_command supine_command_fit = {
         "  supine precompute rest.ply --patient patient.json -o lungs.safetensors",
     .operands_least = 0,
     .operands_most = 2 + SUPINE_PATIENT_OTHERS_MAX,
-    .operands_missing = "a surface in one state and some in others",
+    .operands_missing = "more than 10 surfaces: name fewer",
     .request_size = sizeof(request),
     .begin = begin,
     .run = run};

@@ -223,7 +223,7 @@ static void print_map(const char *path, const supine_source *source) {
                report->size[0], report->size[1], report->size[2], report->spacing[0],
                report->spacing[1], report->spacing[2], report->axes, report->source, report->taken);
   if (report->parted > 0.0) {
-    (void)printf("  the lungs touch: parted at necks up to %.3g mm wide\n", report->parted);
+    (void)printf("  the lungs touch: separated at necks up to %.3g mm wide\n", report->parted);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];

@@ -18,11 +18,11 @@ typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
   const supine_patient_record *patient; /* patient model, owned by the caller; NULL: none */
-  supine_patient_field field;           /* of the patient */
+  supine_patient_field field;           /* of the patient model */
   supine_source made_from;  /* the lungs as loaded, and the axes and units of their files */
   supine_prepared prepared; /* their model */
   char assumed[800];        /* sentence about the assumptions */
-  supine_findings findings; /* findings that the user should know */
+  supine_findings findings; /* findings about the files and the model */
 } supine_model_options;
 
 /* Set the defaults of a zeroed struct. */

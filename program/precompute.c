@@ -200,12 +200,13 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
   wanted->model.patient = record;
   wanted->model.choice.law = SUPINE_LAW_DEEP; /* its constants are replaced by the patient's */
   wanted->basis.patient = *text;
-  (void)snprintf(wanted->summary, sizeof wanted->summary,
-                 "%s: %s law%s from %.0f points; held out %.1f of %.1f mm RMS, %.0f %% explained; "
-                 "expected error %.1f mm RMS",
-                 record->name, supine_patient_law_names[record->patient.law],
-                 record->patient.centre_count > 0 ? " and kriging" : "", record->points,
-                 record->held_out, record->held_out_baseline, record->explained, record->expected);
+  (void)snprintf(
+      wanted->summary, sizeof wanted->summary,
+      "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% explained; "
+      "expected error %.1f mm RMS",
+      record->name, supine_patient_law_names[record->patient.law],
+      record->patient.centre_count > 0 ? " and kriging" : "", record->points, record->held_out,
+      record->held_out_baseline, record->explained, record->expected);
   wanted->basis.patient_summary = wanted->summary;
   wanted->basis.expected_error = record->expected_constant;
   (void)printf("%s\n", wanted->summary);
@@ -236,10 +237,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
   const bool fields = wanted->fields != NULL;
   char *text = NULL;
-  static supine_patient_record record; /* about 40 kB, too large for the stack */
+  static supine_patient_record record; /* about 74 kB, too large for the stack */
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: this name is a mesh's: give a name that ends in .safetensors",
+                            "%s: this is the name of a mesh: give a name that ends in .safetensors",
                             wanted->path);
   }
   supine_status status = fields ? check_fields(wanted->fields, wanted->path, error)

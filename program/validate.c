@@ -26,7 +26,7 @@ typedef struct request {
   bool has_scale, json;
 } request;
 
-/* "prone", "prone:rest+500", "0.6:0:-0.8", "0.6:0:-0.8:full" */
+/* Read "prone", "prone:rest+500", "0.6:0:-0.8" or "0.6:0:-0.8:full". */
 static supine_status read_posture(const char *text, void *field, supine_error *error) {
   supine_command_state *state = field;
   if (text[0] == '\0' || strlen(text) >= sizeof state->posture) {
@@ -36,7 +36,7 @@ static supine_status read_posture(const char *text, void *field, supine_error *e
   return supine_state_parse(text, &state->state, error);
 }
 
-/* "prone.ply", "prone:prone.ply", "prone:rest+500:prone.ply", into the whole request. */
+/* Read "prone.ply", "prone:prone.ply" or "prone:rest+500:prone.ply" into the whole request. */
 static supine_status read_state(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   supine_command_state *state = &wanted->state[wanted->count];
@@ -62,25 +62,27 @@ static supine_status read_state(const char *text, void *field, supine_error *err
 
 static const supine_option table[] = {
     {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
-     "the same lungs in another state, of any meshing; may be repeated, up to 8, and several then "
-     "tell how linear displacement is with volume. Without a volume: what the surface holds",
+     "surface of the same lungs in another state, with any mesh; may be repeated, up to 8 times. "
+     "Several also show how linear displacement is in volume. Default volume: that of the surface",
      .read = read_state, .wants = "(at most 8) SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
-     "the state that motion starts from, as landmarks and the maps beside the prediction have it; "
-     "default: the basis's scan itself",
+     "state that motion starts from: that of the first landmarks, and of the surface that the "
+     "fitted "
+     "maps move; default: the scan",
      FILLS(from), .read = read_posture, .wants = "a state, as supine:rest"},
-    {.help = "The volume of states that name none (default: what the state's surface holds):"},
+    {.help = "The volume of states that name none (default: the volume of the state's surface):"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {"scale", 0, "S", "breath scale instead", FILLS(scale), SUPINE_SAYS_GIVEN(request, has_scale),
-     .wants = "a number", .rivals = "breath"},
+    {"scale", 0, "S", "breath scale, instead of a volume", FILLS(scale),
+     SUPINE_SAYS_GIVEN(request, has_scale), .wants = "a number", .rivals = "breath"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
-     "where the error sits: .png, a picture of every state; .ply or .vtp, the predicted surface of "
-     "the first with the way to the state's surface as its displacement (mm)",
+     "local errors: .png, a picture of every state; .ply or .vtp, the predicted surface of the "
+     "first "
+     "state, with its displacement from the nearest points of the state's surface (mm)",
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
-    {"json", 0, NULL, "prints JSON instead of text", FILLS(json)},
+    {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
 static bool draws(const char *path) {
@@ -109,8 +111,8 @@ static void print_line(const supine_command_subject *s) {
   if (s->count < 2) {
     return;
   }
-  (void)puts("linearity with volume: the breath scale that comes nearest to each state\n"
-             "          mL    by volume    nearest    leaves, mm RMS");
+  (void)puts("linearity in volume: breath scale by volume, and that nearest to each state\n"
+             "          mL    by volume    nearest    residual, mm RMS");
   for (size_t i = 0; i < s->count; ++i) {
     const supine_command_outcome *of = &s->outcome[i];
     if (of->has_best) {
@@ -121,11 +123,11 @@ static void print_line(const supine_command_subject *s) {
   }
   if (s->line_count > 1) {
     (void)printf(
-        "a straight line from where motion starts misses those %zu of one posture by up to "
+        "a straight line from the start of motion differs from the %zu in one posture by up to "
         "%.1f %% of the largest\n",
         s->line_count, 100.0 * s->line_off);
   } else {
-    (void)puts("no two states in one posture: nothing to draw a line through");
+    (void)puts("no two states in one posture: no line can be fitted");
   }
 }
 
@@ -149,8 +151,8 @@ static void print_text(const supine_command_subject *s) {
   (void)puts("translation, rigid+scale and affine are fitted to the other state itself\n"
              "for comparison, the paper: surfaces within 2 mm, constants within 1 %");
   if (!points) {
-    (void)puts("a small distance between surfaces does not prove the motion of what is in them: "
-               "--landmarks");
+    (void)puts("a small distance between surfaces does not prove the motion inside: give "
+               "--landmarks to measure it");
   }
 }
 
@@ -311,7 +313,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_validate = {
     name,
-    "how far a prediction is from another scan",
+    "compare a basis with another scan of the person",
     .usage = "BASIS --state [POSTURE:]SURFACE [--landmarks PAIRS.csv] [OPTIONS]\n"
              "BASIS --landmarks PAIRS.csv --volume VOLUME [OPTIONS]",
     .about = "Compares a basis with other states of the same person: "
@@ -325,6 +327,6 @@ const supine_command supine_command_validate = {
              "      --state supine:full:full.ply --landmarks pairs.csv",
     .operands_least = 1,
     .operands_most = 1,
-    .operands_missing = "name one basis file",
+    .operands_missing = "name one basis file (made by 'supine precompute')",
     .request_size = sizeof(request),
     .run = run};

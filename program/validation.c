@@ -12,11 +12,12 @@
 #include "precompute/inside/surface.h"
 #include "program/options/basis_input.h"
 
+/* Largest number of vertices whose distance is searched, and number of golden-section steps. */
 enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24 };
 
 static const double search_span = 0.5; /* half-width of the search, in shares of a full breath */
-static const double golden = 0.6180339887498949;
-static const double same_posture = 1e-9;
+static const double golden = 0.6180339887498949; /* (sqrt(5) - 1) / 2 */
+static const double same_posture = 1e-9;         /* largest difference of equal unit vectors */
 
 void supine_command_subject_free(supine_command_subject *subject) {
   supine_basis_close(subject->basis);
@@ -343,7 +344,8 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   if (status == SUPINE_OK && landmarks != NULL) {
     status = validate_points(s, i, landmarks, reverse, error);
   }
-  if (status == SUPINE_OK && state->path != NULL) { /* add the fitted motion to the prediction */
+  if (status == SUPINE_OK &&
+      state->path != NULL) { /* this also moves the prediction by the fitted motion */
     status = supine_patient_validate_surface(&s->rest, s->moved, outcome->predicted, &lungs.mesh,
                                              outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;

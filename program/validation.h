@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Data of 'supine validate': a basis, the state that motion starts from, and the states that are
- * predicted. */
+/* Predict states of a person by a basis and compare them with scans, for 'supine validate'. */
 #ifndef SUPINE_COMMAND_VALIDATION_H
 #define SUPINE_COMMAND_VALIDATION_H
 
@@ -18,7 +17,7 @@ typedef struct supine_command_state {
   char posture[SUPINE_POSTURE_NAME_MAX]; /* empty: not given */
   supine_state state;                    /* default volume: not given */
   bool has_scale;
-  double scale; /* the gain instead; negative below full inflation */
+  double scale; /* the gain, instead of a volume */
 } supine_command_state;
 
 /* Result for one state. */
@@ -26,14 +25,14 @@ typedef struct supine_command_outcome {
   supine_pose pose;
   double scale; /* its gain */
   bool has_millilitres;
-  double millilitres; /* from the state that motion starts from */
+  double millilitres; /* mL above the state that motion starts from */
   double *predicted;  /* [N, 3] */
-  double *nearest;    /* [N, 3] of the state's surface */
+  double *nearest;    /* [N, 3] nearest points of the state's surface */
   bool has_surface, has_points, has_best;
   supine_patient_distance surface[SUPINE_PATIENT_MAP_COUNT];
   supine_patient_distance points[SUPINE_PATIENT_MAP_COUNT];
-  double best_scale; /* best scale: least distance to the surface */
-  double best_rms;   /* distance of vertices to it, mm */
+  double best_scale; /* scale with the least distance to the surface */
+  double best_rms;   /* that distance, RMS over vertices, mm */
 } supine_command_outcome;
 
 typedef struct supine_command_subject {
@@ -41,13 +40,13 @@ typedef struct supine_command_subject {
   supine_patient_moved moved; /* motion between the scans that is removed */
   supine_command_state from;
   double from_scale, from_millilitres; /* gain and volume of the state that motion starts from */
-  supine_mesh rest;                    /* where motion starts from */
+  supine_mesh rest;                    /* surface that motion starts from */
   size_t count;
   supine_command_state state[SUPINE_COMMAND_STATES_MAX];
   supine_command_outcome outcome[SUPINE_COMMAND_STATES_MAX];
-  size_t line_count; /* states in the posture of the first: the line through rest */
-  double line_slope; /* breath scale for a millilitre */
-  double line_off;   /* largest departure, of the largest scale */
+  size_t line_count; /* states in the posture of the first, which the line is fitted to */
+  double line_slope; /* breath scale per mL */
+  double line_off;   /* largest residual, as a share of the largest scale */
 } supine_command_subject;
 
 void supine_command_subject_free(supine_command_subject *subject);
@@ -69,7 +68,7 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
                                             const char *landmarks, bool reverse,
                                             supine_error *error);
 
-/* Fit a line to the best scales over volumes. */
+/* Fit to the best scales over volumes a line through the state that motion starts from. */
 void supine_command_find_line(supine_command_subject *subject);
 
 /* Draw the errors on the surface, one panel for each state.

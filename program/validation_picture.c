@@ -38,7 +38,7 @@ static supine_status write_picture(supine_renderer *renderer, const supine_pictu
   if (status == SUPINE_OK) {
     return supine_output_commit(&output, error);
   }
-  if (ferror(output.file) != 0) { /* committing gives the reason of the failed write */
+  if (ferror(output.file) != 0) { /* committing reports a failed write */
     (void)supine_output_commit(&output, error);
   }
   supine_output_abandon(&output);
