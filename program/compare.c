@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine compare: how far postures differ, and where the lungs ventilate in each. */
+/* supine compare: compare postures by displacement, and ventilation by height in each. */
 #include <errno.h>
 #include <string.h>
 
@@ -131,7 +131,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_compare = {
     name,
-    "how far postures differ, and who ventilates where",
+    "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
     .about =
         "Reports how far the lungs move from supine at rest to each posture and between every "
@@ -145,10 +145,12 @@ const supine_command supine_command_compare = {
         "under '95 %'. Ventilation by height: the lungs before a breath are cut into ten slabs of "
         "equal thickness across gravity. What the tissue of a slab gains is the volume that its "
         "part of the surface sweeps, plus what crosses its lower cut, less what crosses its upper "
-        "one; a cut's motion is the plane fitted to its outline's. The slabs' gains sum to the "
+        "one; the motion of a cut is a plane fitted to that of its outline. The slabs' gains sum "
+        "to the "
         "volume asked for; gain over volume is the regional expansion. Constant, odd and even are "
-        "shares of the squared displacement over all directions: odd parts turn over with gravity, "
-        "so without an even part prone is the exact reverse of supine about their mean.\n"
+        "shares of the squared displacement over all directions: odd parts change sign with "
+        "gravity, "
+        "so that without an even part prone is the exact reverse of supine about their mean.\n"
         "\n"
         "Examples:\n"
         "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How far, and in which direction, named points move between postures. */
+/* Compute and print how far, and in which direction, embedded structures move between postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,12 +13,11 @@
 #include "program/inside.h"
 #include "program/options/expected_output.h"
 
-/* Displacements of each name in each posture, [postures, names, 3], mm from the reference
- * surface. */
+/* Displacements of all names in all postures. */
 typedef struct comparison {
   const supine_posture_list *postures;
   supine_command_names names;
-  double *moves;
+  double *moves;  /* [postures, names, 3] mm from the reference surface */
   double *errors; /* [postures, postures, names] expected, mm RMS; 0 where they are not known */
 } comparison;
 
@@ -129,7 +128,8 @@ static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) 
   return true;
 }
 
-/* Print every pair of postures. */
+/* Write the displacements between every two postures to `csv`; else add them to `list`; else print
+ * a table. */
 static supine_status write_pairs(const comparison *c, json_t *list, FILE *csv) {
   if (csv != NULL) {
     (void)fputs("from,to,name,dx,dy,dz,moved_mm,expected_error_mm\n", csv);

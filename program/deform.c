@@ -91,7 +91,7 @@ static supine_status find_pose(const supine_basis *basis, const request *wanted,
     return supine_options_pose(basis, name, &wanted->volume, gravity, pose, error);
   }
   supine_mesh reference = {0};
-  (void)supine_basis_weights(basis, gravity, pose->weights); /* a unit vector is legal */
+  (void)supine_basis_weights(basis, gravity, pose->weights); /* cannot fail: a unit vector */
   supine_pose_fill(pose, 1.0);
   supine_status status = supine_options_basis_rest_mesh(basis, &reference);
   if (status == SUPINE_OK) {

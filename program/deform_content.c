@@ -218,10 +218,12 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   supine_field_residual residual = {0};
   const supine_status status = supine_field_invert(forward, inverse, &residual, error);
   if (status == SUPINE_OK) {
-    (void)printf("forward and back again: off by %.3g mm RMS, %.3g mm at most, inside the lungs",
-                 residual.rms, residual.largest);
+    (void)printf(
+        "field and inverse in turn: residual %.3g mm RMS, %.3g mm at most, inside the lungs",
+        residual.rms, residual.largest);
     if (residual.lost > 0) {
-      (void)printf("; the field folds at %zu nodes outside or between the lungs", residual.lost);
+      (void)printf("; the field folds and has no inverse at %zu %s", residual.lost,
+                   residual.lost == 1 ? "node" : "nodes");
     }
     (void)putchar('\n');
   }
@@ -260,7 +262,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   second->nodes.values = u;
   supine_image depth;
   status = supine_field_resample(&back, NULL, false, &second->depth, &depth, error);
-  if (status == SUPINE_OK) { /* the field from the moved lungs back to the scan */
+  if (status == SUPINE_OK) { /* the depth of the nodes in the first state */
     supine_image_free(&second->depth);
     second->depth = depth;
   }

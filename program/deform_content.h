@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The part of 'supine deform' that moves what 'supine embed' made: points, fields, images. */
+/* Move the points and grids that 'supine embed' made, for 'supine deform': write points, fields and
+ * images. */
 #ifndef SUPINE_DEFORM_CONTENT_H
 #define SUPINE_DEFORM_CONTENT_H
 
@@ -25,8 +26,8 @@ extern const supine_option supine_command_deform_content_options[];
 typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;
-  supine_reference_pose from; /* also the state of images */
-  bool from_given;            /* it is not the scan */
+  supine_reference_pose from; /* state that displacements are measured from, and of images */
+  bool from_given;            /* by --from; else it is the scan */
   supine_expected expected;
   supine_mesh_save_options save; /* axes and unit of the output */
 } supine_deformation;
@@ -35,7 +36,8 @@ typedef struct supine_deformation {
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
                                                   supine_error *error);
 
-/* Read the image of --image or --labels, and print whether densities are scaled. */
+/* Read the image of --image or --labels. With --density, check that it is in Hounsfield units; with
+ * --image alone, print that densities are not scaled. */
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* States of the lungs for pictures, and the picture around them. */
+/* Compute the states of the lungs that pictures show, and fill the pictures. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

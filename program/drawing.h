@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What still and moving pictures of 'supine render' share: the options, the states drawn, and the
- * picture around them. */
+/* Declare what still pictures and animations of 'supine render' share: options, states, pictures.
+ */
 #ifndef SUPINE_COMMAND_DRAWING_H
 #define SUPINE_COMMAND_DRAWING_H
 
@@ -19,11 +19,11 @@ typedef struct supine_command_drawing {
   supine_volume_options volume;
   supine_from from; /* state that colours and displacements are measured from */
   const char *title;
-  const char *inside; /* a file, or NULL */
-  double scale;       /* mm, or 0: by volume */
-  double largest;
-  double opacity; /* opacity of the lungs; 0: not given */
-  size_t width, height;
+  const char *inside;   /* file of --inside; NULL: none */
+  double scale;         /* largest displacement, mm; 0: by volume */
+  double largest;       /* end of the colour bar, mm; 0: automatic */
+  double opacity;       /* opacity of the lungs; 0: not given */
+  size_t width, height; /* pixels; 0: automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
   unsigned theme; /* 1: dark */
@@ -34,12 +34,12 @@ typedef struct supine_command_drawing {
 /* One posture, ready to be drawn. */
 typedef struct supine_command_drawn {
   supine_pose pose;
-  float *value; /* [N] */
+  float *value; /* [N] displacement, mm */
   char subtitle[96];
   supine_command_marks marks;
 } supine_command_drawn;
 
-/* What drawing needs. Set the first three, then open; close also after a failure. */
+/* Objects needed for drawing. Set the first three, then open; close also after a failure. */
 typedef struct supine_command_studio {
   const supine_basis *basis;
   const supine_command_drawing *wanted;
@@ -48,7 +48,7 @@ typedef struct supine_command_studio {
   supine_renderer *renderer;
   supine_basis *inside; /* or NULL */
   supine_command_names names;
-  double ends[2]; /* of the colours: 95th percentile and largest value of all states found */
+  double ends[2]; /* largest 95th percentile and largest displacement of the states found, mm */
 } supine_command_studio;
 
 supine_status supine_command_studio_open(supine_command_studio *studio, supine_error *error);
@@ -59,11 +59,12 @@ supine_status supine_command_drawn_find(supine_command_studio *studio,
                                         const supine_posture_item *item,
                                         supine_command_drawn *found, supine_error *error);
 
-/* Compute the marks of a state found, if there is something inside. */
+/* Compute the marks of the structures inside in a state found; none without --inside. */
 supine_status supine_command_drawn_mark(const supine_command_studio *studio,
                                         supine_command_drawn *found, supine_error *error);
 
-/* Return the picture of `count` panels. @param label  [128], text of the colour bar; written */
+/* Return the picture of `count` panels.
+ * @param label  [128] set to the text of the colour bar; must outlive the picture */
 supine_picture supine_command_drawing_picture(const supine_command_studio *studio,
                                               const supine_panel *panels, size_t count,
                                               char *label);

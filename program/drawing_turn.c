@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A turn of the patient as an animation. */
+/* Draw a turn of the patient as an animation. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -127,7 +127,7 @@ static supine_status animate(turning *t, supine_error *error) {
   }
   if (status == SUPINE_OK) {
     status = supine_render_animation_write(animation, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* the stream knows why a write failed */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* committing reports a failed write */
       status = supine_output_commit(&output, error);
     }
   }

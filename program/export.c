@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine export: a basis as a page for the browser, or as glTF morph targets. */
+/* supine export: write a basis as a page for the browser, or as glTF morph targets. */
 #include <string.h>
 #include <strings.h>
 
@@ -14,8 +14,8 @@ typedef struct request {
   const char *path;
   const char *title;
   supine_from from;
-  double volume;
-  double largest;
+  double volume;  /* tidal volume, mL */
+  double largest; /* largest displacement of an open surface, mm */
   bool page;
   bool glb_only; /* set where an option was given that a page does not use */
   const char *inside;
@@ -92,7 +92,7 @@ static supine_status write_page(const export_source *source, const request *want
   if (status == SUPINE_OK) {
     (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
     if (page.inside != NULL) {
-      (void)printf(" and what is inside, %zu name%s", page.parts->count,
+      (void)printf(" and the structures inside, %zu name%s", page.parts->count,
                    page.parts->count == 1 ? "" : "s");
     }
     (void)puts("; open it in any browser");

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Structures embedded in the lungs: a file of 'supine embed', the names in it, and pictures of it.
- */
+/* Open the structures that 'supine embed' made, read their names, and make the marks that show them
+ * in pictures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,7 +47,8 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   names->text = malloc((length + 1) * sizeof *names->text);
   if (names->space == NULL || names->text == NULL) {
     supine_command_names_close(names);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu names", n);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices",
+                            n);
   }
   memcpy(names->space, text->data, length);
   names->space[length] = '\0';
@@ -68,7 +69,8 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
     }
   }
   if (status == SUPINE_OK && !sort_by_name(names, n)) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu names", n);
+    status =
+        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the names of %zu vertices", n);
   }
   if (status != SUPINE_OK) {
     supine_command_names_close(names);

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Structures embedded in the lungs: a file of 'supine embed', the names in it, and pictures of it.
- */
+/* Open the structures that 'supine embed' made, read their names, and make the marks that show them
+ * in pictures. */
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
 #include "program/render/render.h"
 
+/* Names of embedded structures. */
 typedef struct supine_command_names {
   size_t count;         /* names */
   char **text;          /* [count] */
-  const uint32_t *part; /* [N] number of each vertex's name */
+  const uint32_t *part; /* [N] index of each vertex's name */
   size_t *order;        /* [N] vertices by name, and by input order within each name */
-  char *space;          /* the text */
+  char *space;          /* memory of `text` */
 } supine_command_names;
 
 /* Read the names of embedded structures.
@@ -40,7 +41,8 @@ typedef struct supine_command_marks {
   char (*label)[48];
 } supine_command_marks;
 
-/* @param from  pose that displacements are measured from
+/* Make the marks of a pose.
+ * @param from  pose that displacements are measured from
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names, const supine_pose *pose,

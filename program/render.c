@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine render: a picture of the lungs in one or several postures. */
+/* supine render: draw the lungs in one or several postures, or during a turn. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +20,7 @@ static supine_status write_picture(const request *wanted, supine_renderer *rende
   supine_status status = supine_output_open(wanted->output, &output, error);
   if (status == SUPINE_OK) {
     status = supine_render_picture_write(renderer, picture, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* the output knows why a write failed */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* committing reports a failed write */
       status = supine_output_commit(&output, error);
     }
   }
@@ -137,11 +137,11 @@ static const supine_option table[] = {
     {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".png or .webp"},
-    {"size", 0, "WxH", "pixels; default: as the postures and views want", .read = read_size,
-     .wants = "WIDTHxHEIGHT, up to 16384 each"},
+    {"size", 0, "WxH", "pixels; default: 440 x 480 for each posture and view, and a margin",
+     .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
      "anterior (default), posterior, left, right, lateral (from the left), head, feet, oblique; "
-     "several come below each other",
+     "several are drawn below each other",
      .read = read_views},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
@@ -157,9 +157,9 @@ static const supine_option table[] = {
      "opacity of the lungs, 0.05 to 1 (opaque); default 1, with --inside 0.35",
      SUPINE_FILLS(request, opacity), .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1",
      .more = true},
-    {"theme", 0, "light|dark", "of the page", SUPINE_FILLS(request, theme), .choices = themes,
-     .standard = "light", .more = true},
-    {"title", 0, "TEXT", "a heading", SUPINE_FILLS(request, title), .more = true},
+    {"theme", 0, "light|dark", "colours of the picture", SUPINE_FILLS(request, theme),
+     .choices = themes, .standard = "light", .more = true},
+    {"title", 0, "TEXT", "heading of the picture", SUPINE_FILLS(request, title), .more = true},
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
@@ -173,7 +173,10 @@ static supine_status check(const request *wanted, supine_posture_list *postures,
                                           : "which posture? Give --posture supine, for example");
   }
   if (wanted->turns != moving) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "--turn makes a .webp, postures a .png");
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        wanted->turns ? "--turn writes an animation: let -o end in .webp"
+                      : "postures make a still picture: let -o end in .png (.webp with --turn)");
   }
   const supine_status status =
       wanted->turns ? SUPINE_OK
