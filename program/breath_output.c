@@ -31,7 +31,7 @@ struct breath_output {
   supine_mesh_series *series; /* of a .vtp file; else NULL */
   char *folder;               /* of a .pvd file until it is complete; else NULL */
   float *positions;           /* [T, N, 3] mm, of a .safetensors file; else NULL */
-  size_t next;                /* frame */
+  size_t next;                /* number of the next frame */
   char comment[512];
 };
 

@@ -11,7 +11,7 @@
 
 typedef struct breath_output breath_output;
 
-/* All of it must outlive the output. */
+/* Content of an output. All of it must outlive the output. */
 typedef struct breath_content {
   const supine_mesh *rest;               /* reference surface of the basis */
   const double *origin;                  /* [N, 3] from which displacement is measured, mm */
@@ -24,7 +24,7 @@ typedef struct breath_content {
 /* Begin an output:
  *
  *     NAME.vtp           one file over time, the triangles once
- *     NAME.pvd           that index, and a folder NAME with a VTP file for each frame
+ *     NAME.pvd           an index with times in s, and a folder NAME with a VTP file per frame
  *     NAME.safetensors   positions F32 [T, N, 3], triangles U32 [M, 3], time F64 [T],
  *                        volume F64 [T, G], gravity F64 [T, 3]
  *

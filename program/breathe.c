@@ -137,7 +137,8 @@ static void report(const request *wanted, const breath_frames *frames, double *s
                wanted->path, frames->count, frames->time[frames->count - 1], wanted->fps, least,
                peak);
   if (frames->fixed) {
-    (void)printf("one posture: %zu of the frames by three additions a vertex\n", frames->stepped);
+    (void)printf("one posture: three additions per vertex for %zu of the frames\n",
+                 frames->stepped);
   }
   (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, of %.0f ms\n",
                1e3 * gsl_stats_median(seconds, 1, frames->count),

@@ -28,8 +28,7 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"points", 0, "FILE",
-     "the observed points where the scan has them, made by 'supine embed BASIS'",
+    {"points", 0, "FILE", "positions of the points in the scan, made by 'supine embed BASIS'",
      SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN, .required = true},
     {"output", 'o', "FILE",
      ".vtp or .ply: the lungs' surface; .csv: everything in the file of --points. Both in the "
@@ -194,7 +193,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_locate = {
     name,
-    "from a few observed points to the whole lung",
+    "find the whole lung from a few observed points",
     .usage = "BASIS OBSERVED.csv --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
     .about = "Fits the lungs to a few points observed inside them, as a navigation system "
              "collects them: the volume, the translation between the frames, and the residual "
@@ -203,7 +202,7 @@ const supine_command supine_command_locate = {
     .options = table,
     .notes =
         "The expected error is the root mean square of the distance in 3-D: half of all points "
-        "lie within 0.9 times theirs, 95 % within 1.8. " SUPINE_EXPECTED_SUPPORT
+        "lie within 0.9 times this distance, 95 % within 1.8 times. " SUPINE_EXPECTED_SUPPORT
         " A few points seldom determine the posture: give --posture. Without it six are "
         "tried, and the error includes the differences between them.\n"
         "\n"

@@ -14,7 +14,7 @@ static const char *const postures[SUPINE_LOCATED_POSTURES] = {"supine", "prone",
                                                               "right",  "upright", "inverted"};
 
 static const double negligible = 0.01; /* smallest probability with which a posture counts */
-static const double determined = 0.95;
+static const double determined = 0.95; /* probability above which points determine a posture */
 
 /* Fit every posture; one that no volume fits gets the share 0. */
 static supine_status try_postures(const supine_locate_task *task, bool posture_given,
@@ -56,7 +56,7 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
 }
 
 /* Compute the best posture's positions, and the errors of a mixture of all postures:
- * sum over k of share_k (sigma_k^2 + |x_k - x|^2). */
+ * sigma^2 = sum over k of share_k (sigma_k^2 + |x_k - x|^2). */
 static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
                                     supine_command_located *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;

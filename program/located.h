@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lungs found from observed points, in a posture that is known or among six. */
+/* Find the lungs from observed points, in a given posture or in the most probable of six. */
 #ifndef SUPINE_COMMAND_LOCATED_H
 #define SUPINE_COMMAND_LOCATED_H
 
@@ -14,10 +14,10 @@ typedef struct supine_command_located {
   const supine_location *best;
   supine_locate_residual *residuals; /* [points] of the most probable posture */
   float *xyz, *sigma;                /* [N, 3] and [N] of that posture; errors include all */
-  void *space;
+  void *space;                       /* workspaces of supine_locate */
 } supine_command_located;
 
-/* Find the lungs, and the positions of a basis.
+/* Find the lungs, and the positions [N, 3] of the basis `shown` in them.
  * @param posture_given  else the task's gravity is tried as each of the six named postures
  * @param located        zeroed; free it in any case
  * @retval those of supine_locate, SUPINE_ERROR_MEMORY */

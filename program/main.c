@@ -55,7 +55,7 @@ static int unknown_command(const char *name) {
   if (nearest != NULL) {
     (void)fprintf(stderr, "supine: no command '%s'; did you mean '%s'?\n", name, nearest);
   } else {
-    (void)fprintf(stderr, "supine: no command '%s'; 'supine --help' lists them\n", name);
+    (void)fprintf(stderr, "supine: no command '%s'; 'supine --help' lists the commands\n", name);
   }
   return SUPINE_EXIT_USAGE;
 }

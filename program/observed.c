@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read observed points. */
+/* Read observed points, and find them by name among the points that 'supine embed' made. */
 #include <stdlib.h>
 #include <string.h>
 

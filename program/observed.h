@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Observed points, by the names that 'supine embed' was given. */
+/* Read observed points, and find them by name among the points that 'supine embed' made. */
 #ifndef SUPINE_COMMAND_OBSERVED_H
 #define SUPINE_COMMAND_OBSERVED_H
 
@@ -21,7 +21,9 @@ typedef struct supine_command_observed {
 supine_status supine_command_observed_load(const char *path, const supine_basis *inside,
                                            const supine_command_names *names, double noise,
                                            supine_command_observed *observed, supine_error *error);
-/* List the names of single points, for messages to place. The caller frees names and vertices.
+
+/* List the names of single points, whose positions messages may set. The caller frees names and
+ * vertices.
  * @param list  its `inside` set
  * @retval SUPINE_ERROR_FORMAT  none, or more than SUPINE_LOCATE_POINTS_MAX
  * @retval SUPINE_ERROR_MEMORY */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine phantom: synthetic lungs. */
+/* supine phantom: make synthetic lungs. */
 #include "precompute/lungs/phantom.h"
 
 #include "program/options/command.h"
@@ -22,8 +22,9 @@ static const supine_option table[] = {
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
   const supine_mesh_save_options save = {
-      .comment = "made lungs, mm; shape after Chaste's lung test data (BSD-3-Clause, University "
-                 "of Oxford)"};
+      .comment =
+          "synthetic lungs, mm; shape after Chaste's lung test data (BSD-3-Clause, University "
+          "of Oxford)"};
   supine_mesh mesh = {0};
   (void)given;
   supine_status status = supine_phantom_create(wanted->vertices, wanted->volume, &mesh, error);

@@ -42,7 +42,8 @@ static const supine_option table[] = {
      .more = true},
     {"pitcher-catcher", 0, NULL,
      "iterate as Santhanam 2008 does, always from the node with the largest remaining force; print "
-     "that force and the distance from the direct solve. Slow: for small meshes. Needs --law paper",
+     "the share of the force that remains and the largest difference from the direct solve. Slow: "
+     "for small meshes. Needs --law paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
@@ -141,7 +142,7 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
                             "--volume needs a closed surface: close it, or give --scale");
   }
-  if (!reference->known) { /* breaths are added to the scan, at one scale */
+  if (!reference->known) { /* breaths are added to the scan, with one gain for both lungs */
     const double held =
         volume->kind == SUPINE_VOLUME_ABSOLUTE ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
     double scale = 0.0;
@@ -168,14 +169,14 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   return status;
 }
 
-/* Share of the largest force below which every node must be for the iteration to stop. */
+/* Iteration stops when the force on every node is below this share of the largest one. */
 static const double pitcher_tolerance = 1e-6;
 
 /* Print progress at each doubling of the number of distributions per vertex. */
 static void report_held(void *context, size_t steps, double held) {
   const size_t turns = steps / *(const size_t *)context;
   if ((turns & (turns - 1)) == 0) {
-    (void)printf("pitcher-catcher: %8zu distributions, %.3g of the force held\n", steps, held);
+    (void)printf("pitcher-catcher: %8zu distributions, %.3g of the force remains\n", steps, held);
   }
 }
 
@@ -209,7 +210,7 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
     solution->catch_[i] = caught[i];
   }
   if (status == SUPINE_OK) {
-    (void)printf("pitcher-catcher: ends %.2g from the direct solve\n", apart);
+    (void)printf("pitcher-catcher: largest difference from the direct solve %.2g\n", apart);
   }
   free(force);
   free(caught);

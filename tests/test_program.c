@@ -52,7 +52,7 @@ static void test_help_every_command_teaches(void **state) {
     EXPECT(0, "Usage: supine", "help %s", commands[i]);
   }
   EXPECT(1, "did you mean 'deform'", "defrom");
-  EXPECT(1, "'supine --help' lists them", "xyzzy");
+  EXPECT(1, "'supine --help' lists the commands", "xyzzy");
   EXPECT(1, "did you mean '--posture'", "deform lungs.safetensors --postrue prone -o a.ply");
   EXPECT(1, "needs a value", "deform lungs.safetensors -o");
 }
