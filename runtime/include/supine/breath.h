@@ -20,9 +20,10 @@
  *   inflates. Compliance is positive for all parameters, so V rises with P everywhere and P(V)
  *   exists. With an added control function (V'' = u) a noisy limb can fold over, and V is a
  *   polynomial, which does not follow the flat ends of a stiff lung's sigmoid.
- * - A constant u is exactly Salazar-Knowles' V = Vmax (1 - exp(-k P)), with c_1 = -k (P_high -
- * P_low) / 2. Venegas' sigmoid V = a + b / (1 + exp(-(P - c) / d)) is u = -tanh((P - c) / 2d) in
- * units of 1/d: smooth and bounded, so that few polynomials approximate it.
+ * - A constant u gives exactly the exponential V = Vmax (1 - exp(-k P)) of [Salazar1964], with
+ *   c_1 = -k (P_high - P_low) / 2. The sigmoid V = a + b / (1 + exp(-(P - c) / d)) of [Venegas1998]
+ *   has u = -tanh((P - c) / 2d) in units of 1/d: smooth and bounded, so that few polynomials
+ *   approximate it.
  * - Legendre polynomials P_0 to P_4 are orthogonal over the range, so that the parameters are as
  *   independent as evenly spread samples allow. c_1 is half the logarithm of the ratio of the
  *   compliances at the two ends (negative: stiffer when full), c_2 < 0 puts the greatest compliance
@@ -49,7 +50,8 @@ extern "C" {
 
 enum {
   SUPINE_PV_CONTROLS = 5,    /**< control parameters of a limb */
-  SUPINE_PV_CONTROL_MAX = 50 /**< largest |c_i|: compliance changes e^100-fold, far past any lung */
+  SUPINE_PV_CONTROL_MAX = 50 /**< largest |c_i|; c_1 = 50 changes the compliance e^100-fold over the
+                                  range, far more than in any lung */
 };
 
 typedef enum supine_pv_limb {
@@ -58,7 +60,7 @@ typedef enum supine_pv_limb {
   SUPINE_PV_LIMB_COUNT
 } supine_pv_limb;
 
-/** One limb. */
+/** One limb of the P-V loop. */
 typedef struct supine_pv_curve {
   double pressure[2];                 /**< P_low < P_high, cmH2O */
   double volume[2];                   /**< V_low < V_high, mL */
@@ -73,15 +75,15 @@ typedef struct supine_pv {
 /** Return "inhale" or "exhale"; never NULL. */
 SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
 
-/** Return the normal adult lung, the default where nothing was measured: 0 to 30 cmH2O, 0 to 6000
- * mL.
+/** Return the P-V loop of a normal adult lung, the default if no loop was measured: 0 to 30 cmH2O,
+ * 0 to 6000 mL.
  *
- * Exhale: Salazar-Knowles with k = ln 2 / 7.58 cmH2O, the mean half-inflation pressure of 20 normal
- * subjects [Salazar1964], and 6000 mL, an adult's total lung capacity, at 30 cmH2O. Inhale: a
- * Venegas sigmoid between the same ends with c = 10 and d = 6 cmH2O, which stays under the exhale
- * limb. Its b d = 44,600 mL cmH2O lies in the 10^4 to 10^5 that Narusawa (J. Appl. Physiol. 91,
- * 2001, 201-210) found over published curves, but c and d are round numbers, no mean of measured
- * lungs. */
+ * The exhale limb is the exponential of [Salazar1964] with k = ln 2 / 7.58 cmH2O, the mean
+ * half-inflation pressure of 20 normal subjects, and 6000 mL, an adult's total lung capacity, at 30
+ * cmH2O. The inhale limb is a sigmoid [Venegas1998] between the same ends with c = 10 and d = 6
+ * cmH2O; it stays below the exhale limb. Its b d = 44,600 mL cmH2O lies in the 10^4 to 10^5 that
+ * Narusawa (J. Appl. Physiol. 91, 2001, 201-210) found over published curves, but c and d are round
+ * numbers, not means of measured lungs. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
 /** Check a limb: finite numbers, rising ranges, and parameters within bounds.
@@ -122,29 +124,30 @@ SUPINE_API supine_status supine_breath_invert(const supine_pv_curve *curve, size
 typedef enum supine_pv_course {
   SUPINE_PV_COSINE = 0,    /**< half a cosine each way: quiet breathing */
   SUPINE_PV_RAMP,          /**< straight lines: a ventilator's pressure ramp */
-  SUPINE_PV_CONSTANT_FLOW, /**< straight lines of volume instead of pressure: [Santhanam2008] V, 500
-                              mL in 5 s of inhalation, 1.5 mL in each step of 15 ms */
+  SUPINE_PV_CONSTANT_FLOW, /**< straight lines of volume instead of pressure, as in [Santhanam2008]
+                              V: 500 mL in 5 s of inhalation, 1.5 mL in each step of 15 ms */
   SUPINE_PV_COURSE_COUNT
 } supine_pv_course;
 
-/** A breath that repeats. */
+/** A breath, repeated without end. */
 typedef struct supine_pv_breath {
   double tidal;           /**< mL inhaled, > 0 */
   double rate;            /**< breaths a minute, > 0 */
-  double inhale_fraction; /**< of the breath's time, between 0 and 1 */
+  double inhale_fraction; /**< fraction of the breath's time that is inhalation, > 0 and < 1 */
   double rest_pressure;   /**< cmH2O at the end of an exhalation */
   supine_pv_course course;
 } supine_pv_breath;
 
-/** Return a breath of 500 mL, 12 times a minute, a third of the time inhaling, from 5 cmH2O, of
- * half cosines. */
+/** Return the default breath: 500 mL, 12 a minute, a third of the time inhaling, from 5 cmH2O at
+ * rest, by half cosines of pressure. */
 SUPINE_API supine_pv_breath supine_breath_default(void);
 
 /** Compute the volume above rest, and the pressure, at given times. A breath begins at time 0, at
  * rest.
  *
- * The peak pressure is where the inhale limb holds the tidal volume above rest. Both limbs are
- * followed between rest and that pressure, and scaled to the tidal volume so that the loop closes:
+ * At the peak pressure, the inhale limb holds the tidal volume above rest. The breath follows both
+ * limbs between the pressure at rest and the peak, scaled to the tidal volume so that the loop
+ * closes:
  *
  *     V(t) = tidal (V_limb(P(t)) - V_limb(P_rest)) / (V_limb(P_peak) - V_limb(P_rest))
  *
@@ -155,9 +158,12 @@ SUPINE_API supine_pv_breath supine_breath_default(void);
  * @param volumes    [count] mL, written; NULL: not wanted
  * @param pressures  [count] cmH2O, written; NULL: not wanted
  * @retval SUPINE_ERROR_ARGUMENT   the breath is outside its documented ranges, the pressure at rest
- * is outside a limb, or the tidal volume or its peak pressure is beyond the end of a limb
- * @retval SUPINE_ERROR_NUMERICAL  a limb is so flat between rest and peak that it holds no air
- * Cost: some 20 microseconds, and less than one for each time. */
+ *                                 is outside a limb, or the tidal volume or its peak pressure is
+ *                                 beyond the end of a limb
+ * @retval SUPINE_ERROR_NUMERICAL  a limb is so flat that its volume does not rise between rest and
+ *                                 peak
+ *
+ * Cost: some 20 microseconds, and less than 1 microsecond for each time. */
 SUPINE_API supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
                                                 size_t count, const double *times, double *volumes,
                                                 double *pressures, supine_error *error);

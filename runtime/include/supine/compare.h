@@ -16,7 +16,8 @@
 extern "C" {
 #endif
 
-/** Areas and Gram matrices of a basis. Any number of threads may use one, as nothing changes it. */
+/** Areas and Gram matrices of a basis. Any number of threads may share one, as no function changes
+ * it. */
 typedef struct supine_compare supine_compare;
 
 /** Compute the Gram matrix of each lung and axis j, in one pass over the vertices:
@@ -35,10 +36,12 @@ SUPINE_API void supine_compare_destroy(supine_compare *compare);
 /** Return the area of the reference surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
 
-/** Compute supine_basis_pose or, with `rms` above 0, the pose whose RMS displacement is that: for
- * open surfaces.
+/** Compute the pose of a state: by its volume (supine_basis_pose) if `rms` is 0; else, for open
+ * surfaces, with one gain for which the RMS displacement is `rms`.
  * @param rms  mm, or 0
- * @retval as supine_basis_pose; SUPINE_ERROR_NUMERICAL also if nothing moves */
+ *
+ * Statuses as supine_basis_pose; SUPINE_ERROR_NUMERICAL also if no vertex moves in this direction.
+ */
 SUPINE_API supine_status supine_compare_pose(const supine_compare *compare,
                                              const supine_state *state, double rms,
                                              supine_pose *pose, supine_error *error);
@@ -63,8 +66,8 @@ SUPINE_API void supine_compare_distances(const supine_compare *compare, const su
 typedef struct supine_distance_statistics {
   double mean; /**< area-weighted */
   double rms;  /**< area-weighted */
-  double p95;  /**< the smallest distance that at least 95 % of the area does not exceed */
-  double max;  /**< of any vertex */
+  double p95;  /**< 95th percentile by area */
+  double max;  /**< largest distance of any vertex */
 } supine_distance_statistics;
 
 /** Compute the statistics of distances [N], none of which is negative: exactly, in four passes,
@@ -72,34 +75,35 @@ typedef struct supine_distance_statistics {
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Compute the energy of each band of harmonics, mm^2: the part of the squared displacement at gain
- * 1 that it gives, averaged over the area and over all directions of gravity,
+/** Compute the energy of each band of harmonics, mm^2: its part of the squared displacement at gain
+ * 1, averaged over the area and over all directions of gravity,
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm       M_lm: column lm of `modes`
  *
- * Odd bands change their sign with gravity, even bands do not.
+ * When gravity changes its sign, so do the odd bands; the even bands do not change.
  * @param energy  [L + 1], written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
 /** The directions of gravity that differ most, at one volume. */
 typedef struct supine_extremes {
-  size_t directions;  /**< sampled directions in which the lungs reach the volume */
-  double pair[2][3];  /**< the two directions that differ most, unit */
-  double pair_rms;    /**< RMS distance between them, mm */
-  double farthest[3]; /**< the direction that differs most from the given one, unit */
-  double farthest_rms;
+  size_t directions;   /**< sampled directions in which the lungs reach the volume */
+  double pair[2][3];   /**< the two directions that differ most, unit */
+  double pair_rms;     /**< RMS distance between them, mm */
+  double farthest[3];  /**< the direction that differs most from the given one, unit */
+  double farthest_rms; /**< RMS distance between these two, mm */
 } supine_extremes;
 
 /** Search the sphere for the directions that differ most. Compare the directions of a golden-angle
- * spiral and `from` with each other, then move the best ones along the sphere while that raises the
- * distance, by steps that halve from the spacing of the spiral to 1e-6 rad. A maximum narrower than
- * the spacing, 3.5 / sqrt(directions) rad, can be missed. Directions in which the lungs cannot
- * reach the volume are left out.
+ * spiral and `from` with each other, then move the best ones along the sphere while that increases
+ * the distance, in steps that are halved from the spacing of the spiral down to 1e-6 rad. A maximum
+ * narrower than the spacing, 3.5 / sqrt(directions) rad, can be missed. Directions in which the
+ * lungs cannot reach the volume are left out.
  *
- * @param from        posture, and the volume in every direction
+ * @param from        the posture to compare with, and the volume for all directions
  * @param rms         mm, see supine_compare_pose
- * @param directions  in the spiral, 2 to 16384; 2048 are 4.5 degrees apart
- * Cost: 3 G K directions^2 / 2 multiplications; allocates 6 G K directions numbers meanwhile.
+ * @param directions  number of directions in the spiral, 2 to 16384; 2048 are 4.5 degrees apart
+ *
+ * Cost: 3 G K directions^2 / 2 multiplications, and 6 G K directions doubles of memory.
  * @retval SUPINE_ERROR_ARGUMENT   directions out of range, or `from` is zero or not finite
  * @retval SUPINE_ERROR_NUMERICAL  `from`, or all but one, cannot reach the volume
  * @retval SUPINE_ERROR_OPEN_SURFACE, SUPINE_ERROR_MEMORY */
@@ -110,29 +114,29 @@ SUPINE_API supine_status supine_compare_search(const supine_compare *compare,
 
 /** The part of one lung between two heights. */
 typedef struct supine_slab {
-  double volume; /**< before the breath, mL */
-  double gain;   /**< mL; divided by `volume`, the regional expansion */
+  double volume; /**< volume before the breath, mL */
+  double gain;   /**< volume gained in the breath, mL; gain / volume is the regional expansion */
 } supine_slab;
 
-/** Most slabs. */
+/** Largest number of slabs. */
 enum { SUPINE_SLABS_MAX = 64 };
 
 /** Compute ventilation by height: cut the surface before a breath into slabs of equal thickness
  * across gravity, from the highest to the lowest point of all lungs, and find the volume that the
  * tissue in each gains.
  *
- *     gain = the volume that the slab's part of the surface sweeps
+ *     gain = the volume swept by the slab's part of the surface
  *            + A mean(u.g) of its lower cut - A mean(u.g) of its upper cut
  *
- * The sweep of each triangle is exact, so that the slabs of a lung sum to the volume that it gains.
- * A cut inside the lung has no vertices: its area A is exact, and its mean displacement along
- * gravity is the value at its centroid of the plane fitted (least squares) to u.g along its
- * outline. This is exact for translations and, to first order, for displacements that are linear in
- * position: a turning lung does not ventilate, and one that swells evenly expands by the same
- * fraction everywhere.
+ * The swept volume of each triangle is exact, so that the slabs of a lung sum to the volume that it
+ * gains. A cut inside the lung has no vertices: its area A is exact; its mean displacement along
+ * gravity is estimated by fitting a plane (least squares) to u.g along its outline, and taking the
+ * value of that plane at the centroid of the cut. This is exact for translations and, to first
+ * order, for displacements that are linear in position: the gains are 0 for a rotation, and
+ * gain / volume is the same in all slabs for a uniform expansion.
  *
  * @param gravity  [3], any length but 0
- * @param from     [N, 3] positions before the breath; NULL: the file's surface
+ * @param from     [N, 3] positions before the breath; NULL: the reference surface
  * @param xyz      [N, 3] positions after it (supine_deform)
  * @param count    1 to SUPINE_SLABS_MAX
  * @param slabs    [G, count], uppermost first, written

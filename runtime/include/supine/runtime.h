@@ -33,11 +33,11 @@
 extern "C" {
 #endif
 
-/** Most modes of a basis, the columns of its coefficients. */
+/** Largest number of modes of a basis. */
 enum { SUPINE_MODES_MAX = 256 };
-/** Most lungs of a basis. */
+/** Largest number of lungs of a basis. */
 enum { SUPINE_LUNGS_MAX = 16 };
-/** Most modes of the normals. */
+/** Largest number of modes of the normals. */
 enum { SUPINE_NORMAL_MODES_MAX = 64 };
 
 typedef struct supine_basis supine_basis;
@@ -49,14 +49,15 @@ typedef enum supine_storage {
   SUPINE_STORAGE_EXACT,    /**< float32, as in the file */
   SUPINE_STORAGE_INT16,    /**< 16-bit coefficients with a scale for each mode; directions and
                                 reference positions of 21 bits */
-  SUPINE_STORAGE_MIXED, /**< INT16, but the last 3 of every 8 modes have 10 or 11 bits; the same as
-                             INT16 below 8 modes */
+  SUPINE_STORAGE_MIXED, /**< INT16, but the last 3 floor(K / 8) of the K modes have coefficients of
+                             10 or 11 bits; the same as INT16 below 8 modes */
   SUPINE_STORAGE_COUNT
 } supine_storage;
 
-/** The instructions that evaluate. All give the same positions within supine_basis_error. */
+/** The instruction set of the evaluation. All sets give the same positions within
+ * supine_basis_error. */
 typedef enum supine_simd {
-  SUPINE_SIMD_AUTO = 0, /**< the widest that this processor has */
+  SUPINE_SIMD_AUTO = 0, /**< the widest of these that this processor has */
   SUPINE_SIMD_PORTABLE, /**< vectors of four numbers: SSE2, NEON, WebAssembly */
   SUPINE_SIMD_AVX2,     /**< AVX2 and FMA */
   SUPINE_SIMD_AVX512,   /**< AVX-512 F and BW */
@@ -68,10 +69,11 @@ typedef struct supine_basis_options {
   size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
-  bool without_normals; /**< ignore the file's normals: saves 12 bytes a vertex for 3 modes */
+  bool without_normals; /**< ignore the file's normals: saves 12 bytes a vertex for every 3 of their
+                             modes */
 } supine_basis_options;
 
-/** The content of an open basis, which owns it. Arrays point into the file's memory. */
+/** The content of an open basis. The basis owns the struct and all arrays. */
 typedef struct supine_basis_info {
   size_t vertex_count;
   size_t triangle_count;
@@ -84,12 +86,12 @@ typedef struct supine_basis_info {
   bool has_volume;        /**< the surface is closed, and states may have volumes */
   supine_storage storage; /**< the storage in use, never AUTO */
   supine_simd simd;       /**< the instructions in use, never AUTO */
-  double bytes_per_vertex; /**< that an evaluation reads */
+  double bytes_per_vertex; /**< number of bytes that an evaluation reads for each vertex */
   /** Bound, in mm, on the error of storage and rounding 500 mL above the reference (on an open
    * surface: where the largest displacement is 20 mm), over the 26 directions of the faces, edges
    * and corners of a cube. supine_basis_error has the bound for any pose. */
   double storage_error;
-  const char *const *lung_names;  /**< [G] "left", ...; a lung without a name has its number */
+  const char *const *lung_names;  /**< [G] "left", ...; "0", "1", ... for lungs without a name */
   const float *bounds;            /**< [G, 2, 3] lowest and highest corner of the box around each
                                        lung of the reference surface, mm */
   const float *vertices;          /**< [N, 3] p, reference positions, mm, LPS */
@@ -101,8 +103,8 @@ typedef struct supine_basis_info {
                                        volume_axes; these three are NULL without volumes */
   const double *volume_quadratic; /**< [G, A, K, K] */
   const double *volume_cubic;     /**< [G, K, K, K] */
-  /** The memory that an evaluation reads, bytes_per_vertex for each vertex in runs of 16 vertices,
-   * for measurements of its traffic. Its layout changes between versions. */
+  /** The memory that an evaluation reads: tiles of 16 vertices, 16 bytes_per_vertex each. Use it
+   * only to measure memory traffic, as the layout changes between versions. */
   const void *packed;
   size_t normal_count;            /**< Q, modes of the normals (supine_deform_lit); 0: none */
   const int16_t *normals;         /**< [N, 3, Q] n */
@@ -112,11 +114,11 @@ typedef struct supine_basis_info {
                                        tissue, mL; 0 without volumes */
   bool has_rest;                  /**< the file has the volume at rest for every posture */
   bool has_full;                  /**< the reference surface is at full inflation */
-  bool is_fields;     /**< made from another simulator's fields, which gain 1 restores */
+  bool is_fields;     /**< made from another simulator's fields; gain 1 gives these fields */
   size_t volume_axes; /**< A: 3; 1 in files of versions 1 and 2, whose gains are equal on
                            all axes */
-  double bend[3];     /**< of the path between full inflation and rest, see
-                           supine_volume_bend */
+  double bend[3];     /**< bend of the path between full inflation and rest on each axis, see
+                           supine_volume_bend; 0: a straight path */
 } supine_basis_info;
 
 /** Weights and gains of one state. */
@@ -130,8 +132,7 @@ typedef struct supine_pose {
  * @param options  NULL: the defaults
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
- * @retval SUPINE_ERROR_FORMAT       it is truncated, corrupted, or no basis file; `error` says
- * where
+ * @retval SUPINE_ERROR_FORMAT       it is truncated, corrupted or not a basis file
  * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or the options lack their size
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instructions asked for
  * @retval SUPINE_ERROR_MEMORY
@@ -156,7 +157,7 @@ SUPINE_API const supine_basis_info *supine_basis_get_info(const supine_basis *ba
 /** Return a metadata string ("format", "error_rms_percent", ...), or NULL. */
 SUPINE_API const char *supine_basis_metadata(const supine_basis *basis, const char *key);
 /** Return all metadata, in the order of the file.
- * @param count  how many, written */
+ * @param count  number of strings, written */
 SUPINE_API const supine_metadata *supine_basis_all_metadata(const supine_basis *basis,
                                                             size_t *count);
 /** Return a tensor of the file by its name ("error_modes", ...), or NULL. */
@@ -177,37 +178,41 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
 /** Compute the weights and gains of a state. The lungs of the pose hold exactly the volume of the
  * state, without a pass over the vertices.
  *
- * A total volume is shared out among the lungs. Above rest all have gone the same part of the way
- * from their own rest to their own full volume [MilicEmili1966]; below rest all shrink in
- * proportion. The gains of a lung lie on a path from full inflation through rest
- * (supine_volume_bend). Files of versions 1 and 2 have one gain for all lungs and axes.
+ * A total volume is divided among the lungs. Above rest, every lung is the same fraction of the way
+ * from its own volume at rest to its own volume at full inflation [MilicEmili1966]; below rest, all
+ * lungs hold the same fraction of their volumes at rest. The gains of a lung lie on a path from
+ * full inflation through rest (supine_volume_bend). Files of versions 1 and 2 have one gain for all
+ * lungs and axes.
  *
  * SUPINE_VOLUME_DEFAULT is rest if the basis has it; else the fields as given (gain 1) if it was
  * made from fields; else 500 mL above the scan.
  * @param state  its gravity has any length but 0
  * @param pose   written
- * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis has no rest or full,
- * or no lung of that name
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis lacks the volume that
+ *                                    the state counts from, or the state does not name every lung
+ *                                    of the basis once
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
- * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume. Single
- * triangles may turn over earlier, which this does not detect Cost: K (L + 1)^2 multiplications for
- * the weights, G K^3 for the gains, once a frame.
+ * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume; single
+ *                                    triangles that turn over earlier are not detected
+ *
+ * Cost: K (L + 1)^2 multiplications for the weights, G K^3 for the gains, once a frame.
  *
  * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
  *                   749-759 */
 SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                            supine_pose *pose, supine_error *error);
 
-/** Compute the gains alone, for the weights that `pose` already has, as in a breath in one posture.
- * Statuses as supine_basis_pose. */
+/** Compute the gains of a state for the weights that `pose` already has, for example during a
+ * breath in one posture. Statuses as supine_basis_pose. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
-/** Return the volume that SUPINE_VOLUME_DEFAULT stands for; DEFAULT itself if the basis was made
- * from fields and has no rest. */
+/** Return the volume that SUPINE_VOLUME_DEFAULT means for this basis (see supine_basis_pose). If
+ * the basis was made from fields and has no rest, the kind of the result is SUPINE_VOLUME_DEFAULT:
+ * gain 1. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
-/** Set every gain to one number, whatever volume that gives: for open surfaces and fields. */
+/** Set every gain to one number, without regard to volumes: for open surfaces and fields. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
 /** Return the state of the scan: its posture and SUPINE_VOLUME_SCAN. */
@@ -218,8 +223,8 @@ SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 SUPINE_API void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
                                      double *volumes);
 
-/** Return a bound, in mm, on the error of storage and rounding in a pose: no deformed vertex is
- * farther from where exact arithmetic on the numbers of the file would put it. */
+/** Return a bound, in mm, on the error of storage and rounding in a pose: the largest distance of
+ * any deformed vertex from its position by exact arithmetic on the numbers of the file. */
 SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pose *pose);
 
 /** Compute the deformed position of every vertex, in the caller's thread.
@@ -227,11 +232,12 @@ SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pos
  *     x_ij = p_ij + A_j (w . c_i) d_ij        A: the gains of the lung of vertex i
  *
  * Rigid parts (tensor `rigid` U32 [R, 2], ranges of vertices) move by the rigid motion that fits
- * these positions best, here and in every function that places vertices.
+ * these positions best, here and in all functions below that compute positions or displacements.
  *
  * @param xyz  [N, 3], written, mm, LPS; any alignment of a float
- * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). Positions that
- * outgrow the cache are stored past it, fastest if `xyz` is aligned to 64 bytes. */
+ * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). If positions
+ * and basis are larger than the cache, positions are written with stores that bypass it, fastest if
+ * `xyz` is aligned to 64 bytes. */
 SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz);
 
 /** Compute supine_deform for vertices begin <= i < end into xyz [end - begin, 3], as the share of
@@ -260,9 +266,9 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_po
  *
  *     xyz += step
  *
- * @param count  vertices
- * @param step   [count, 3] displacements of one step, from supine_displace_range with its gains;
- * the gains' negatives undo it
+ * @param count  number of vertices
+ * @param step   [count, 3] displacements of one step, from supine_displace_range with the
+ *               differences of the gains; their negatives give the step back
  * @param xyz    [count, 3] positions before and after; must not overlap `step`
  * Rounding errors add up, by at most 2^-24 of the coordinate a step. Begin each breath from
  * supine_deform. */
@@ -285,8 +291,8 @@ SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const sup
  *
  * The file states the angle between these and the normals of supine_normals, measured on held-out
  * states: metadata "normals_mean_degrees" and "normals_p999_degrees" (mean and 99.9th percentile),
- * for the volumes "normals_range_ml", or where no rest is known, for the largest displacements
- * "normals_range_mm". It is larger outside that range.
+ * over the range of volumes "normals_range_ml" or, if the file has no rest, of largest
+ * displacements "normals_range_mm". The angle is larger outside that range.
  *
  * @param xyz      [N, 3], written; NULL: the normals alone
  * @param normals  [N, 3], written; 0 for a vertex without triangles
@@ -303,7 +309,7 @@ SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, cons
 
 /** Compute supine_deform_batch and normals [count, end - begin, 3]. */
 SUPINE_API supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
-                                                 const supine_pose *pose, size_t begin, size_t end,
+                                                 const supine_pose *poses, size_t begin, size_t end,
                                                  float *xyz, float *normals);
 
 /** Compute the unit normals of a deformed surface from its triangles: at each vertex the mean of
@@ -314,13 +320,15 @@ SUPINE_API supine_status supine_deform_lit_batch(const supine_basis *basis, size
  * Cost: one pass over the triangles, in the caller's thread. */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
-/** Most modes of supine.glsl, and floats of a vertex's attributes before its coefficients. */
+/** Largest number of modes of supine.glsl, and number of floats before the coefficients in the
+ * attributes of a vertex. */
 enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 
 /** Fill a vertex buffer for supine.glsl with vertices begin <= i < end, each of which has
  *
- *     rest vec4 (offset 0; w is the lung's number), direction vec3 (offset 16),
- *     coefficients (offset 28): (K + 3) / 4 vec4s, the last of which may have fewer numbers
+ *     rest          vec4 at byte 0: reference position, mm, and the index of the lung as w
+ *     direction     vec3 at byte 16, mm
+ *     coefficients  (K + 3) / 4 vec4s from byte 28; the last may have fewer than four numbers
  *
  * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes a vertex of 4 modes
  * @retval SUPINE_ERROR_UNSUPPORTED  more than SUPINE_GL_MODES modes, or a vector field */
@@ -335,7 +343,7 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 
-/** Pack the normals' modes of vertices begin <= i < end for supine.glsl: three to a word, in
+/** Pack the normals' modes of vertices begin <= i < end for supine.glsl: three modes to a word, in
  * SUPINE_WORDS W = (Q + 2) / 3 attributes of type uvec3.
  * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes a vertex of 6
  * modes

@@ -31,6 +31,7 @@ typedef enum supine_dtype {
   SUPINE_DTYPE_COUNT
 } supine_dtype;
 
+/** Largest number of axes of a tensor. */
 enum { SUPINE_TENSOR_RANK_MAX = 4 };
 
 /** One tensor, row-major. A tensor that is written belongs to the caller; one that is read points
@@ -80,9 +81,9 @@ typedef struct supine_safetensors supine_safetensors;
 SUPINE_API supine_status supine_safetensors_open(const char *path, supine_safetensors **file,
                                                  supine_error *error);
 
-/** Open a file in memory, which the caller keeps until it is closed. It needs no alignment, as
+/** Open a file in memory; the caller keeps the bytes until it is closed. They need no alignment, as
  * misaligned tensors are copied.
- * @param name  for messages */
+ * @param name  name of the file, for messages */
 SUPINE_API supine_status supine_safetensors_open_memory(const void *bytes, size_t size,
                                                         const char *name, supine_safetensors **file,
                                                         supine_error *error);
@@ -97,13 +98,14 @@ SUPINE_API const supine_tensor *supine_safetensors_find(const supine_safetensors
 SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key);
 
 /** Return all metadata, in the order of the file.
- * @param count  how many, written */
+ * @param count  number of strings, written */
 SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
                                                                   size_t *count);
 
-/** Check the content against the metadata "checksum": "xxh64:" and 16 hexadecimal digits, or in
- * basis files of version 1 the 16 digits alone, of another hash.
- * @retval SUPINE_ERROR_FORMAT  the file has no checksum, or another one: it is corrupted */
+/** Check the content against the metadata "checksum": "xxh64:" and 16 hexadecimal digits; in basis
+ * files of version 1, only the 16 digits, of another hash.
+ * @retval SUPINE_ERROR_FORMAT  the file states no checksum, or one that differs from its content's:
+ *                              it is corrupted */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
 
@@ -111,10 +113,10 @@ SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *fil
  * element size, in the given order within one size, so that each begins at a multiple of its
  * element size; the header is padded with spaces to a multiple of 8. The caller checks the stream
  * for errors (ferror, fclose).
- * @param name  of the file, for messages
- * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys of one name, a dtype, rank or size out of
- *                                range, text that is not UTF-8, or the key "checksum", which is the
- *                                writer's */
+ * @param name  name of the file, for messages
+ * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys have the same name, a dtype, rank or size
+ *                                is out of range, text is not UTF-8, or metadata has the key
+ *                                "checksum", which this function adds */
 SUPINE_API supine_status supine_safetensors_write(FILE *file, const char *name,
                                                   const supine_tensor *tensors, size_t tensor_count,
                                                   const supine_metadata *metadata,

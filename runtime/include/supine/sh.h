@@ -20,7 +20,7 @@
 extern "C" {
 #endif
 
-/** The highest band that the recurrences are tested for. */
+/** The highest band: the recurrences are tested up to it. */
 #define SUPINE_SH_BAND_MAX 64
 
 /** Return the number of harmonics with l <= band: (band + 1)^2. */

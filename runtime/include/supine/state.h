@@ -32,13 +32,13 @@ typedef enum supine_volume_kind {
   SUPINE_VOLUME_REST,        /**< the end of a quiet expiration in the posture */
   SUPINE_VOLUME_FULL,        /**< full inflation */
   SUPINE_VOLUME_SCAN,        /**< the volume scanned */
-  SUPINE_VOLUME_ABSOLUTE,    /**< 0: the volume of gas and tissue, as measured in a CT */
+  SUPINE_VOLUME_ABSOLUTE,    /**< zero: `ml` is the volume of gas and tissue, as measured in a CT */
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;
 
 typedef struct supine_volume {
   supine_volume_kind kind;
-  double ml; /**< mL beyond the volume of the kind */
+  double ml; /**< mL above the volume of the kind; negative: below */
 } supine_volume;
 
 enum { SUPINE_STATE_LUNGS_MAX = 2, SUPINE_STATE_NAME_SIZE = 16 };
@@ -46,7 +46,7 @@ enum { SUPINE_STATE_LUNGS_MAX = 2, SUPINE_STATE_NAME_SIZE = 16 };
 typedef struct supine_state {
   double gravity[3];    /**< unit vector in body axes (LPS) that points where things fall */
   supine_volume volume; /**< of all lungs together; unused if lungs are named */
-  size_t lung_count;    /**< lungs named below, or 0 */
+  size_t lung_count;    /**< number of lungs named below; 0: none */
   struct {
     char name[SUPINE_STATE_NAME_SIZE];
     supine_volume volume;
@@ -56,8 +56,8 @@ typedef struct supine_state {
 /** Parse a state: "prone", "rest+500", "left:full-300", "0:1:0:rest", "left=rest,right=rest+200".
  *
  * A posture or volume that the text lacks stays as it is in `state`: set defaults first.
- * @retval SUPINE_ERROR_ARGUMENT  no state; `error` suggests what may be meant, and `state` is
- *                                unchanged */
+ * @retval SUPINE_ERROR_ARGUMENT  the text is not a state; `error` suggests what may be meant, and
+ *                                `state` is unchanged */
 SUPINE_API supine_status supine_state_parse(const char *text, supine_state *state,
                                             supine_error *error);
 
@@ -67,13 +67,13 @@ SUPINE_API supine_status supine_state_parse_posture(const char *text, supine_sta
 SUPINE_API supine_status supine_state_parse_volume(const char *text, supine_state *state,
                                                    supine_error *error);
 
-/** Print a state as supine_state_parse reads it: "left:rest+500". Volumes have 9 digits.
- * @param size  bytes of `text`; what does not fit is cut off, and 160 is enough for any state
+/** Print a state as supine_state_parse reads it: "left:rest+500", with up to 9 digits a volume.
+ * @param size  bytes of `text`; longer text is cut off, and 160 bytes are enough for any state
  * @return the length of the whole text, without its NUL */
 SUPINE_API size_t supine_state_print(const supine_state *state, char *text, size_t size);
 
-/** Print a state for people: "left side at rest + 500 mL", without a volume that is the default.
- * Sizes as supine_state_print. */
+/** Print a state in words: "left side at rest + 500 mL"; a default volume is omitted. Parameters
+ * and result as supine_state_print. */
 SUPINE_API size_t supine_state_describe(const supine_state *state, char *text, size_t size);
 
 #ifdef __cplusplus

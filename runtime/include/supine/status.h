@@ -41,7 +41,7 @@ typedef enum supine_status {
   SUPINE_STATUS_COUNT        /**< sentinel: the number of codes above */
 } supine_status;
 
-/** Return a phrase for a status; never NULL, also for values outside the enumeration. */
+/** Return a phrase for a status; never NULL, even for values outside the enumeration. */
 SUPINE_API const char *supine_status_string(supine_status status);
 
 /** The detail of a failure: which file, which vertex, which remedy. The caller owns it and passes
@@ -51,7 +51,9 @@ typedef struct supine_error {
   char message[512]; /**< one line, NUL-terminated, no trailing newline */
 } supine_error;
 
-/** Fill in `error`, unless it is NULL, by a printf format, cut to fit; return `status`. */
+/** Set the status of `error` and its message by a printf format, cut to fit, unless `error` is
+ * NULL.
+ * @return `status` */
 SUPINE_API supine_status supine_error_set(supine_error *error, supine_status status,
                                           const char *format, ...) SUPINE_PRINTF(3, 4);
 

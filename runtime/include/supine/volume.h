@@ -14,8 +14,8 @@
 extern "C" {
 #endif
 
-/** The volume of a lung beyond its reference, as a polynomial of its gains (x, y, z) at given
- * weights:
+/** The volume V of a lung less the volume F of its reference surface, mL, as a polynomial of its
+ * gains (x, y, z) at given weights:
  *
  *     V - F = of . (x, y, z, yz, xz, xy, xyz) */
 typedef struct supine_volume_form {
@@ -49,8 +49,9 @@ SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const d
 /** Compute the cubic at s = `scale`. */
 SUPINE_API double supine_volume_at(const double cubic[3], double scale);
 
-/** Find the scale at which the cubic is `volume`, on the way from 0 where it is monotone.
- * @retval SUPINE_ERROR_NUMERICAL  there is none: the surface folds before, or nothing moves */
+/** Find the scale at which the cubic is `volume`, in the interval around 0 in which it is monotone.
+ * @retval SUPINE_ERROR_NUMERICAL  there is none: the surface folds before, or the volume does not
+ *                                 change with the scale */
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                              supine_error *error);
 
@@ -60,18 +61,19 @@ SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volum
  *     ratio_j = sigma + 2 bend_j e(sigma)
  *     e = (sigma^3 - sigma) / 2  for sigma <= 1,   (sigma - 1) / sigma^6  for sigma > 1
  *
- * The diaphragm (z) does most of a quiet breath, the rib cage (x, y) most of a breath near full
- * inflation (Verschakelen 1995, n 120). Below rest the bend fades: it would turn triangles over. A
- * bend of 0 is a straight line.
+ * The diaphragm (z) makes most of a quiet breath, the rib cage (x, y) most of a breath near full
+ * inflation (Verschakelen 1995, 120 subjects). Below rest (sigma > 1) the bend fades, as it would
+ * turn triangles over. A bend of 0 gives a straight path.
  * @param ratio  [3], written */
 SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ratio[3]);
 
-/** Find the gains on the path at which a lung holds a volume.
- * @param bend    [3] of the path
- * @param rest    mL beyond the reference at rest; unused if the bend is 0
- * @param volume  mL beyond the reference
+/** Find the gains on the path of supine_volume_bend at which a lung holds a volume.
+ * @param bend    [3] bend of the path
+ * @param rest    volume at rest, mL above the reference; unused if the bend is 0
+ * @param volume  wanted volume, mL above the reference
  * @param gains   [3], written
- * @retval SUPINE_ERROR_NUMERICAL  there are none: the surface folds before, or nothing moves */
+ * @retval SUPINE_ERROR_NUMERICAL  there are none: the surface folds before, or the volume does not
+ *                                 change with the gains */
 SUPINE_API supine_status supine_volume_form_gains(const supine_volume_form *form,
                                                   const double bend[3], double rest, double volume,
                                                   double gains[3], supine_error *error);
