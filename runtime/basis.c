@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Open basis files: every tensor is checked before anything uses it. */
+/* Open basis files, and check every tensor before anything uses it. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@
 #include "runtime/internal.h"
 #include "runtime/safetensors/platform.h"
 
-/* The file that is being checked, its name and where a failure is reported. */
+/* The file that is being checked, its name, and the error that a failure fills in. */
 typedef struct check {
   const supine_safetensors *file;
   const char *name;
@@ -27,9 +27,10 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s", c->name, detail);
 }
 
-/* No lung has a number of 2^30 or more in any unit here; with all below it, sums over 256 modes of
- * the products of three stay finite. The exponent decides, also for what is infinite or NaN:
- * without a branch an element, so that it runs at the speed of memory. */
+/* Check that all numbers are finite and below 2^30 in size. No number of a lung is larger in any
+ * unit used here, and below this limit sums over 256 modes of products of three numbers stay
+ * finite. Only the exponent bits are compared, which also refuses infinity and NaN, without a
+ * branch for each element: this runs at the speed of memory. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -48,11 +49,12 @@ static bool finite_doubles(const double *values, size_t count) {
   return bad == 0;
 }
 
-/* An axis of any length. */
+/* The length of an axis that may have any length. */
 #define ANY SIZE_MAX
 
-/* Find the numbers of a tensor of this type and shape, all finite; axes that are ANY are filled in.
- * NULL with the reason if the file has not got it. */
+/* Find the numbers of a tensor of this type and shape, and check that they are finite; set axes of
+ * `shape` that are ANY to the tensor's. Return NULL and set the error if the file has no such
+ * tensor. */
 static const void *want(const check *c, const char *name, supine_dtype dtype, size_t rank,
                         size_t *shape) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, name);
@@ -65,7 +67,7 @@ static const void *want(const check *c, const char *name, supine_dtype dtype, si
     shape[i] = shape[i] == ANY ? tensor->shape[i] : shape[i];
     count *= shape[i];
     if (tensor->shape[i] != shape[i]) {
-      (void)refuse(c, "axis %zu of tensor '%s' is %zu instead of %zu", i, name, tensor->shape[i],
+      (void)refuse(c, "axis %zu of tensor '%s' has length %zu, not %zu", i, name, tensor->shape[i],
                    shape[i]);
       return NULL;
     }
@@ -93,7 +95,7 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
   }
   info->volume_axes = version[0] == '3' ? 3 : 1;
   if (kind == NULL || (strcmp(kind, "scalar") != 0 && strcmp(kind, "vector") != 0)) {
-    return refuse(c, "the kind in the file is neither scalar nor vector");
+    return refuse(c, "metadata kind is neither scalar nor vector");
   }
   info->vector = strcmp(kind, "vector") == 0;
   return supine_safetensors_verify(c->file, c->error);
@@ -154,11 +156,11 @@ static supine_status check_modes(const check *c, supine_basis *basis) {
   }
   return shape[1] == supine_sh_count(info->band)
              ? SUPINE_OK
-             : refuse(c, "modes of %zu harmonics, not (L + 1)^2 with L from 0 to %d", shape[1],
-                      SUPINE_SH_BAND_MAX);
+             : refuse(c, "modes have %zu harmonics, which is not (L + 1)^2 for an L from 0 to %d",
+                      shape[1], SUPINE_SH_BAND_MAX);
 }
 
-/* Name the lungs by the metadata, "left,right", and those that it does not name by their number. */
+/* Name the lungs as metadata "lungs" lists them, "left,right"; name the others by their index. */
 static void name_lungs(const check *c, supine_basis *basis) {
   const char *at = supine_safetensors_metadata(c->file, "lungs");
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
@@ -174,6 +176,7 @@ static void name_lungs(const check *c, supine_basis *basis) {
   basis->info.lung_names = basis->name_of;
 }
 
+/* Compute the box around each lung of the reference surface; an empty lung has a box of zeros. */
 static void bound_lungs(supine_basis *basis) {
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     if (basis->lung_begin[lung] == basis->lung_begin[lung + 1]) {
@@ -204,7 +207,7 @@ static size_t named_lungs(const check *c) {
 }
 
 /* Find where each lung's vertices begin: they are grouped by lung, 0 ... 0 1 ... 1 2 ... A lung
- * that the metadata names may be empty, as content may lie in one lung alone. */
+ * that the metadata names may be empty, as embedded content may lie in one lung only. */
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t n = info->vertex_count;
@@ -225,8 +228,9 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
     }
   }
   if (at != n) {
-    return refuse(c, "vertex %zu is of lung %u: vertices must be grouped by lung, 0 to at most %d",
-                  at, lung[at], SUPINE_LUNGS_MAX - 1);
+    return refuse(
+        c, "vertex %zu belongs to lung %u: vertices must be grouped by lung, 0 to at most %d", at,
+        lung[at], SUPINE_LUNGS_MAX - 1);
   }
   while (count < named) {
     basis->lung_begin[count++] = n;
@@ -239,7 +243,8 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Volume forms are optional, all or none; the first two have an axis more since version 3. */
+/* Check the volume forms, which are optional: all three or none. Since version 3, the first two
+ * have one more axis. */
 static supine_status check_volume(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t g = info->lung_count;
@@ -263,8 +268,8 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
              : SUPINE_ERROR_FORMAT;
 }
 
-/* Read the numbers, separated by commas, of a metadata string; where the file lacks it, they stay.
- */
+/* Read the numbers, separated by commas, of a metadata string. If the file lacks it, leave `values`
+ * as they are. */
 static supine_status read_numbers(const check *c, const char *key, size_t count, double *values) {
   const char *const text = supine_safetensors_metadata(c->file, key);
   const char *at = text;
@@ -272,7 +277,8 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
     char *end = NULL;
     values[i] = strtod(at, &end);
     if (end == at || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
-      return refuse(c, "metadata %s is no list of %zu numbers: %.48s", key, count, text);
+      return refuse(c, "metadata %s is not a list of %zu finite number%s: %.48s", key, count,
+                    count == 1 ? "" : "s", text);
     }
     at = end + 1;
   }
@@ -307,7 +313,8 @@ static void measure_lungs(supine_basis *basis) {
   }
 }
 
-/* Find the volume of the reference surface. Content is not that surface: its file states it. */
+/* Find the volume of each lung of the reference surface: measure it or, in a file of embedded
+ * content, whose vertices are not that surface, read it from the metadata. */
 static supine_status check_reference(const check *c, supine_basis *basis) {
   basis->info.reference_volume = basis->reference_volume;
   if (!basis->info.has_volume) {
@@ -321,9 +328,7 @@ static supine_status check_reference(const check *c, supine_basis *basis) {
   return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* Read the scan's state. A file of fields, or of a scan taken as it is, has its surface as
- * reference.
- */
+/* Read the state of the scan. Without metadata, the scan is the reference surface, supine. */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
@@ -344,10 +349,11 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
   }
   return supine_safetensors_metadata(c->file, "bend") == NULL || basis->rest_by_lung
              ? SUPINE_OK
-             : refuse(c, "bend without volumes at rest by lung");
+             : refuse(c, "metadata bend requires tensor 'resting_volume' by lung");
 }
 
-/* Volumes at rest: by lung, or of all lungs together in files of version 1 and 2. */
+/* Check the volumes at rest, which are optional: by lung, or of all lungs together in files of
+ * versions 1 and 2. */
 static supine_status check_rest(const check *c, supine_basis *basis) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
   if (tensor == NULL) {
@@ -361,7 +367,7 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
   return basis->resting != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Normals are optional: the modes and their weights, or neither. */
+/* Check the normals, which are optional: the modes and their weights, or neither. */
 static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t terms = supine_basis_normal_terms(basis);
@@ -386,7 +392,8 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Choose the kernels and pack. AUTO takes the smallest storage that is accurate enough. */
+/* Choose the kernels and pack the tensors. For AUTO, choose the smallest storage that is accurate
+ * enough. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
   static const double error_limit = 0.005; /* mm */
@@ -394,13 +401,14 @@ static supine_status prepare(const check *c, supine_basis *basis,
   supine_simd simd = options->simd;
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
       simd >= SUPINE_SIMD_COUNT) {
-    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT, "unknown storage or code: %d, %d",
+    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT,
+                            "unknown storage %d or instruction set %d: see supine_basis_options",
                             (int)storage, (int)simd);
   }
   basis->kernels = supine_kernels_choose(&simd);
   if (basis->kernels == NULL) {
     return supine_error_set(c->error, SUPINE_ERROR_UNSUPPORTED,
-                            "this processor or build lacks the instructions asked for");
+                            "this processor or build lacks the instruction set: choose AUTO");
   }
   basis->info.simd = simd;
   const bool choose = storage == SUPINE_STORAGE_AUTO;
@@ -437,7 +445,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   return SUPINE_OK;
 }
 
-/* Copy options; those that an older program does not know of are zero. */
+/* Copy the options; set those to 0 that the struct of an older program lacks. */
 static supine_status take_options(const check *c, const supine_basis_options *options,
                                   supine_basis_options *taken) {
   const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
@@ -454,7 +462,7 @@ static supine_status take_options(const check *c, const supine_basis_options *op
   return SUPINE_OK;
 }
 
-/* Rigid parts are optional: ranges of vertices, each in one lung. */
+/* Check the rigid parts, which are optional: ranges of vertices, each in one lung. */
 static supine_status check_rigid(const check *c, supine_basis *basis) {
   const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
   if (rigid == NULL) {
@@ -470,14 +478,14 @@ static supine_status check_rigid(const check *c, supine_basis *basis) {
     }
   }
   if (!well) {
-    return refuse(c, "rigid must be ranges of vertices, [R, 2], each in one lung");
+    return refuse(c, "tensor 'rigid' must hold ranges of vertices [R, 2], each in one lung");
   }
   basis->rigid = rigid->data;
   basis->rigid_count = rigid->shape[0];
   return SUPINE_OK;
 }
 
-/* Open a basis; the file is its own from here on, and closed on failure. */
+/* Open a basis, which takes over `file`; on failure, close the file. */
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {

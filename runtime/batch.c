@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Evaluate many poses at once: a block of tiles is converted to floats once, and stays in the cache
- * while every pose reads it. */
+/* Evaluate many poses at once: convert a block of tiles to floats once, so that it stays in the
+ * cache while it is evaluated for every pose. */
 #include <string.h>
 
 #include "runtime/internal.h"
 
 enum {
-  BLOCK_TILES = 23,
-  BLOCK_BYTES = 32768,   /* of tiles as floats, less than a first-level cache */
-  WEIGHT_NUMBERS = 4096, /* folded weights of a group of poses */
-  GROUP = 256            /* most poses of a group */
+  BLOCK_TILES = 23,      /* largest number of tiles of a block */
+  BLOCK_BYTES = 32768,   /* bytes of a block of tiles as floats, less than a first-level cache */
+  WEIGHT_NUMBERS = 4096, /* number of folded weights of a group of poses */
+  GROUP = 256            /* largest number of poses of a group */
 };
 
 typedef struct block {
@@ -18,9 +18,9 @@ typedef struct block {
   float held[GROUP][16]; /* see supine_target */
 } block;
 
-/* Evaluate whole tiles of one lung for a group of poses. `positions` belongs to pose 0, and those
- * of the next pose are `apart` numbers on. Nine parameters: a range of tiles and its target, in the
- * innermost call but one. */
+/* Evaluate whole tiles of one lung for a group of poses. `positions` are those of pose 0; those of
+ * pose j begin j * apart floats later. Its nine parameters describe the poses, a range
+ * of tiles and where its positions are written. */
 static void batch_tiles(const supine_basis *basis, size_t count, block *scratch, supine_tiles *wide,
                         size_t first, size_t tiles, float *positions, size_t apart, bool stream) {
   const size_t fit = BLOCK_BYTES / wide->stride;
@@ -59,8 +59,8 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const supine_p
     if (first >= last) {
       continue;
     }
-    /* Whole tiles are evaluated in blocks; vertices before and after them, or all if one tile
-     * outgrows the block, pose by pose. */
+    /* Whole tiles are evaluated in blocks. Vertices before and after them are evaluated pose by
+     * pose; so are all vertices if one tile is larger than a block. */
     size_t from = (first + TILE - 1) / TILE * TILE;
     size_t to = last / TILE * TILE;
     if (from >= to || wide.stride > BLOCK_BYTES) {

@@ -43,7 +43,8 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   return SUPINE_OK;
 }
 
-/* Return how far a moment is along its limb, linear in time: 0 at rest, 1 at the peak. */
+/* Compute how far along its limb the breath is at a time, linear in time: 0 at rest, 1 at the peak.
+ */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -55,13 +56,15 @@ static double breath_share(const supine_pv_breath *breath, double time, supine_p
   return (1.0 - phase) / (1.0 - breath->inhale_fraction);
 }
 
+/* The P-V loop of one breath. */
 typedef struct loop {
-  double rest, peak; /* cmH2O */
+  double rest, peak; /* pressures, cmH2O */
   supine_limb limb[SUPINE_PV_LIMB_COUNT];
-  double volume[SUPINE_PV_LIMB_COUNT]; /* mL at rest */
-  double gain[SUPINE_PV_LIMB_COUNT];   /* mL from rest to peak */
+  double volume[SUPINE_PV_LIMB_COUNT]; /* volume at rest, mL */
+  double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained from rest to peak, mL */
 } loop;
 
+/* Check both limbs, and that their ranges hold a pressure, named `what` in messages. */
 static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
@@ -96,8 +99,8 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   const double full = rest + breath->tidal;
   if (full > inhale->volume[1]) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "tidal volume %g mL is more than the %g mL that the inhale limb holds "
-                            "above its volume at %g cmH2O",
+                            "tidal volume %g mL is larger than the %g mL that the inhale limb "
+                            "gains above %g cmH2O",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
   status = supine_limb_pressure(&cycle->limb[SUPINE_PV_INHALE], full, &cycle->peak);
@@ -121,7 +124,8 @@ static double between(double value, double low, double high) {
   return value < low ? low : value > high ? high : value;
 }
 
-/* Compute one moment: volume from pressure or, at constant flow, pressure from volume. */
+/* Compute volume and pressure at a time: volume from pressure or, at constant flow, pressure from
+ * volume. */
 static supine_status follow(const supine_pv_breath *breath, const loop *cycle, double time,
                             double *volume, double *pressure, supine_error *error) {
   static const double pi = 3.14159265358979323846;
@@ -167,7 +171,7 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
   }
   if (pv == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "this breath needs a pressure-volume relation");
+                            "this breath needs a pressure-volume relation: pass pv");
   }
   loop cycle;
   status = loop_begin(pv, breath, &cycle, error);

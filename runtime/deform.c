@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute positions x_ij = p_ij + A_j (w . c_i) d_ij, in runs of whole tiles of one lung. */
+/* Compute positions x_ij = p_ij + A_j (w . c_i) d_ij, as many whole tiles of one lung at a time as
+ * possible. */
 #include <string.h>
 
 #include "runtime/rigid.h"
@@ -24,8 +25,8 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
   return moved;
 }
 
-/* Evaluate vertices begin <= i < end of one tile: the whole tile into a buffer, and copy the part.
- */
+/* Evaluate vertices begin <= i < end of one tile: evaluate the whole tile into a buffer, and copy
+ * these vertices. */
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
@@ -64,7 +65,7 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
   }
 }
 
-enum { RIGID_BLOCK = 256 }; /* vertices evaluated at once */
+enum { RIGID_BLOCK = 256 }; /* number of vertices evaluated at once */
 
 void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {

@@ -6,8 +6,8 @@
 
 #include "runtime/locate.h"
 
-static const double resting_spread =
-    0.05; /* standard deviation of the volume at rest, over the full one */
+/* Standard deviation of an assumed volume at rest, as a fraction of the reference volume. */
+static const double resting_spread = 0.05;
 const double supine_expected_shift = 0.01;
 
 double supine_expected_constant(const supine_basis *basis) {
@@ -77,10 +77,11 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* The two poses, and the same with 1 % more volume where rest is assumed. */
+/* The two poses and, for states that count from an assumed rest, the same with 1 % of the reference
+ * volume more. */
 typedef struct poses {
   supine_pose at, from, fuller_at, fuller_from;
-  bool assumed;
+  bool assumed; /* at least one of the states counts from an assumed rest */
 } poses;
 
 static supine_status find_poses(const supine_basis *basis, const supine_state *state,

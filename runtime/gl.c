@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fill vertex attributes and uniforms of supine.glsl. */
+/* Fill the vertex attributes and uniforms of supine.glsl. */
 #include <string.h>
 
 #include "runtime/internal.h"

@@ -8,15 +8,15 @@
 
 #include "runtime/kernels/tiles.h"
 
-/** Harmonics of bands 0 to 2. */
+/** Number of harmonics of the volume at rest, bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
-/** Store past the caches if the tiles and positions of one frame, or the positions of a batch, have
- * more bytes than this, unless a range has at most STREAM_RANGE vertices, which its caller reads at
- * once. */
+/** Sizes above which positions are written with stores that bypass the caches: bytes of the tiles
+ * and positions of one frame, and bytes of the positions of a batch. A range of at most
+ * STREAM_RANGE vertices is always stored in the caches, as its caller is likely to read it next. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
-/** Room for a lung's name. */
+/** Bytes of a lung's name, with its NUL. */
 enum { LUNG_NAME_SIZE = 32 };
 
 struct supine_basis {
@@ -27,29 +27,30 @@ struct supine_basis {
   const char *name_of[SUPINE_LUNGS_MAX];
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
-  supine_tiles lit;   /**< modes of the normals; bytes is NULL without them */
-  supine_tiles tiles; /**< positions, see tiles.h */
+  supine_tiles lit;   /**< modes of the normals; bytes is NULL if there are none */
+  supine_tiles tiles; /**< coefficients, directions and reference positions, see tiles.h */
   const supine_kernels *kernels;
-  bool stream; /**< store past the cache, which positions outgrow */
+  bool stream; /**< write positions with stores that bypass the caches, see STREAM_BYTES */
   supine_prefetch prefetch;
-  /** Value of one unit of mode k's packed coefficients, times that of the directions. */
+  /** Value of one unit of mode k's packed coefficients times one unit of the packed directions. */
   double mode_scale[SUPINE_MODES_MAX];
-  /** Bounds of mode k on the error of packing and on the displacement, mm at weight and gain 1. */
+  /** Bounds on the packing error and on the displacement of mode k, mm at weight and gain 1. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< mL; info.reference_volume points here */
   const double *resting; /**< harmonics of the volume at rest, mL beyond the reference: [G, 9], or
                             [9] for all lungs together; or NULL */
   bool rest_by_lung;     /**< `resting` is [G, 9]; else all lungs have one gain */
-  double upright_gain;   /**< full inflation upright beyond supine, over the reference volume */
-  double scan_volume;    /**< of the scan beyond the reference, mL */
+  double upright_gain;   /**< volume at full inflation upright less that supine, as a fraction of
+                            the reference volume */
+  double scan_volume;    /**< volume of the scan less that of the reference surface, mL */
   double scan_gravity[3];
   const uint32_t *rigid; /**< [rigid_count, 2], see rigid.h */
   size_t rigid_count;
-  double rest_error; /**< largest error of a rest position, mm */
-  double rest_size;  /**< bound on the distance of a rest position from 0, mm */
+  double rest_error; /**< largest packing error of a reference position, mm */
+  double rest_size;  /**< bound on the distance of a reference position from the origin, mm */
 };
 
-/** Pack the tensors into tiles of a storage, not AUTO; tiles packed before are freed.
+/** Pack the tensors into tiles of a storage, not AUTO; free tiles packed before.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
 
@@ -77,20 +78,21 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
 void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target);
 
-/** Return a target moved on by `count` vertices. */
+/** Return the target that begins `count` vertices after this one. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
 /** Compute supine_basis_info.storage_error of the present tiles. */
 double supine_basis_storage_error(const supine_basis *basis);
 
-/** Compute the factors of the kernels: weights times the units of the packed coefficients, then the
- * three gains of a lung.
+/** Compute the factors that the kernels multiply by: K weights times the units of the packed
+ * coefficients, then the three gains of a lung.
  * @param folded  [K + 3], written */
 void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded);
 
-/** Fill in one gain for all lungs and axes, at which they hold `volume` mL beyond the reference.
- * @param pose  with its weights
- * @retval SUPINE_ERROR_NUMERICAL */
+/** Set the gains of a pose to the one gain for all lungs and axes at which the lungs hold `volume`
+ * mL more than the reference surface.
+ * @param pose  its weights are read, its gains written
+ * @retval SUPINE_ERROR_NUMERICAL  there is none */
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);
 
 #endif

@@ -71,7 +71,7 @@ static int column_of(size_t term, size_t axis, double *sign) {
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
-/* Fill the columns and multiply them by L^-1. */
+/* Compute the centre, and multiply the columns by L^-1. */
 static void whiten(supine_kriging *fit) {
   const size_t n = fit->count;
   memset(fit->centre, 0, sizeof fit->centre);
@@ -106,8 +106,9 @@ static bool absent(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
-/* Compute the terms' normal equations, A = X' K^-1 X + P and X' K^-1 y. The row of an absent term
- * is that of the identity. */
+/* Compute the normal equations of the terms, with matrix A = X' K^-1 X + P and right side
+ * X' K^-1 y + P m, where P and m are the prior's inverse covariance and mean. The row of an absent
+ * term is that of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -140,7 +141,7 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* Compute the terms, their covariance A^-1, and that covariance summed over columns. */
+/* Compute the terms, their covariance A^-1, and the covariance of the columns' factors. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
   double inverse[TERMS][TERMS]; /* row k: L^-1 e_k */
@@ -230,8 +231,8 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   return SUPINE_OK;
 }
 
-/* Compute the block of a point in Q = K^-1 - K^-1 X A^-1 X' K^-1: the inverse covariance of its
- * residual from all others.
+/* Compute the 3 x 3 block of point j in Q = K^-1 - K^-1 X A^-1 X' K^-1: the inverse covariance of
+ * its residual less the prediction by all other points.
  * @param row  [n] L^-1 e_j */
 static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
   const size_t n = fit->count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Predict the field and its variance at many points, RUN of them at a time. */
+/* Predict residuals and their variance at many points, RUN of them at a time. */
 #include <math.h>
 #include <string.h>
 
@@ -7,11 +7,11 @@
 
 enum { RUN = 32, COLUMNS = SUPINE_KRIGING_TERMS };
 
-/* RUN targets, stored by axis; the last target is repeated to fill the run. */
+/* RUN points of a target, stored by axis; the last point is repeated to fill the run. */
 typedef struct run {
-  float place[3][RUN]; /* p - c */
-  float volume[3][RUN];
-  float root[RUN]; /* sqrt of the axis variance of g */
+  float place[3][RUN];  /* p - c, mm */
+  float volume[3][RUN]; /* v, mm */
+  float root[RUN];      /* standard deviation of g on one axis, mm */
 } run;
 
 static void fill(const supine_kriging *fit, const supine_kriging_target *target, size_t begin,
@@ -29,8 +29,8 @@ static void fill(const supine_kriging *fit, const supine_kriging_target *target,
   }
 }
 
-/* Compute the covariances of a run with point j. exp(-a) is (exp(-a / 64))^64 by a polynomial of
- * degree 5: the relative error is 1e-6. */
+/* Compute the covariances of a run with observed point j. exp(-a) is computed as (exp(-a / 64))^64
+ * by a polynomial of degree 5, with a relative error of 1e-6. */
 static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *in, float *out) {
   const supine_kriging_point *p = &fit->points[j];
   const double size = p->size > fit->model.least ? p->size : fit->model.least;
@@ -66,7 +66,7 @@ static void project(size_t count, float (*w)[RUN], const double *numbers, float 
   }
 }
 
-/* Solve L w = k, k the covariances of a run with all points. */
+/* Solve L w = k, where k are the covariances of a run with all observed points. */
 static void solve(const supine_kriging *fit, size_t lung, const run *in, float (*w)[RUN]) {
   const size_t n = fit->count;
   for (size_t j = 0; j < n; ++j) {
@@ -86,8 +86,8 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
   }
 }
 
-/* Compute the variance 3 (k(q, q) - w'w) + m' spread m, m the columns at q minus w' times those of
- * the points. */
+/* Compute the variance 3 (k(q, q) - w'w) + m' spread m at points q, where m is the columns at q
+ * less w' times L^-1 times the columns of the observed points. */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

@@ -7,13 +7,14 @@
 
 #include <supine/breath.h>
 
-/** Parts of a limb's range. Within their bounds the control parameters change the compliance by at
- * most e^500 over the range, so by e^16 over a part, which 16 points integrate to 1e-15. */
+/** Number of equal parts into which a limb's range is divided for integration. Within their bounds,
+ * the control parameters change the compliance by at most e^500 over the range, and so by at most
+ * e^16 over a part, which a rule of 16 points integrates to 1e-15. */
 enum { LIMB_PARTS = 32 };
 
 typedef struct supine_limb {
   supine_pv_curve curve;
-  double sum[LIMB_PARTS + 1]; /**< I(x) at the parts' ends */
+  double sum[LIMB_PARTS + 1]; /**< I(x) at the ends of the parts (supine_breath_curve_evaluate) */
 } supine_limb;
 
 /** Integrate a curve that supine_breath_curve_check accepts. */
@@ -22,8 +23,8 @@ void supine_limb_begin(const supine_pv_curve *curve, supine_limb *limb);
 /** Compute V(P) and dV/dP (NULL: not wanted); a pressure outside the range counts as its end. */
 double supine_limb_volume(const supine_limb *limb, double pressure, double *compliance);
 
-/** Compute P(V) of a volume within the range, to 1e-11 of the range's volumes.
- * @retval SUPINE_ERROR_NUMERICAL  not found */
+/** Compute P(V) of a volume within the range, to within 1e-11 of the range of volumes.
+ * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 supine_status supine_limb_pressure(const supine_limb *limb, double volume, double *pressure);
 
 #endif

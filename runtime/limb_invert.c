@@ -13,7 +13,7 @@ supine_status supine_limb_pressure(const supine_limb *limb, double volume, doubl
   const double share = (volume - curve->volume[0]) / span;
   double low = curve->pressure[0];
   double high = curve->pressure[1];
-  double before = HUGE_VAL; /* |V - volume| of the last pressure tried */
+  double before = HUGE_VAL; /* |V - volume| at the pressure before, mL */
   double at = (1.0 - share) * low + share * high;
   for (int step = 0; step < STEPS_MAX; ++step) {
     double compliance = 0.0;
@@ -30,7 +30,8 @@ supine_status supine_limb_pressure(const supine_limb *limb, double volume, doubl
       *pressure = inside ? next : at; /* Newton's last step costs nothing */
       return SUPINE_OK;
     }
-    /* A Newton step, or the bracket's middle where that leaves it or does not halve the miss. */
+    /* Take the Newton step, or the middle of the bracket if the step leaves it or if the last step
+     * did not halve the error. */
     if (!inside || miss > 0.5 * before) {
       next = low + 0.5 * (high - low);
     }

@@ -8,9 +8,10 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-enum { BATCH_BYTES = 32768 }; /* of tiles that stay in the first-level cache during a batch */
+/* Bytes of the tiles that a batch evaluates at once, which stay in the first-level cache. */
+enum { BATCH_BYTES = 32768 };
 
-/* Pack the normals of 16 vertices, whose modes begin at `row`. */
+/* Pack the normals of 16 vertices, the modes of each of which begin at its `row`. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
                                     unsigned char *to) {
   const size_t words = supine_tiles_normal_words(tiles->modes);
@@ -96,7 +97,7 @@ void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *p
   }
 }
 
-/* Compute the factors of the kernel for one lung. */
+/* Compute the factors that the kernel multiplies by for one lung. */
 static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, pose, v);
@@ -110,7 +111,7 @@ static void light(const supine_basis *basis, const supine_pose *pose, size_t beg
                   bool stream, float *normals) {
   const supine_target target = {
       .x = normals, .stream = stream, .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* words are filled up to three modes */
+  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* weights 0 for missing modes of the words */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
@@ -153,7 +154,7 @@ supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
       3.0 * (double)(end - begin) * (double)count * sizeof *normals > STREAM_BATCH_BYTES;
   const size_t fit = BATCH_BYTES / basis->lit.stride;
   const size_t step = TILE * (fit > 0 ? fit : 1);
-  for (size_t at = begin; at < end;) { /* a block of tiles after the other, for every pose */
+  for (size_t at = begin; at < end;) { /* block by block of tiles, each for every pose */
     const size_t next = (at / step + 1) * step;
     const size_t last = next < end ? next : end;
     for (size_t j = 0; j < count; ++j) {

@@ -8,27 +8,29 @@
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX, "one limit");
 
-static const double prior_spread = 0.17; /* prior standard deviation of the volume, of the full one:
-                                          * 0.3 of the way from rest (0.43) to full */
-static const double outlier_limit = 3.0; /* of sigma */
-static const double outlier_noise = 300; /* mm: noise that an outlier is given */
-static const double volume_step = 1;     /* mL: a smaller step ends the search */
-static const double angle_step = 1e-4;   /* rad: a smaller step ends the search */
-static const double sill_of_error = 4.0 / 3; /* sill s over the expected-error constant c: 6 mm over
-                                              * 4.5; c holds after a translation, which explains
-                                              * the difference */
+/* Prior standard deviation of the volume as a fraction of the reference volume: 0.3 of the way from
+ * rest (0.43 of that volume) to full inflation. */
+static const double prior_spread = 0.17;
+static const double outlier_limit = 3.0; /* smallest residual of an outlier, in sigma */
+static const double outlier_noise = 300; /* noise that an outlier is given, mm */
+static const double volume_step = 1;     /* step below which the search ends, mL */
+static const double angle_step = 1e-4;   /* step below which the search ends, rad */
+/* Ratio of the sill s to the constant c of the expected error: 6 mm to 4.5 mm. They differ as c was
+ * measured after the best translation. */
+static const double sill_of_error = 4.0 / 3;
 
+/* Largest number of Gauss-Newton steps, and of halvings of one change of the volume. */
 enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
-/* Inputs and working space of one call. */
+/* Inputs, outputs and work space of one call. */
 typedef struct study {
   const supine_locate_task *task;
   supine_location *found;
   supine_locate_fit *fit;
   supine_kriging_point *points; /* [n] */
   double *law;                  /* [n, 3] the law's positions in the state, mm */
-  double *kriging;
-  double *scratch; /* [n] */
+  double *kriging;              /* [supine_kriging_space(n)] */
+  double *scratch;              /* [n] */
 } study;
 
 static size_t doubles_of(size_t bytes) {
@@ -65,8 +67,9 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
     const double sum = o->position[0] + o->position[1] + o->position[2];
     if (o->vertex >= n || !isfinite(sum) || !(o->noise > 0) || !isfinite(o->noise)) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "observation %zu: vertex %zu of %zu, or numbers out of range", j + 1,
-                              o->vertex, n);
+                              "observation %zu: vertex %zu of %zu vertices is out of range, or its "
+                              "position or noise is not finite or not positive",
+                              j + 1, o->vertex, n);
     }
   }
   return SUPINE_OK;
@@ -81,7 +84,8 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
   }
 }
 
-/* Set what does not depend on the state: scan positions, lungs, noise and the fit's options. */
+/* Set the members that do not depend on the state: scan positions, lungs, noise and the fit's
+ * options. */
 static supine_status begin(study *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
@@ -117,7 +121,8 @@ static void turn(const double rotation[9], const double x[3], double turned[3]) 
   }
 }
 
-/* Compute the law's positions in the state, and their derivative by the volume. */
+/* Compute the law's positions in the state, and their change by one prior standard deviation of the
+ * volume. */
 static supine_status evaluate(study *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
@@ -146,7 +151,8 @@ static supine_status evaluate(study *s, supine_error *error) {
   return status;
 }
 
-/* Compute the translation between the means, and the residuals in the body's axes. */
+/* Compute the translation that takes the mean of the law's points to the mean of the observed, and
+ * the residuals in the body's axes. */
 static void find_residuals(study *s) {
   const size_t n = s->task->count;
   supine_location *found = s->found;
@@ -174,11 +180,11 @@ static void find_residuals(study *s) {
   }
 }
 
-/* Set the rotation that fits the points best, as a start. */
+/* Set the rotation to the one that fits the law's points best, as a start of the search. */
 static void rotate_roughly(study *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
-  const double *c = s->fit->origin; /* between means, as nothing is turned yet */
+  const double *c = s->fit->origin; /* difference of the means, as the rotation is the identity */
   double mean[3] = {0};
   const size_t n = s->task->count;
   for (size_t j = 0; j < 3 * n; ++j) {
@@ -195,7 +201,7 @@ static void rotate_roughly(study *s) {
   supine_rigid_rotation((const double(*)[3])h, s->found->rotation);
 }
 
-/* Multiply R by exp(r), by Rodrigues' formula. */
+/* Multiply the rotation R from the right by exp(r), by Rodrigues' formula. */
 static void rotate_further(double rotation[9], const double r[3]) {
   const double angle = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
   if (angle == 0) {
@@ -221,7 +227,8 @@ static void rotate_further(double rotation[9], const double r[3]) {
   memcpy(rotation, product, sizeof product);
 }
 
-/* Change the volume; halve the change while no pose has the new volume. */
+/* Change the volume by `ml`, at most by half its prior standard deviation; halve the change while
+ * no pose has the new volume. */
 static supine_status change_volume(study *s, double ml, supine_error *error) {
   const double most = 0.5 * s->fit->deviation;
   const double before = s->found->state.volume.ml;

@@ -8,29 +8,32 @@
 
 #include "runtime/kriging.h"
 
-enum { LOCATE_BLOCK = 256 }; /* vertices evaluated at once */
+/** Number of vertices evaluated at once. */
+enum { LOCATE_BLOCK = 256 };
 
 /** A fit, at the start of the caller's workspace. */
 typedef struct supine_locate_fit {
   supine_kriging kriging;
   supine_kriging_options options;
-  double origin[3]; /**< where the rotated body's origin is put before the fit's terms, mm */
-  double deviation; /**< prior standard deviation of the volume, mL; 0 where it is known */
+  double origin[3]; /**< translation of the rotated body, without the fitted translation, mm */
+  double deviation; /**< prior standard deviation of the volume, mL; 0 if it is known */
 } supine_locate_fit;
 
-/** c of a file, mm. */
+/** Return the constant c of the expected error of a file, mm. */
 double supine_expected_constant(const supine_basis *basis);
 
-/** Compute the volume of the reference surface, mL, and the share of it by which
- * supine_expected_shifted shifts. */
+/** Compute the volume of all lungs of the reference surface, mL. */
 double supine_expected_reference(const supine_basis *basis);
+
+/** Volume that supine_expected_shifted adds, as a fraction of the reference volume: 0.01. */
 extern const double supine_expected_shift;
 
-/** Compute the RMS over all vertices of the displacement between two poses, mm. */
+/** Compute the RMS of the displacement between two poses over all vertices, mm. */
 double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
                            const supine_pose *from);
 
-/** Compute the pose whose volumes are 1 % of the reference volume above a state's.
+/** Compute the pose of a state with 1 % of the reference volume added, in equal parts to lungs that
+ * the state names.
  * @retval those of supine_basis_pose */
 supine_status supine_expected_shifted(const supine_basis *basis, const supine_state *state,
                                       supine_pose *pose, supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute positions and expected errors of every vertex from a fit. */
+/* Compute the positions and expected errors of every vertex from a fit. */
 #include <math.h>
 
 #include "runtime/locate.h"
@@ -33,7 +33,7 @@ static supine_status find_poses(const supine_location *found, const supine_basis
   return status;
 }
 
-/* Positions of a block of vertices, and input and output of the prediction. */
+/* Positions of a block of vertices, and the input and output of its prediction. */
 typedef struct block {
   float law[3 * LOCATE_BLOCK], scan[3 * LOCATE_BLOCK], volume[3 * LOCATE_BLOCK];
   float size[LOCATE_BLOCK];
@@ -65,9 +65,10 @@ static void predict(const supine_location *found, const supine_basis *basis, con
   supine_kriging_predict(&fit->kriging, &target, b->shift, b->variance);
 }
 
-/* Convert to the frame of the observations, and bound the error by the one without observations.
- * That one holds after the best translation, which three points determine well enough; with two the
- * bound would understate the error by a factor of 0.85. */
+/* Convert to the frame of the observations, and bound the expected error by the one without
+ * observations. That one holds after the best translation, which three points determine well
+ * enough; with two, the bound would understate the error by a factor of 0.85. It does not include
+ * the error of a fitted rotation. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Packing a basis into tiles, and what that costs in accuracy. */
+/* Pack a basis into tiles, and bound the error of packing. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -9,34 +9,37 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 * 4096, /* what all of fixed_narrow's numbers reach */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* a value within the range of all numbers of fixed_narrow */
   FLOAT_FRACTION_BITS = 23
 };
 
-/* One tile before it is packed: coefficients [axes][K][16], direction and rest [48]. */
+/* One tile before it is packed: coefficients [axes, K, 16], directions and reference positions
+ * [48].
+ */
 typedef struct source {
   float coefficients[3 * SUPINE_MODES_MAX * TILE];
   float direction[TILE_NUMBERS];
   float rest[TILE_NUMBERS];
 } source;
 
-/* Values of one packed unit, and the largest errors so far. */
+/* Values of one packed unit, and the largest squared errors so far. */
 typedef struct work {
-  double mode[SUPINE_MODES_MAX]; /* mm */
-  double direction;
-  double rest;            /* mm, a power of two */
-  float direction_square; /* largest squared error of a direction, and of a rest position, mm^2 */
-  float rest_square;
+  double mode[SUPINE_MODES_MAX]; /* unit of a coefficient of each mode, mm */
+  double direction;              /* unit of a direction */
+  double rest;                   /* unit of a reference position, mm, a power of two */
+  float direction_square;        /* largest squared error of a direction */
+  float rest_square;             /* largest squared error of a reference position, mm^2 */
   source source;
 } work;
 
-/* Return 0 for numbers so small that products with them would be subnormal, and slow. */
+/* Replace numbers by 0 that are so small that products with them would be subnormal, and slow. */
 static float flush(float value) {
   return fabsf(value) < 1e-30F ? 0 : value;
 }
 
-/* Return the length by which compact storages divide a vertex's direction and multiply its
- * coefficients, so that one unit of each suits all vertices; 1 where there is none. */
+/* Compute the length of a vertex's direction: compact storages divide the direction by it and
+ * multiply the coefficients, so that one unit suits all vertices. 1 for a direction of 0 or a
+ * vector field. */
 static double direction_length(const supine_basis *basis, size_t i) {
   double square = 0;
   for (size_t axis = 0; axis < 3 && basis->info.direction != NULL; ++axis) {
@@ -89,23 +92,25 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
   }
 }
 
-/* Return 2^e such that `top` is about 2^31 of it, within what fixed_scale can do. */
+/* Return the power of two of which `top` is 2^30 to 2^31 times, within the exponents that
+ * fixed_scale can apply. */
 static double rest_unit(float top) {
   const int exponent = flush(top) > 0 ? ilogbf(top) - 30 : -130;
   return ldexp(1, exponent < 96 ? exponent : 96);
 }
 
-/* Bits of a coefficient of mode k in a shared word (compact.h). */
+/* Return the number of bits of a coefficient of mode k in a shared word (compact.h). */
 static int word_bits(const supine_tiles *tiles, size_t k) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
   return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
 }
 
-/* Choose the units, and bound what each mode displaces and what its packing costs: half the lowest
- * bit of a coefficient, and the rounding of its word to a float. */
+/* Choose the units, and bound the displacement and the packing error of each mode. The error of a
+ * coefficient is half its lowest bit, and the rounding of its word to a float. */
 static void choose_units(supine_basis *basis, work *w) {
   const bool compact = supine_tiles_compact(basis->tiles.storage);
-  const double axes = sqrt((double)basis->tiles.axes); /* coefficients of a vertex err together */
+  const double axes =
+      sqrt((double)basis->tiles.axes); /* bound on the length of a vector of components up to 1 */
   float top[SUPINE_MODES_MAX];
   float farthest = 0;
   for (size_t i = 0; i < 6 * basis->info.lung_count; ++i) {
@@ -128,8 +133,8 @@ static void choose_units(supine_basis *basis, work *w) {
   }
 }
 
-/* Pack rows of 16 coefficients of one axis. The first of three has the uppermost bits, as its
- * numbers tend to be the largest. */
+/* Pack the rows of 16 coefficients of one axis, one row for each mode. The first mode of three gets
+ * the uppermost bits, as its numbers tend to be the largest. */
 static void pack_coefficients(const supine_tiles *tiles, const double *unit, const float *rows,
                               unsigned char *at) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
@@ -156,7 +161,7 @@ static void pack_coefficients(const supine_tiles *tiles, const double *unit, con
   }
 }
 
-/* Pack 48 coordinates, and raise *square to the largest squared error of a vertex. */
+/* Pack 48 coordinates, and raise *square to the largest squared error of any vertex. */
 static void pack_numbers(const supine_tiles *tiles, double unit, const float *numbers,
                          unsigned char *at, float *square) {
   float error[TILE_NUMBERS];

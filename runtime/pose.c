@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute weights and gains of a state. */
+/* Compute the weights and gains of a state. */
 #include <math.h>
 #include <string.h>
 
@@ -38,7 +38,8 @@ static void contract(const supine_basis *basis, size_t lung, const double *weigh
                          basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
-/* Compute a row of the volumes at rest, mL beyond the reference surface. */
+/* Compute the volume at rest, mL above the reference surface, from harmonics y: of lung `row`, or
+ * of all lungs together (row 0) in files of versions 1 and 2. */
 static double resting(const supine_basis *basis, size_t row, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
@@ -55,11 +56,11 @@ static double sum_of(const double *values, size_t count) {
   return sum;
 }
 
-/* Volumes in one posture, mL beyond the reference surface. */
+/* Volumes in one posture, mL above the reference surface. */
 typedef struct volumes {
-  size_t lungs;
+  size_t lungs; /* number of lungs */
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* 0 without rest by lung */
+  double rest[SUPINE_LUNGS_MAX]; /* 0 if the file has no volumes at rest by lung */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;
@@ -89,13 +90,13 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
 
 static supine_status refuse(const char *what, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                          "this basis does not know what %s is: its scan was taken as it is "
+                          "this basis has no volume at %s: its scan was used as it is "
                           "(--scanned none, --law paper or --fields). Give scan+ML or an absolute "
-                          "volume, as 2600mL",
+                          "volume such as 2600mL",
                           what);
 }
 
-/* Find the volume of all lungs together, mL beyond the reference. */
+/* Find the volume of all lungs together, mL above the reference surface. */
 static supine_status total_of(const supine_basis *basis, const volumes *v,
                               const supine_volume *volume, double *total, supine_error *error) {
   switch (volume->kind) {
@@ -112,13 +113,14 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
     *total = basis->scan_volume + volume->ml;
     return SUPINE_OK;
   default:
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no such kind of volume: %d",
-                            (int)volume->kind);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "unknown kind of volume %d: see supine_volume_kind", (int)volume->kind);
   }
 }
 
-/* Share a total out among the lungs. Above rest all have gone the same part of the way from their
- * own rest to their own full volume; below rest all shrink in proportion. */
+/* Divide a total among the lungs, all in mL above the reference surface. Above rest, every lung is
+ * the same fraction of the way from its volume at rest to its volume at full inflation; below rest,
+ * all lungs hold the same fraction of their volumes at rest. */
 static void share_out(const supine_basis *basis, const volumes *v, double total, double *lung_ml) {
   const double *reference = basis->info.reference_volume;
   const double whole = sum_of(reference, v->lungs);
@@ -131,14 +133,15 @@ static void share_out(const supine_basis *basis, const volumes *v, double total,
   }
 }
 
-/* Find the gains of one lung that holds `ml` mL beyond the reference. */
+/* Find the gains at which one lung holds `ml` mL more than its reference surface. */
 static supine_status lung_gains(const supine_basis *basis, const volumes *v, size_t lung, double ml,
                                 supine_pose *pose, supine_error *error) {
   return supine_volume_form_gains(&v->form[lung], basis->info.bend, v->rest[lung], ml,
                                   pose->gains[lung], error);
 }
 
-/* Find one gain for all lungs and axes. */
+/* Find the one gain for all lungs and axes at which they hold `total` mL more than the reference.
+ */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
                                   supine_error *error) {
   static const double straight[3] = {0, 0, 0};
@@ -156,6 +159,7 @@ static supine_status common_gains(const volumes *v, double total, supine_pose *p
   return status;
 }
 
+/* Find the gains at which all lungs together hold `total` mL more than the reference surface. */
 static supine_status total_gains(const supine_basis *basis, const volumes *v, double total,
                                  supine_pose *pose, supine_error *error) {
   if (!basis->rest_by_lung) {
@@ -170,8 +174,8 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   return status;
 }
 
-/* Find the gains of each lung by its own volume. The volume of one lung at rest, full inflation or
- * in the scan is what it holds when all lungs are in that state. */
+/* Find the gains of each lung from its own volume. At rest, at full inflation and in the scan, a
+ * lung has the volume that it holds when all lungs are in that state. */
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
@@ -188,7 +192,8 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
     }
     if (lung == v->lungs || (i > 0 && strcmp(state->lungs[0].name, state->lungs[i].name) == 0)) {
       return supine_error_set(
-          error, SUPINE_ERROR_ARGUMENT, "no lung '%s' or named twice; this basis has %s%s%s",
+          error, SUPINE_ERROR_ARGUMENT,
+          "lung '%s' is unknown or named twice; name each lung of this basis once: %s%s%s",
           state->lungs[i].name, basis->info.lung_names[0], v->lungs > 1 ? " and " : "",
           v->lungs > 1 ? basis->info.lung_names[1] : "");
     }
@@ -213,7 +218,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* A surface without volumes has no state but its reference. */
+/* Set the gains of a basis without volumes: 0 for the reference surface, the only state it has. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;

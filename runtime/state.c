@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Read and print states. */
+/* Parse and print states. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -76,7 +76,7 @@ static supine_status read_lungs(const char *text, supine_state *state, supine_er
     const size_t size = strcspn(value, ",");
     if (at[length] != '=' || length == 0 || length >= SUPINE_STATE_NAME_SIZE || size >= PIECE) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "'%s': volumes by lung are left=VOLUME,right=VOLUME", text);
+                              "'%s': give volumes by lung as left=VOLUME,right=VOLUME", text);
     }
     if (read.lung_count == SUPINE_STATE_LUNGS_MAX) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' names more than %d lungs", text,
@@ -170,7 +170,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* it ends no posture */
+  if (equals != NULL && colon != NULL && colon > equals) { /* no posture comes before this colon */
     colon = NULL;
   }
   if (colon == NULL) {
@@ -196,7 +196,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   return status;
 }
 
-/* A text being printed, cut to its size, and the length of the whole. */
+/* A text being printed, cut off to its size, and the length of the whole text. */
 typedef struct writer {
   char *text;
   size_t size;

@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: MIT
-// A vertex of a deformed lung and its normal, for vertex shaders. GLSL ES 3.00 and GLSL 3.30 core: put
-// this text after the #version line (and, for ES, "precision highp float;").
+// Compute a vertex of a deformed lung and its normal in a vertex shader, in GLSL ES 3.00 or GLSL 3.30 core.
+// Put this text after the #version line (and, for ES, after "precision highp float;").
 //
 //     x = reference + gain (w . c) direction    w: K weights, gain: 3 numbers of each lung, c: K numbers a vertex
 //     n = sum over j of v_j n_j           v: Q numbers of each lung, n_j: Q vectors a vertex
 //
 // Attributes come from supine_gl_pack and supine_gl_pack_normals, the uniforms from supine_gl_weights
-// and supine_gl_normal_weights (supine/runtime.h). Gains are chosen by rest.w, the lung's number, so that
-// all lungs are one draw. K + 6 multiplications and K + 2 additions a vertex, and 3 Q of each for a normal.
+// and supine_gl_normal_weights (supine/runtime.h). rest.w is the index of the lung and selects its gains, so
+// that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions, a normal 3 Q
+// of each more.
 
 #ifndef SUPINE_LUNGS
 #define SUPINE_LUNGS 2
 #endif
 #ifndef SUPINE_VECTORS
-#define SUPINE_VECTORS 4 // of four coefficients each, (K + 3) / 4
+#define SUPINE_VECTORS 4 // vectors of four coefficients: (K + 3) / 4
 #endif
 #ifndef SUPINE_WORDS
-#define SUPINE_WORDS 2 // of three of the normals' modes each, (Q + 2) / 3
+#define SUPINE_WORDS 2 // words of three modes of the normals: (Q + 2) / 3
 #endif
 
 uniform vec4 supine_weights[SUPINE_VECTORS];
@@ -51,8 +52,8 @@ vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0, vec4 c1, vec4 c2, vec4 
 }
 #endif
 
-// What word `part` of the normal's modes adds: the sum over all parts points along the normal, as long
-// as the area around the vertex is beside its area at rest. The modes are 13, 10 and 9 bits.
+// Compute the contribution of word `part` of the modes to the normal. The sum over all parts points along
+// the normal, but its length is not 1. The three modes of a word have 13, 10 and 9 bits.
 vec3 supine_normal(vec4 rest, int part, uvec3 words) {
   vec3 v = supine_normal_weights[int(rest.w) * SUPINE_WORDS + part];
   return v.x * vec3(ivec3(words)) + v.y * vec3(ivec3(words << 13)) + v.z * vec3(ivec3(words << 23));

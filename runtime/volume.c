@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute volumes from gains, and gains from volumes. */
+/* Compute the volume of a lung from its gains, and the gains from the volume. */
 #include <math.h>
 #include <stdbool.h>
 
@@ -42,7 +42,8 @@ static double cubic_slope(const double c[3], double s) {
   return c[0] + s * (2 * c[1] + s * 3 * c[2]);
 }
 
-/* Find the nearest s on one side of 0 at which the slope is 0; infinite if there is none. */
+/* Find the s nearest to 0, on the side (1 or -1) of 0, at which the slope is 0; infinite if there
+ * is none. */
 static double cubic_turn(const double c[3], double side) {
   double roots[2] = {INFINITY, INFINITY};
   const double discriminant = c[1] * c[1] - 3 * c[0] * c[2];
@@ -62,8 +63,8 @@ static double cubic_turn(const double c[3], double side) {
   return nearest * side;
 }
 
-/* Solve cubic(s) = volume between low and high, where it is monotone, by Newton's steps, or by
- * bisection if a step leaves the bracket. */
+/* Solve cubic(s) = volume between low and high, where it is monotone, by Newton's method, with a
+ * bisection whenever a step leaves the bracket. */
 static double cubic_solve(const double c[3], double volume, double low, double high) {
   const bool rising = supine_volume_at(c, high) > supine_volume_at(c, low);
   double s = volume / c[0];
@@ -161,7 +162,8 @@ static double volume_on_path(const supine_volume_form *form, const double bend[3
   return supine_volume_form_at(form, gains);
 }
 
-/* Step along the path until the volume is passed, then halve the last step. */
+/* Find the gains on the path at which the lung holds `volume`: step along the path until that
+ * volume is passed, then bisect the last step. */
 static supine_status follow_path(const supine_volume_form *form, const double bend[3], double scale,
                                  double rest, double volume, double gains[3], supine_error *error) {
   const double step = volume / rest > 0 ? 1.0 / 16 : -1.0 / 16;

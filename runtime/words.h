@@ -6,14 +6,14 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Compare in upper or lower case (ASCII, in every locale). */
+/* Report whether two words are the same, ignoring case (of ASCII letters only, in every locale). */
 bool supine_words_same(const char *a, const char *b);
 
-/* Longest word of a distance; the rest of it does not count. */
+/* Largest number of characters of `word` that supine_words_distance compares. */
 enum { SUPINE_WORD_MAX = 63 };
 
 /* Count the fewest insertions, deletions and replacements of a character that turn `text`, of any
- * length, into `word` (Levenshtein 1966), in upper or lower case. */
+ * length, into `word`, ignoring case (Levenshtein 1966). */
 size_t supine_words_distance(const char *text, const char *word);
 
 #endif

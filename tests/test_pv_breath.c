@@ -184,7 +184,7 @@ static void test_breath_out_of_range_refused(void **state) {
   expect_argument(normal, &breath, 1.0, "rest pressure -0.1");
   breath = breath_of(SUPINE_PV_COSINE);
   breath.tidal = 5000.0;
-  expect_argument(normal, &breath, 1.0, "tidal volume 5000 mL is more than");
+  expect_argument(normal, &breath, 1.0, "tidal volume 5000 mL is larger than");
   breath = breath_of(SUPINE_PV_COURSE_COUNT);
   expect_argument(normal, &breath, 1.0, "unknown pressure course");
   supine_pv narrow = *normal; /* the exhale limb ends below the peak pressure */

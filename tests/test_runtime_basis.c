@@ -239,8 +239,8 @@ static void test_open_wrong_content_refused_with_reason(void **state) {
   expect_refused(spoil_resting_size,
                  "'resting_volume' has a number that is not finite, or 2^30 or more");
   expect_refused(spoil_lung_order, "grouped by lung");
-  expect_refused(spoil_lung_gap, "vertex 6 is of lung 2");
-  expect_refused(spoil_lung_first, "vertex 0 is of lung 1");
+  expect_refused(spoil_lung_gap, "vertex 6 belongs to lung 2");
+  expect_refused(spoil_lung_first, "vertex 0 belongs to lung 1");
 }
 
 typedef struct parts {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute Gram matrices of a basis, and distances from them. */
+/* Compute the Gram matrices of a basis, and from them distances, gains and energies. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -51,7 +51,8 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
   return total > 0 && isfinite(total)
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the surface has no area: nothing to average over");
+                                "the surface has no area, or one that is not finite: no average "
+                                "over it exists");
 }
 
 /* Add weight c c^T to the upper triangle of `gram`. */
@@ -136,7 +137,7 @@ double supine_compare_area(const supine_compare *compare) {
   return compare->area;
 }
 
-/* Compute q^T G p of K weights each. */
+/* Compute q^T G p, where q and p have `count` numbers. */
 static double product(const double *gram, const double *q, const double *p, size_t count) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
@@ -187,7 +188,9 @@ supine_status supine_compare_pose(const supine_compare *compare, const supine_st
   const double one = supine_compare_rms(compare, pose, NULL);
   if (!(one > 0)) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "nothing moves in this direction: no gain gives %g mm", rms);
+                            "no vertex moves in this direction of gravity: no gain gives an RMS of "
+                            "%g mm",
+                            rms);
   }
   supine_pose_fill(pose, rms / one);
   return SUPINE_OK;

@@ -16,7 +16,7 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* Compute |u_i| of the field with weights q [3, K]. */
+/* Compute |u_i| of the field with products of gains and weights q [3, K], mm. */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];
@@ -64,8 +64,7 @@ static double percentile(const supine_compare *compare, const float *distance, d
       }
     }
     uint32_t at = 0;
-    uint32_t last =
-        0; /* the last that is not empty, in case rounding leaves the target beyond it */
+    uint32_t last = 0; /* last bin that is not empty, if rounding leaves the target above the sum */
     for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
       below += bin[at];
       last = bin[at] > 0 ? at : last;
@@ -90,7 +89,7 @@ void supine_compare_statistics(const supine_compare *compare, const float *dista
   for (size_t i = 0; i < compare->basis->info.vertex_count; ++i) {
     const double share = (double)compare->share[i];
     const double d = (double)distance[i];
-    area += share; /* 1, but for rounding */
+    area += share; /* 1 up to rounding */
     sum += share * d;
     square += share * d * d;
     largest = distance[i] > largest ? distance[i] : largest;

@@ -11,15 +11,18 @@
 struct supine_compare {
   const supine_basis *basis;
   double area;  /**< mm^2 */
-  float *share; /**< [N] a_i, the fraction of the area that a vertex stands for */
+  float *share; /**< [N] a_i, the fraction of the area that belongs to vertex i */
   double *gram; /**< [G, 3, K, K] Gram matrices of lungs and axes, mm^2 */
-  double *sum;  /**< [K, K] the sum of all */
+  double *sum;  /**< [K, K] the sum of all Gram matrices, mm^2 */
 };
 
-/** Compute the mean square of the displacement with q [G, 3, K] = gains x weights, mm^2. */
+/** Compute the mean square, mm^2, of the displacement for products q [G, 3, K] of gains and
+ * weights.
+ */
 double supine_compare_square(const supine_compare *compare, const double *q);
 
-/** Compute q [G, 3, K] of a pose, minus that of `from` unless it is NULL. */
+/** Compute the products q [G, 3, K] of the gains and weights of a pose, less those of `from` unless
+ * it is NULL. */
 void supine_compare_state(const supine_compare *compare, const supine_pose *pose,
                           const supine_pose *from, double *q);
 

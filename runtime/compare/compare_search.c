@@ -18,7 +18,7 @@ enum {
 
 typedef struct search {
   const supine_compare *compare;
-  const supine_state *from; /* its volume */
+  const supine_state *from; /* posture to compare with, and volume of all states */
   double rms;               /* mm, or 0 */
   size_t count;             /* 3 G K */
   size_t reached;           /* number of directions that reach the volume */
@@ -40,8 +40,8 @@ static supine_status state_of(const search *s, const double direction[3], double
   return status;
 }
 
-/* Compute the squared distance of two states from their difference, which is exact if they are
- * near. */
+/* Compute the squared distance of two states, mm^2, from their difference, which avoids
+ * cancellation if they are near. */
 static double apart(const search *s, const double *a, const double *b) {
   double q[STATE_MAX];
   for (size_t k = 0; k < s->count; ++k) {
@@ -62,7 +62,7 @@ static void multiply(const search *s, const double *q, double *product) {
   }
 }
 
-/* Compute the states of the spiral's directions, and of `from` last. */
+/* Compute the states of the spiral's directions that reach the volume, and last that of `from`. */
 static supine_status sample(search *s, const double from[3], size_t directions,
                             supine_error *error) {
   supine_status status = SUPINE_OK;
@@ -90,10 +90,11 @@ static supine_status sample(search *s, const double from[3], size_t directions,
   }
   return s->reached >= 2 ? SUPINE_OK
                          : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                            "no other direction reaches this volume");
+                                            "no other direction of gravity reaches this volume: "
+                                            "give another volume");
 }
 
-/* Compute |q_i - q_j|^2 in the Gram metric. */
+/* Compute the squared distance of sampled states i and j, mm^2, from stored products. */
 static double sampled_apart(const search *s, size_t i, size_t j) {
   const double *product = s->product + i * s->count;
   const double *q = s->state + j * s->count;
@@ -104,7 +105,8 @@ static double sampled_apart(const search *s, size_t i, size_t j) {
   return s->square[i] - 2 * both + s->square[j];
 }
 
-/* Turn `direction` by `step` radians along axis `move` / 2 of its tangent plane. */
+/* Turn `direction` by `step` radians along axis `move` / 2 of its tangent plane, forwards if `move`
+ * is even, else backwards. */
 static void turned(const double direction[3], int move, double step, double result[3]) {
   const int thin = fabs(direction[0]) < 0.6 ? 0 : (fabs(direction[1]) < 0.6 ? 1 : 2);
   double across[3] = {0, 0, 0};
@@ -124,8 +126,8 @@ static void turned(const double direction[3], int move, double step, double resu
   (void)supine_normalise(result, result);
 }
 
-/* Move the first `movable` of two directions while that increases the distance of their states, mm.
- */
+/* Move the first `movable` of two directions while that increases the distance of their states;
+ * return that distance, mm. */
 static double refine(const search *s, double direction[2][3], int movable, double step) {
   double q[2][STATE_MAX];
   (void)state_of(s, direction[0], q[0], NULL); /* both reached the volume before */
@@ -192,8 +194,8 @@ supine_status supine_compare_search(const supine_compare *compare, const supine_
                                     double rms, size_t directions, supine_extremes *extremes,
                                     supine_error *error) {
   if (directions < 2 || directions > DIRECTIONS_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu directions: 2 to %d", directions,
-                            (int)DIRECTIONS_MAX);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu directions: give 2 to %d",
+                            directions, (int)DIRECTIONS_MAX);
   }
   double start[3];
   if (!supine_normalise(from->gravity, start)) {

@@ -8,35 +8,36 @@
 
 #include "runtime/compare/compare_internal.h"
 
-/* Sums over the part of a lung's surface above a cut, or over one slab's; heights grow along
- * gravity, so that "above" is before the cut. N is the area vector of a piece. */
+/* Sums over the part of a lung's surface above a cut. Levels t increase along gravity g, so that
+ * "above" a cut is at smaller t. u is the displacement and N the area vector of a piece, mm. */
 typedef struct part {
-  double sweep;     /* sum of u.N, the displacement's */
+  double sweep;     /* sum of u.N: the volume that the part sweeps */
   double volume;    /* sum of t (g.N) */
   double area;      /* sum of g.N: minus the area of the cut that closes the part */
   double moment[2]; /* sum of (x, y) (g.N): minus the moments of the cut */
 } part;
 
-/* Least-squares sums of u.g along the outline of a cut. */
+/* Sums along the outline of a cut, weighted by length, to fit a plane to u.g by least squares. */
 typedef struct outline {
   double length, x, y, xx, xy, yy, u, xu, yu;
 } outline;
 
-/* A triangle in axes (x, y, t) with t along gravity. */
+/* A triangle in axes (x, y, t) with t along gravity, mm. */
 typedef struct triangle {
-  double at[3][3];   /* corners: x, y, t */
-  double u[3][3];    /* displacement */
-  double normal[3];  /* area vector at rest */
-  double average[3]; /* area vector, averaged over the motion */
+  double at[3][3];   /* corners before the breath: x, y, t */
+  double u[3][3];    /* displacements of the corners */
+  double normal[3];  /* area vector before the breath, mm^2 */
+  double average[3]; /* area vector, averaged over the motion, mm^2 */
 } triangle;
 
+/* The slabs, and the sums of one lung at the levels between them. */
 typedef struct cutter {
-  const float *from; /* [N, 3] where the motion begins */
-  double axis[3][3]; /* x, y and gravity */
-  size_t count;      /* slabs */
-  double level[SUPINE_SLABS_MAX + 1];
-  part below[SUPINE_SLABS_MAX + 1];
-  outline line[SUPINE_SLABS_MAX + 1];
+  const float *from;                  /* [N, 3] positions before the breath */
+  double axis[3][3];                  /* axes x, y and gravity */
+  size_t count;                       /* number of slabs */
+  double level[SUPINE_SLABS_MAX + 1]; /* t at which slab i begins, mm; the last: where all end */
+  part above[SUPINE_SLABS_MAX + 1];   /* parts above each level of the triangles that it cuts */
+  outline line[SUPINE_SLABS_MAX + 1]; /* outline of the cut at each level */
 } cutter;
 
 static void add_cross(const double *a, const double *b, double factor, double *sum) {
@@ -95,7 +96,8 @@ static void read_triangle(const cutter *c, const float *xyz, const uint32_t *cor
   add_cross(f[0], f[1], 1.0 / 6, t->average);
 }
 
-/* Adds the piece whose moments of barycentric coordinates, over the triangle's area, are m. */
+/* Add a piece of a triangle to the sums. `m` are the integrals of the barycentric coordinates over
+ * the piece, divided by the area of the triangle. */
 static void add_piece(const triangle *t, const double m[3], part *sum) {
   for (int v = 0; v < 3; ++v) {
     const double down = m[v] * t->normal[2];
@@ -122,7 +124,8 @@ static void add_segment(const double p[3], const double q[3], double u, outline 
   line->yu += length * y * u;
 }
 
-/* Cut a triangle at a level between its corners. */
+/* Cut a triangle at a level between its corners; add the piece above the level to `sum`, and the
+ * cut edge to `line`. */
 static void cut(const triangle *t, double level, part *sum, outline *line) {
   int lone = 0; /* the corner that is alone on its side */
   int before = 0;
@@ -157,7 +160,7 @@ static void cut(const triangle *t, double level, part *sum, outline *line) {
   add_segment(end[0], end[1], down / 2, line);
 }
 
-/* Find the slab of a height. */
+/* Find the slab that holds level t. */
 static size_t slab_of(const cutter *c, double t) {
   size_t slab = 0;
   while (slab + 1 < c->count && c->level[slab + 1] <= t) {
@@ -176,7 +179,7 @@ static void add_triangle(cutter *c, const triangle *t, part *whole) {
     last = slab > last ? slab : last;
   }
   for (size_t level = first + 1; level <= last; ++level) {
-    cut(t, c->level[level], &c->below[level], &c->line[level]);
+    cut(t, c->level[level], &c->above[level], &c->line[level]);
   }
   add_piece(t, full, &whole[last + 1]);
 }
@@ -208,9 +211,9 @@ static double cut_flux(const part *before, const outline *line) {
 
 static void cut_lung(cutter *c, const supine_basis *basis, size_t lung, const float *xyz,
                      supine_slab *slabs) {
-  part whole[SUPINE_SLABS_MAX + 1]; /* triangles that lie before a level entirely */
+  part whole[SUPINE_SLABS_MAX + 1]; /* [slab + 1]: triangles whose lowest corner is in the slab */
   memset(whole, 0, sizeof whole);
-  memset(c->below, 0, sizeof c->below);
+  memset(c->above, 0, sizeof c->above);
   memset(c->line, 0, sizeof c->line);
   for (size_t i = 0; i < basis->info.triangle_count; ++i) {
     const uint32_t *corner = basis->info.triangles + 3 * i;
@@ -231,7 +234,7 @@ static void cut_lung(cutter *c, const supine_basis *basis, size_t lung, const fl
     so_far.moment[0] += add->moment[0];
     so_far.moment[1] += add->moment[1];
     part here = so_far;
-    const part *cuts = &c->below[slab + 1];
+    const part *cuts = &c->above[slab + 1];
     double next = 0;
     if (slab + 1 < c->count) {
       here.sweep += cuts->sweep;
@@ -255,7 +258,7 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
   cutter c = {.from = from != NULL ? from : basis->info.vertices, .count = count};
   if (count == 0 || count > SUPINE_SLABS_MAX || !make_axes(gravity, c.axis)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu slabs (1 to %d), or gravity has no direction", count,
+                            "%zu slabs: give 1 to %d; or gravity has no direction", count,
                             (int)SUPINE_SLABS_MAX);
   }
   if (!basis->info.has_volume) {

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Numbers of fewer bits: two or three in a word of 32 bits, or three in two words.
+ * Compact numbers: two or three in a word of 32 bits, or three in two words.
  *
- * A number is shifted to the upper bits of its word and read as the whole word, a signed integer,
- * so that reading costs one shift and one conversion. The bits below it belong to other numbers:
- * they are known when it is packed, and the value is chosen so that the whole word comes nearest.
+ * To read a number, shift its word so that the number has the uppermost bits, and convert the whole
+ * word as a signed integer: one shift and one conversion. The bits below the number belong to other
+ * numbers; they are known when it is packed, and the number is chosen so that the whole word is as
+ * near as possible to its value.
  */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
@@ -33,7 +34,8 @@ static inline int32_t word_integer(uint32_t word) {
   return value;
 }
 
-/** Round to the nearest integer, far below 2^51, in instructions that every processor has. */
+/** Round a number of a size below 2^51 to the nearest integer, in instructions that every processor
+ * has. */
 static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
@@ -47,12 +49,12 @@ static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
-/** Pack two numbers of -2^31 to 2^31 into a word, the first into the lower half. */
+/** Pack two numbers between -2^31 and 2^31 into a word, the first into the lower half. */
 static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** @{ Return a number of such a word. */
+/** @{ Unpack the first or second number of such a word. */
 static inline float pair_first(uint32_t word) {
   return (float)word_integer(word << 16);
 }
@@ -93,8 +95,9 @@ static inline float normal_number(uint32_t word, size_t number) {
   return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
 }
 
-/** Pack three numbers of -2^31 to 2^31 into two words: the first and second into the upper 21 bits
- * of a word each, the third into the 22 bits left. None becomes 0 (see fixed_scale). */
+/** Pack three numbers between -2^31 and 2^31 into two words: the first and second into the upper 21
+ * bits of a word each, the third into the 22 bits that are left. Replace 0 by the smallest positive
+ * number, as fixed_scale needs. */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;
@@ -105,15 +108,15 @@ static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   }
 }
 
-/** Unpack the three numbers. */
+/** Unpack the three numbers of two words of fixed_narrow. */
 static inline void fixed_widen(const uint32_t *words, float *numbers) {
   numbers[0] = (float)word_integer(words[0]);
   numbers[1] = (float)word_integer(words[1]);
   numbers[2] = (float)word_integer(words[0] << 21 | (words[1] << 10 & 0x1FFC00U));
 }
 
-/** Multiply a number other than 0 by the power of two whose exponent is `unit`, in its place in a
- * float's bits. */
+/** Multiply a number other than 0 by a power of two, by adding to its exponent bits.
+ * @param unit  the exponent of the power, shifted to the exponent bits of a float */
 static inline float fixed_scale(float number, uint32_t unit) {
   return bits_float(float_bits(number) + unit);
 }

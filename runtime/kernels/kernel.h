@@ -7,7 +7,8 @@
  *     LANES            4, 8 or 16
  *     FMA(a, b, c)     a * b + c
  *     RSQRT(x)         an estimate of 1 / sqrt(x), of 12 bits at least
- *     STREAM(to, v)    store a vector past the cache, or OWN_WRITER in place of the writer here
+ *     STREAM(to, v)    store a vector with stores that bypass the caches; or OWN_WRITER, if the
+ *                      file defines its own writer in place of the one here
  */
 #include "runtime/kernels/tiles.h"
 #include <string.h>
@@ -19,10 +20,10 @@ typedef int32_t vi __attribute__((vector_size(4 * LANES)));
 typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 
 enum {
-  GROUPS = TILE / LANES, /* vectors of one number of each vertex */
-  PIECES = TILE_NUMBERS / LANES,
-  CHAINS = GROUPS == 1 ? 2 : 1, /* sums over the modes: one vector alone waits for its additions */
-  KNOWN_MODES = 16              /* most modes whose weights stay in registers */
+  GROUPS = TILE / LANES,         /* vectors of one number of each vertex of a tile */
+  PIECES = TILE_NUMBERS / LANES, /* vectors of the coordinates of a tile */
+  CHAINS = GROUPS == 1 ? 2 : 1,  /* partial sums over the modes: with one, additions would wait */
+  KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
 
 /* One number of each vertex of a tile. */
@@ -45,7 +46,7 @@ typedef struct triples {
 #define EACH(F, j) EACH4(F, j, 0), EACH4(F, j, 4), EACH4(F, j, 8), EACH4(F, j, 12)
 #endif
 
-/* Lane i of piece j of x y z x y z ... holds coordinate AXIS of vertex VERTEX. */
+/* Lane i of piece j of x y z x y z ... holds coordinate AXIS(j, i) of vertex VERTEX(j, i). */
 #define VERTEX(j, i) (((j)*LANES + (i)) / 3)
 #define AXIS(j, i) (((j)*LANES + (i)) % 3)
 
@@ -55,7 +56,8 @@ INLINE vf load(const unsigned char *at) {
   return v;
 }
 
-/* The signed integers that begin `shift` bits below the top of words (compact.h). */
+/* Convert to floats the signed integers that begin `shift` bits below the top of words (compact.h).
+ */
 INLINE vf integers(vu words, int shift) {
   return __builtin_convertvector((vi)(words << shift), vf);
 }
@@ -73,15 +75,15 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* A loop that the compiler specialises: for one storage and kind and, where `modes` is not 0, that
- * many modes and positions in one array. */
+/* The constants for which the compiler specialises a loop. If `modes` is not 0, the loop evaluates
+ * that number of modes and writes positions into one array. */
 typedef struct form {
   supine_storage storage;
-  size_t modes;
+  size_t modes; /* 0: any number */
   bool vector;
 } form;
 
-/* Add w times a mode of 16 vertices: floats, or words from `shift` on. */
+/* Add w times one mode of 16 vertices: floats, or if `compact` words read from bit `shift` on. */
 INLINE void add_mode(row *sum, vf w, const unsigned char *at, int shift, bool compact) {
   for (size_t q = 0; q < GROUPS; ++q, at += sizeof(vf)) {
     sum->v[q] = FMA(w, compact ? integers((vu)load(at), shift) : load(at), sum->v[q]);
@@ -97,7 +99,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   row *even = &sum[0];
   row *odd = &sum[CHAINS - 1];
   for (size_t q = 0; q < CHAINS * GROUPS; ++q) {
-    sum[q / GROUPS].v[q % GROUPS] = splat(-0.0F); /* what changes no product added to it */
+    sum[q / GROUPS].v[q % GROUPS] = splat(-0.0F); /* adding -0 changes no number, not even a 0 */
   }
   for (size_t k = 0; k < paired / 2; ++k, at += compact ? 64 : 128) {
     add_mode(even, weight(w, 2 * k, known), at, 16, compact);
@@ -118,7 +120,8 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   return *even;
 }
 
-/* The numbers of a direction or rest position; compact ones in the unit they are packed in. */
+/* Load 48 numbers of directions or reference positions; compact ones in the unit that they are
+ * packed in. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
   for (size_t j = 0; j < PIECES && !compact; ++j) {
@@ -134,7 +137,7 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
   return n;
 }
 
-/* Positions of the reference surface, mm. */
+/* Load the reference positions of a tile, mm. */
 INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
   triples p = numbers(tile + tiles->rest_begin, compact);
   for (size_t j = 0; j < PIECES && compact; ++j) {
@@ -143,7 +146,7 @@ INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *ti
   return p;
 }
 
-/* x y z x y z ... of 16 vertices: x and y into place first, then z. */
+/* Interleave coordinates to x y z x y z ... of 16 vertices: put x and y into place, then z. */
 INLINE triples interleave(const row *x, const row *y, const row *z) {
 #define FROM_XY(j, i) (VERTEX(j, i) + (AXIS(j, i) == 1 ? LANES : 0))
 #define FROM_Z(j, i) (AXIS(j, i) == 2 ? VERTEX(j, i) + LANES : (i))
@@ -160,7 +163,7 @@ INLINE triples interleave(const row *x, const row *y, const row *z) {
 #undef PIECE
 }
 
-/* One number of each vertex, three times. */
+/* Repeat one number of each vertex three times. */
 INLINE triples spread(const row *a) {
   triples t;
   for (size_t q = 0; q < GROUPS; ++q) {
@@ -172,7 +175,7 @@ INLINE triples spread(const row *a) {
 }
 
 #ifndef OWN_WRITER
-/* An array that is written in order, past the cache where `stream`. */
+/* An array that is written in order, with stores that bypass the caches if `stream`. */
 typedef struct writer {
   float *to;
   bool stream;
@@ -196,7 +199,7 @@ INLINE void writer_close(const writer *w, const supine_target *target) {
 }
 #endif
 
-/* Coordinate a of the vertices in three pieces of x y z x y z ... */
+/* SEPARATE(a) is coordinate a of the vertices in three pieces of x y z x y z ... */
 #define FROM_01(a, i) ((3 * (i) + (a)) % (2 * LANES))
 #define FROM_2(a, i) (3 * (i) + (a) < 2 * LANES ? (i) : 3 * (i) + (a)-LANES)
 #define SEPARATE(a)                                                                                \
@@ -289,7 +292,7 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_
 static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
                    const supine_target *target) {
   const bool registers = LANES == 16 && target->rest && target->y == NULL;
-  if (registers && tiles->modes == 4) { /* as the default law has */
+  if (registers && tiles->modes == 4) { /* as bases of the default law have */
     deform_storage(tiles, folded, first, count, target, 4);
   } else if (registers && tiles->modes == KNOWN_MODES) {
     deform_storage(tiles, folded, first, count, target, KNOWN_MODES);
@@ -298,7 +301,8 @@ static void deform(const supine_tiles *tiles, const float *folded, size_t first,
   }
 }
 
-/* A normal's coordinate before its length is divided out: a chain for each place in the words. */
+/* Compute one coordinate of normals before they are normalised, with a partial sum for each of the
+ * three modes of a word. */
 INLINE vf dot_normal(const unsigned char *at, const float *w, size_t words) {
   vf sum[3] = {{0}, {0}, {0}};
   for (size_t j = 0; j < words; ++j, at += 64) {
@@ -323,8 +327,8 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
       for (size_t axis = 0; axis < 3; ++axis) {
         v[axis] = dot_normal(tile + axis * axis_bytes + q * sizeof(vf), w, words);
       }
-      /* The smallest normal number keeps 0 from becoming NaN; one Newton step doubles the bits of
-       * the estimate. */
+      /* Adding the smallest normal number keeps a normal of 0 from becoming NaN. One Newton step
+       * doubles the number of correct bits of the estimate. */
       const vf square = FMA(v[0], v[0], FMA(v[1], v[1], v[2] * v[2])) + 0x1p-126F;
       const vf guess = RSQRT(square);
       const vf error = FMA(-(square * guess), guess, splat(1));
@@ -353,7 +357,7 @@ static void light(const supine_tiles *tiles, const float *w, size_t first, size_
   }
 }
 
-/* Write compact coefficients of one axis as floats. */
+/* Convert the compact coefficients of one axis to floats, in their packed units. */
 static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, vf *to) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
   for (size_t k = 0; k < tiles->modes; ++k) {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The kernels for AVX2 and FMA: two vectors for the 16 vertices of a tile. */
+/* Kernels for AVX2 and FMA: two vectors hold one number of the 16 vertices of a tile. */
 #include "runtime/kernels/tiles.h"
 
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
 
-/* Store past the cache: in halves, which the processor joins, where the array is aligned to 16
- * bytes, as malloc gives it. */
+/* Store a vector and bypass the caches. If the array is aligned to 16 bytes only, as by malloc,
+ * store halves, which the processor combines; with less alignment, do not bypass the caches. */
 static inline __attribute__((always_inline)) void stream8(float *to, __m256 v) {
   if ((uintptr_t)to % 16 != 0) {
     _mm256_storeu_ps(to, v);

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* The kernels for AVX-512 F and BW: one vector for the 16 vertices of a tile. */
+/* Kernels for AVX-512 F and BW: one vector holds one number of the 16 vertices of a tile. */
 #include "runtime/kernels/tiles.h"
 
 #if defined(__AVX512F__) && defined(__AVX512BW__)
 #include <immintrin.h>
 
-/* An array that is written in order, past the cache where `stream`. A store past the cache must
- * fill an aligned line; where the array is not aligned, each line joins the end of one vector to
+/* An array that is written in order, with stores that bypass the caches if `stream`. Such a store
+ * must fill an aligned line; if the array is not aligned, each line joins the end of one vector to
  * the beginning of the next. */
 typedef struct writer {
   __m512 last;  /* the vector before this one */
   __m512i join; /* permutation of (last, next) that makes the line */
   float *to;
-  size_t offset; /* numbers by which `to` is past an aligned line */
+  size_t offset; /* number of floats from the beginning of an aligned line to `to` */
   bool stream;
-  bool shared; /* the next line begins with numbers before the array */
+  bool shared; /* the next line begins with numbers that are not part of the array */
 } writer;
 
 static inline __attribute__((always_inline)) writer writer_open(float *to,
@@ -43,7 +43,8 @@ static inline __attribute__((always_inline)) void writer_put(writer *w, __m512 n
   w->to += 16;
 }
 
-/* Store the end of the last vector, which no full line has taken. */
+/* Store the end of the last vector, which fills no line; or leave the vector in `held` if another
+ * call continues the array. */
 static inline __attribute__((always_inline)) void writer_close(const writer *w,
                                                                const supine_target *target) {
   if (target->held != NULL && target->continued) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The kernels for vectors of four numbers, which GCC and Clang have for every processor: SSE2,
- * NEON, WebAssembly's 128 bits. */
+/* Kernels for vectors of four numbers, which GCC and Clang compile for every processor: SSE2, NEON,
+ * 128-bit vectors of WebAssembly. */
 #include <math.h>
 
 #define KERNELS supine_kernels_portable

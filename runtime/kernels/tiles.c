@@ -14,10 +14,10 @@ static bool has_avx512(void) {
   return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw");
 }
 
-/* Measured with 16 million vertices of 16 modes. On AMD's family 25 (Zen 4) NEAR brings 39 GB/s of
- * int16 tiles and 36 of float32, NONE 37 and 30, and FAR 36 and 26; asking for every line at any
- * distance costs more than it gives there, as the processor fetches lines in pairs. On family 26
- * (Zen 5) FAR is the fastest. */
+/* Choose by the processor's family, from measurements with 16 million vertices of 16 modes. On AMD
+ * family 25 (Zen 4), NEAR reads 39 GB/s of int16 tiles and 36 GB/s of float32, NONE 37 and 30, FAR
+ * 36 and 26. Prefetching every line is slower there at any distance, as the processor fetches lines
+ * in pairs. On family 26 (Zen 5), FAR is the fastest. */
 supine_prefetch supine_kernels_prefetch_choose(void) {
   unsigned a = 0;
   unsigned b = 0;
@@ -26,7 +26,7 @@ supine_prefetch supine_kernels_prefetch_choose(void) {
   const bool amd = __get_cpuid(0, &a, &b, &c, &d) != 0 && b == signature_AMD_ebx &&
                    d == signature_AMD_edx && c == signature_AMD_ecx;
   const bool known = __get_cpuid(1, &a, &b, &c, &d) != 0;
-  const unsigned family = (a >> 8 & 15U) + (a >> 20 & 255U); /* the second counts from 15 up */
+  const unsigned family = (a >> 8 & 15U) + (a >> 20 & 255U); /* base and extended family */
   return amd && known && family == 26 ? SUPINE_PREFETCH_FAR : SUPINE_PREFETCH_NEAR;
 }
 #else

@@ -3,53 +3,53 @@
  * The basis in memory as the kernels read it: tiles of 16 vertices, each of whole cache lines.
  *
  *     coefficients   for each axis (1 for scalar fields, 3 for vector fields)
- *                      EXACT  16 floats a mode
- *                      INT16  16 words of 32 bits for two modes, see compact.h
- *                      MIXED  the same, but 16 words for three of the last modes
+ *                      EXACT  16 floats for each mode
+ *                      INT16  16 words of 32 bits for every two modes, see compact.h
+ *                      MIXED  the same, but 16 words for every three of the last modes
  *     direction      48 numbers x y z x y z ...; none for vector fields
  *     rest           48 numbers x y z x y z ..., reference positions
  *
  * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. Directions and
- * reference positions are floats (EXACT) or fixed-point numbers, three in two words (compact.h),
- * whose unit suits the largest: a position within half a metre of the origin errs by at most 0.0005
- * mm in each coordinate. The units of coefficients and directions are multiplied into the weights,
- * once a frame. */
+ * reference positions are floats (EXACT) or fixed-point numbers, three in two words (compact.h), in
+ * a unit that suits the largest: within half a metre of the origin, the error of a position is at
+ * most 0.0005 mm in each coordinate. The units of coefficients and directions are multiplied into
+ * the weights, once a frame. */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
 
 #include <supine/runtime.h>
 
 enum {
-  TILE = 16,         /**< vertices */
-  TILE_NUMBERS = 48, /**< their coordinates */
+  TILE = 16,         /**< number of vertices of a tile */
+  TILE_NUMBERS = 48, /**< number of coordinates of these vertices */
 };
 
 typedef struct supine_tiles {
   supine_storage storage;
   size_t modes;
   size_t axes;            /**< 1, or 3 for vector fields */
-  size_t axis_bytes;      /**< of the coefficients of one axis in one tile */
-  size_t direction_begin; /**< byte offsets in a tile */
-  size_t rest_begin;
-  size_t stride; /**< bytes from tile to tile */
-  size_t count;
-  uint32_t
-      rest_unit; /**< of compact positions: the exponent of 2, in its place in a float's bits */
-  unsigned char *bytes;
+  size_t axis_bytes;      /**< bytes of the coefficients of one axis in one tile */
+  size_t direction_begin; /**< byte offset of the directions in a tile */
+  size_t rest_begin;      /**< byte offset of the reference positions in a tile */
+  size_t stride;          /**< bytes from tile to tile */
+  size_t count;           /**< number of tiles */
+  uint32_t rest_unit;     /**< unit of compact positions, see fixed_scale */
+  unsigned char *bytes;   /**< [count, stride] */
 } supine_tiles;
 
-/** Report whether two or three coefficients share a word, and directions and positions are fixed
- * point. */
+/** Report whether a storage is compact: two or three coefficients share a word, and directions and
+ * positions are fixed-point numbers. */
 static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return how many words of a vertex hold three coefficients each, those of its last modes. */
+/** Return the number of words that hold three coefficients each, for the last modes of a vertex. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
 
-/** Return how many modes come before those, two to a word if words are shared at all. */
+/** Return the number of modes before those, which have two coefficients to a word in a compact
+ * storage. */
 static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
@@ -59,8 +59,8 @@ static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
   return 64 * (k < paired ? k / 2 : (paired + 1) / 2 + (k - paired) / 3);
 }
 
-/** Fill in everything but `bytes` and `rest_unit` for a storage, never AUTO. Inline, so that the
- * layout is a constant where the number of modes is. */
+/** Fill in everything but `bytes` and `rest_unit` for a storage, never AUTO. The function is
+ * inline, so that the layout is a constant if the number of modes is. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
@@ -79,12 +79,13 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
 }
 
 /** Return the number of words for one coordinate of a normal. Word j holds modes j, j + words and
- * j + 2 words (compact.h), 0 for those that are missing. */
+ * j + 2 words (compact.h), or 0 for modes that do not exist. */
 static inline size_t supine_tiles_normal_words(size_t modes) {
   return (modes + 2) / 3;
 }
 
-/** Fill in the layout of tiles of normals: for each axis, 16 vertices' words j, for each j. */
+/** Fill in the layout of tiles of normals: for each axis and each word j, the words of 16 vertices.
+ */
 static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
   *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
   tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);
@@ -95,13 +96,13 @@ static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, si
 typedef enum supine_prefetch {
   SUPINE_PREFETCH_NONE, /**< they are in the cache */
   SUPINE_PREFETCH_NEAR, /**< every other line, 640 bytes ahead, to the second-level cache */
-  SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, past the caches */
+  SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
 
-/** Prefetch what lies ahead of a tile of `stride` bytes. */
+/** Prefetch `stride` bytes at a distance ahead of a tile. */
 static inline __attribute__((always_inline)) void
 supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch how) {
-  enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* of the builtin */
+  enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality argument of __builtin_prefetch */
   if (how == SUPINE_PREFETCH_NEAR) {
     for (size_t line = 0; line < stride; line += 128) {
       __builtin_prefetch(tile + 640 + line, 0, SECOND_LEVEL);
@@ -117,11 +118,11 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
  */
 typedef struct supine_target {
   float *x, *y, *z;
-  bool rest;   /**< positions; otherwise displacements alone */
-  bool stream; /**< store past the cache */
+  bool rest;   /**< write positions; false: displacements */
+  bool stream; /**< use stores that bypass the caches */
   supine_prefetch prefetch;
-  /** [16] or NULL. If several calls write one array, the last numbers of one call, which the next
-   * call stores in the cache line that both share. */
+  /** [16] or NULL. If several calls write one array: the last numbers of one call, which the next
+   * call stores, as both share a cache line. */
   float *held;
   bool continues; /**< a call before this one left numbers in `held` */
   bool continued; /**< leave numbers for a call after this one */
@@ -132,7 +133,7 @@ typedef struct supine_target {
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
 
-/** Make stores past the cache visible to other threads, after the last kernel of a call. */
+/** Make stores that bypass the caches visible to other threads, after the last kernel of a call. */
 static inline void supine_stream_fence(bool stream) {
 #if defined(__x86_64__)
   if (stream) {
@@ -143,8 +144,9 @@ static inline void supine_stream_fence(bool stream) {
 #endif
 }
 
-/** Convert tiles first <= t < first + count to floats in the EXACT layout `to`, in their own units,
- * so that the same folded weights apply. */
+/** Convert tiles first <= t < first + count to floats in the EXACT layout `to`: reference positions
+ * in mm, coefficients and directions in their packed units, so that the same folded weights apply.
+ */
 typedef void supine_widen_tiles(const supine_tiles *tiles, size_t first, size_t count,
                                 supine_tiles *to);
 
@@ -157,11 +159,11 @@ typedef struct supine_kernels {
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;
-extern const supine_kernels supine_kernels_avx2;   /**< NULLs where not built */
-extern const supine_kernels supine_kernels_avx512; /**< NULLs where not built */
+extern const supine_kernels supine_kernels_avx2;   /**< members are NULL in builds without it */
+extern const supine_kernels supine_kernels_avx512; /**< members are NULL in builds without it */
 
-/** Return the kernels of a kind, or for AUTO the widest, whose kind *simd becomes; NULL if the
- * processor or the build lacks them. */
+/** Return the kernels of an instruction set; for AUTO, the widest of this processor, and set *simd
+ * to it. NULL if the processor or the build lacks the instruction set. */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
 
 /** Return the fastest way to prefetch on this processor. */

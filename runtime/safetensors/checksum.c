@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Element types, and the checksum over tensors and metadata. */
+/* Look up element types, and compute the checksum over tensors and metadata. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -50,8 +50,8 @@ static void hash_block(uint64_t lanes[LANES], const unsigned char *bytes) {
   }
 }
 
-/* The hash of version 1, which is read for ever. Eight lanes take the little-endian 64-bit words in
- * turn, the last block padded with zeros:
+/* Compute the hash of files of version 1. Eight lanes take the little-endian 64-bit words in turn,
+ * the last block padded with zeros:
  *
  *     lane = rotate_left(lane ^ word, 29) * 0x9E3779B97F4A7C15        lane j begins at seed + j
  *
@@ -89,7 +89,7 @@ static uint64_t hash_text(hash_function *hash, const char *text, uint64_t seed) 
   return hash(text, strlen(text), seed);
 }
 
-/* "F32 [20000,3]" */
+/* Hash the element type and shape as text, "F32 [20000,3]". */
 static uint64_t hash_kind(const supine_tensor *tensor, uint64_t seed) {
   char text[32 + 21 * SUPINE_TENSOR_RANK_MAX]; /* the longest count has 20 digits */
   size_t used =
@@ -102,7 +102,7 @@ static uint64_t hash_kind(const supine_tensor *tensor, uint64_t seed) {
   return hash_text(xxh64, text, seed);
 }
 
-/* Of version 1: shapes as 64-bit words. */
+/* Hash the element type as text and the shape as 64-bit words, as in files of version 1. */
 static uint64_t hash_kind_1(const supine_tensor *tensor, uint64_t seed) {
   uint64_t shape[SUPINE_TENSOR_RANK_MAX] = {0};
   for (size_t r = 0; r < tensor->rank; ++r) {
@@ -112,6 +112,7 @@ static uint64_t hash_kind_1(const supine_tensor *tensor, uint64_t seed) {
   return hash_1(shape, tensor->rank * sizeof *shape, name);
 }
 
+/* The hash functions and seeds of one version of the checksum. */
 typedef struct kind {
   hash_function *hash;
   uint64_t (*hash_kind)(const supine_tensor *tensor, uint64_t seed);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Memory where there are no files, as in WebAssembly. */
+/* Allocate memory, and refuse to map files, on systems without files, such as WebAssembly. */
 #include <stdlib.h>
 
 #include "runtime/safetensors/platform.h"
@@ -7,7 +7,8 @@
 supine_status supine_platform_map(const char *path, supine_platform_file *file,
                                   supine_error *error) {
   *file = (supine_platform_file){NULL, 0};
-  return supine_error_set(error, SUPINE_ERROR_READ, "%s: there are no files here: open its bytes",
+  return supine_error_set(error, SUPINE_ERROR_READ,
+                          "%s: this system has no files: open the bytes of the file in memory",
                           path);
 }
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * What differs between operating systems: a file as memory, and large memory. */
+ * Functions that differ between operating systems: mapping of files and allocation of large memory.
+ */
 #ifndef SUPINE_PLATFORM_H
 #define SUPINE_PLATFORM_H
 
@@ -8,24 +9,25 @@
 
 #include <supine/status.h>
 
-/** A file's bytes, read-only and shared with other processes that read it. */
+/** The bytes of a mapped file, read-only and shared with other processes that map it. */
 typedef struct supine_platform_file {
-  const void *bytes; /**< NULL where the file is empty */
+  const void *bytes; /**< NULL if the file is empty */
   size_t size;
 } supine_platform_file;
 
-/** Maps a file.
+/** Map a file into memory.
  * @param path  UTF-8
- * @retval SUPINE_ERROR_READ  missing, unreadable, or no file */
+ * @retval SUPINE_ERROR_READ  the file is missing or unreadable, or the path is not a regular file
+ */
 supine_status supine_platform_map(const char *path, supine_platform_file *file,
                                   supine_error *error);
-/** Gives it back; legal on a zeroed struct. */
+/** Unmap a file; legal on a zeroed struct. */
 void supine_platform_unmap(const supine_platform_file *file);
 
-/** Memory aligned to lines of the cache, not zeroed; in huge pages where it fills some and the
- * system has them. NULL: none is left. */
+/** Allocate memory, aligned to cache lines and not zeroed; in huge pages if it is large enough and
+ * the system has them. Return NULL if out of memory. */
 void *supine_platform_allocate(size_t bytes);
-/** Gives that back; NULL is legal. */
+/** Free memory of supine_platform_allocate; NULL is legal. */
 void supine_platform_free(void *memory);
 
 #endif

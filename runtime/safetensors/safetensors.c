@@ -5,7 +5,9 @@
 
 #include "runtime/safetensors/safetensors_file.h"
 
-/* Open bytes, which the file owns from here on if they are a mapping. */
+/* Open the bytes of a file. If they are a mapping, the open file owns it; on failure it is
+ * unmapped.
+ */
 static supine_status open_bytes(const void *bytes, size_t size, supine_platform_file mapping,
                                 const char *name, supine_safetensors **result,
                                 supine_error *error) {
@@ -61,7 +63,9 @@ void supine_safetensors_close(supine_safetensors *file) {
 supine_status supine_safetensors_verify(const supine_safetensors *file, supine_error *error) {
   const char *stated = supine_safetensors_metadata(file, "checksum");
   if (stated == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no checksum: not written by Supine",
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: no checksum, so that Supine has not written it: write it again "
+                            "with Supine",
                             file->name);
   }
   char found[CHECKSUM_SIZE];
@@ -70,6 +74,7 @@ supine_status supine_safetensors_verify(const supine_safetensors *file, supine_e
   return strcmp(stated, found) == 0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: corrupted: its checksum is %s, it states %.32s", file->name,
-                                found, stated);
+                                "%s: corrupted: it states checksum %.32s, but its content has %s: "
+                                "copy or write it again",
+                                file->name, stated, found);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The header of a safetensors file: strict JSON (RFC 8259), of which every number is checked. */
+/* Parse the header of a safetensors file: strict JSON (RFC 8259). Every number in it is checked. */
 #include <inttypes.h>
 #include <limits.h>
 #include <stdarg.h>
@@ -14,8 +14,8 @@ enum { PREFIX = 8, HEADER_MAX = 1 << 24, TENSORS_MAX = 1024, METADATA_MAX = 4096
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "tensors are little-endian");
 
-/* The header being parsed, which ends with a NUL. After the first failure nothing is taken any
- * more. */
+/* The header being parsed, which ends with a NUL. After the first failure, take() accepts no
+ * character and the first error is kept. */
 typedef struct parser {
   supine_safetensors *file;
   char *at, *end;
@@ -75,7 +75,8 @@ static char *put_utf8(char *to, uint32_t code) {
   return to;
 }
 
-/* Decode an escape: \n, \uXXXX or a surrogate pair; return the end of what it stands for. */
+/* Decode an escape (\n, \uXXXX or a surrogate pair) into `to`; return the end of the decoded text.
+ */
 static char *take_escape(parser *p, char *to) {
   static const char names[] = "\"\\/bfnrt";
   static const char meanings[] = "\"\\/\b\f\n\r\t";
@@ -99,11 +100,11 @@ static char *take_escape(parser *p, char *to) {
   return put_utf8(to, code);
 }
 
-/* Decode a string where it stands, as UTF-8 that ends with a NUL; "" after a failure. */
+/* Decode a string in place, to UTF-8 that ends with a NUL; return "" after a failure. */
 static const char *take_string(parser *p) {
   expect(p, '"');
   char *const begin = p->at;
-  char *to = begin; /* never ahead of p->at: an escape is longer than what it stands for */
+  char *to = begin; /* never ahead of p->at, as an escape is longer than its decoded text */
   while (p->status == SUPINE_OK && *p->at != '"') {
     const size_t length = supine_utf8_length(p->at, (size_t)(p->end - p->at));
     if (*p->at == '\\') {
@@ -124,8 +125,8 @@ static const char *take_string(parser *p) {
   return begin;
 }
 
-/* Take an array of at most `capacity` counts, without sign, fraction, exponent or leading zeros;
- * return how many there are. ULLONG_MAX is refused, as it also stands for what overflows. */
+/* Take an array of at most `capacity` integers without sign, fraction, exponent or leading zeros;
+ * return their number. ULLONG_MAX is refused, as strtoull also returns it for overflow. */
 static size_t take_counts(parser *p, size_t *values, size_t capacity) {
   size_t count = 0;
   expect(p, '[');
@@ -182,8 +183,8 @@ static supine_dtype take_dtype(parser *p, const char *tensor) {
   return (supine_dtype)dtype;
 }
 
-/* Parse {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, members in any order. `data` is
- * the first offset until the tensor is placed. */
+/* Parse {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, members in any order. Until
+ * place_tensors, `data` holds the first offset. */
 static void parse_tensor(parser *p, const char *name) {
   static const char *const members[] = {"dtype", "shape", "data_offsets"};
   supine_safetensors *file = p->file;
@@ -250,7 +251,7 @@ static void parse_header(parser *p) {
     } while (take(p, ','));
     expect(p, '}');
   }
-  if (take(p, '\0') || p->at != p->end) { /* white space alone may follow */
+  if (take(p, '\0') || p->at != p->end) { /* only white space may follow */
     fail_json(p);
   }
 }
@@ -270,7 +271,8 @@ static int compare_places(const void *left, const void *right) {
   return (places[0][key] > places[1][key]) - (places[0][key] < places[1][key]);
 }
 
-/* Check that the tensors fill the data exactly, and give each its address, or an aligned copy. */
+/* Check that the tensors fill the data exactly, and point each to its data or to an aligned copy.
+ */
 static supine_status place_tensors(parser *p, size_t data_begin) {
   supine_safetensors *file = p->file;
   const size_t data_size = file->size - data_begin;
@@ -322,7 +324,7 @@ supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *e
     fail(&p, "not a safetensors file");
     return p.status;
   }
-  size_t members = 1; /* at most, of all objects */
+  size_t members = 1; /* upper bound on the number of members of all objects */
   for (size_t i = 0; i < length; ++i) {
     members += file->bytes[PREFIX + i] == ':';
   }

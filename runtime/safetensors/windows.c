@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Files and memory of Windows. */
+/* Map files and allocate memory on Windows. */
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
 
@@ -9,7 +9,8 @@
 
 #include "runtime/safetensors/platform.h"
 
-/* The path in the system's own letters, to be freed; NULL: no UTF-8, or no memory. */
+/* Convert a path from UTF-8 to UTF-16; the caller frees it. Return NULL if it is not UTF-8 or if
+ * out of memory. */
 static wchar_t *widen(const char *path) {
   const int length = MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, path, -1, NULL, 0);
   wchar_t *wide = length > 0 ? malloc((size_t)length * sizeof *wide) : NULL;
@@ -19,7 +20,7 @@ static wchar_t *widen(const char *path) {
   return wide;
 }
 
-/* The mapping lives on when its handles are closed. */
+/* Map a file. The view stays valid after the handles are closed. */
 static const void *map_handle(HANDLE handle) {
   HANDLE mapping = CreateFileMappingW(handle, NULL, PAGE_READONLY, 0, 0, NULL);
   const void *bytes = mapping != NULL ? MapViewOfFile(mapping, FILE_MAP_READ, 0, 0, 0) : NULL;
