@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-/** A posture and a volume: "prone", "left:rest+500", "full-300", "2600mL". As an object: gravity, the direction in which
- * things fall in the patient's axes (supine, [0, 1, 0], where it is left out), with a volume (the basis's default) or a
- * gain, which is free of volumes: 0 is the file's surface. */
+/** A posture and a volume as text: "prone", "left:rest+500", "full-300", "2600mL". As an object: gravity, the direction in
+ * which things fall in the patient's axes (default: supine, [0, 1, 0]), with a volume (default: that of the basis) or with
+ * one gain for all lungs, whatever volume it gives: 0 is the reference surface. */
 export type State = string | { gravity?: ArrayLike<number>; volume?: string; gain?: number };
 
 /** The numbers of a tensor of the file: a view, row-major. */
@@ -14,42 +14,43 @@ export interface Tensor {
  * `positions` and `normals`. Lengths are mm, volumes mL, axes LPS: +x left, +y posterior, +z head. */
 export interface Basis {
   readonly vertexCount: number;
-  /** The file's surface [3 N]. */
+  /** Reference positions [3 N]. */
   readonly vertices: Float32Array;
   /** Indices of vertices [3 M]. */
   readonly triangles: Uint32Array;
-  /** The vertices of each lung, from the first up to the second number. */
+  /** The vertices of each lung: index of the first, and index after the last. */
   readonly lungs: Record<string, [number, number]>;
   readonly metadata: Record<string, string>;
-  /** Positions [3 N] of the last `deform`: the file's surface before the first. */
+  /** Positions [3 N] of the last `deform` or `deformLit`; before the first, the reference positions. */
   readonly positions: Float32Array;
   /** Unit normals [3 N] of the last `deformLit`. */
   readonly normals: Float32Array;
-  /** Volume of each lung in the pose, gas and tissue. Throws where the surface is open. */
+  /** Volume of each lung in the pose, gas and tissue. Throws if the surface is open. */
   readonly volumes: Record<string, number>;
-  /** Bound, mm, on what storage and rounding cost any vertex in the pose. */
+  /** Bound on the error of storage and rounding of any vertex in the pose, mm. */
   readonly error: number;
-  /** Get a tensor of the file by name, as "coefficients"; undefined where it has none. */
+  /** Get a tensor of the file by its name, such as "coefficients"; undefined if the file has none of that name. */
   tensor(name: string): Tensor | undefined;
-  /** Pose the lungs: a few microseconds. A refused state leaves the pose as it was.
+  /** Set the pose to a state, in a few microseconds. If the state is refused, the pose does not change.
    * @throws SupineError */
   pose(state: State): this;
   /** Compute `positions` of the pose and return them. */
   deform(): Float32Array;
-  /** Compute `positions` and `normals` of the pose: by the file's modes of normals, else from the triangles. */
+  /** Compute `positions` and `normals` of the pose and return `positions`. Normals come from the file's modes of normals
+   * or, if it has none, from the triangles. */
   deformLit(): Float32Array;
-  /** Compute the expected error [N] of each vertex in the pose, mm (3-D RMS), counted from the scan or another state.
-   * The next call overwrites it.
+  /** Compute the expected error [N] of each vertex in the pose, mm (3-D RMS), if the positions in the scan or in state
+   * `since` are exact. The next call overwrites the result.
    * @throws SupineError */
   expectedError(since?: State): Float32Array;
 }
 
-/** What the library refused, in its words. */
+/** A failure that the library reports, with its message. */
 export class SupineError extends Error {
   readonly status: 'argument' | 'memory' | 'read' | 'format' | 'mesh' | 'open surface' | 'unsupported' | 'write' | 'numerical';
 }
 
-/** Open the bytes of a basis file, which are checked whole and copied.
- * @param options.wasm supine.wasm, bytes or compiled, where it is not beside this module
+/** Open the bytes of a basis file: check all of them, and copy them.
+ * @param options.wasm supine.wasm, as bytes or compiled, if it is not beside this module
  * @throws SupineError */
 export function open(source: ArrayBufferLike | ArrayBufferView, options?: { wasm?: BufferSource | WebAssembly.Module }): Promise<Basis>;

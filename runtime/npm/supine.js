@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The C library as WebAssembly, one instance for each basis: nothing allocates once a basis is open, so the memory
-// never grows and the arrays stay where they are.
+// Run the C library as WebAssembly, one instance for each basis. Nothing allocates after a basis is open, so that the
+// memory never grows and the arrays never move.
 
-// Of the C structs: sizes, and offsets in supine_basis_info, which only grows at its end; bytes.
+// Bytes of the C structs, and byte offsets in supine_basis_info, which only grows at its end.
 const STATE = 128, POSE = 8 * (256 + 3 * 16), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
-const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array]; // by supine_dtype
+const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array]; // in the order of supine_dtype
 const STATUS = ['ok', 'argument', 'memory', 'read', 'format', 'mesh', 'open surface', 'unsupported', 'write', 'numerical'];
 
 export class SupineError extends Error {
@@ -23,7 +23,7 @@ class Basis {
     this.#c = instance.exports;
     this.#c._initialize();
     const size = 2 * (STATE + POSE) + VOLUMES + TEXT + ERROR;
-    this.#state = this.#allocate(size); // of doubles, as is what follows up to the text
+    this.#state = this.#allocate(size); // all parts before the text are aligned for doubles
     this.#pose = this.#state + STATE;
     this.#nextState = this.#pose + POSE;
     this.#nextPose = this.#nextState + STATE;
@@ -59,7 +59,7 @@ class Basis {
     for (let at = pairs, end = pairs + 8 * this.#word(this.#text); at < end; at += 8) {
       this.metadata[this.#string(this.#word(at))] = this.#string(this.#word(at + 4));
     }
-    this.deform(); // of gains 0: the file's surface
+    this.deform(); // with gains of 0: the reference surface
   }
 
   tensor(name) {
@@ -113,7 +113,7 @@ class Basis {
     return this.#view(Float32Array, this.#expected, this.vertexCount);
   }
 
-  /** Fill in the next state: supine, and of the default volume, where `state` does not say. */
+  /** Fill in the next state; without a posture it is supine, without a volume it has the default volume. */
   #read(state) {
     const { gravity = [0, 1, 0], volume = '' } = typeof state === 'string' ? { volume: state } : state;
     this.#view(Uint8Array, this.#nextState, STATE).fill(0);
@@ -152,7 +152,7 @@ class Basis {
   }
 }
 
-let beside; // the library beside this file, compiled once
+let beside; // promise of the library beside this file, compiled once
 
 async function load() {
   const url = new URL('./supine.wasm', import.meta.url);
@@ -163,7 +163,7 @@ async function load() {
 export async function open(source, { wasm } = {}) {
   const bytes = ArrayBuffer.isView(source) ? new Uint8Array(source.buffer, source.byteOffset, source.byteLength) : new Uint8Array(source);
   const module = wasm === undefined ? await (beside ??= load()) : wasm instanceof WebAssembly.Module ? wasm : await WebAssembly.compile(wasm);
-  // The C library's printf could write to files; none are there.
+  // printf of the C runtime imports functions that write to files: refuse them.
   const none = () => 52; // ENOSYS
   const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: { fd_close: none, fd_seek: none, fd_write: none } });
   return new Basis(instance, bytes);

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Builds the run-time library, by CMake, and puts it into the package.
+"""Build the run-time library with CMake, and put it into the package.
 
-SUPINE_LIBRARY names a shared library that is there already, of these very sources."""
+If the environment variable SUPINE_LIBRARY names a shared library built from the same sources, use that one."""
 import glob
 import os
 import re
@@ -35,8 +35,8 @@ class Build(build_py):
 
 
 class Wheel(bdist_wheel):
-    """One wheel for every Python: nothing in it is compiled against Python. On Linux its tag states the oldest glibc
-    that has every symbol that the library asks for."""
+    """Build one wheel for every Python, as nothing in it is compiled against Python. On Linux, its tag states the
+    oldest glibc that has every symbol that the library needs."""
     def get_tag(self):
         platform = super().get_tag()[2]
         with open(os.path.join(self.get_finalized_command("build_py").build_lib, "supine/libsupine_runtime.so"), "rb") as library:

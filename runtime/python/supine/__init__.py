@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lungs that sag and breathe, at the C library's speed.
+"""Deform lungs by gravity and breathing, at the speed of the C library.
 
     import supine
 
@@ -50,7 +50,7 @@ _VOXELS = {"int8": "int8", "uint8": "uint8", "int16": "int16", "uint16": "uint16
 
 
 def _three(gravity: Gravity) -> Any:
-    """Gravity as C has it: of a posture's name, or three numbers as they are."""
+    """Convert gravity, a posture's name or three numbers, to a C array."""
     if isinstance(gravity, str):
         state = _c.State()
         _c.state_parse_posture(gravity.encode(), state)
@@ -66,12 +66,13 @@ def _numbers(values: ArrayLike, count: int, name: str) -> Any:
 
 
 def gravity(posture: Gravity) -> Doubles:
-    """The unit vector, where things fall, of a posture: `gravity("prone")` is (0, -1, 0)."""
+    """Return gravity in a posture, a unit vector that points where things fall: `gravity("prone")` is (0, -1, 0)."""
     return np.array(_three(posture))
 
 
 def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
-    """Gravity of a body that W, X, Y, Z turns from its own axes into a world whose z points up."""
+    """Compute gravity for a body's orientation: a quaternion W, X, Y, Z that rotates from body axes to world axes, in
+    a world whose z points up."""
     out = (ctypes.c_double * 3)()
     status = _c.posture_quaternion(_numbers(quaternion, 4, "quaternion"), out)
     if status != 0:
@@ -80,7 +81,7 @@ def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
 
 
 def tilt(posture: Gravity, degrees: float) -> Doubles:
-    """Gravity turned in the sagittal plane: supine by +15 degrees is head down."""
+    """Turn gravity in the sagittal plane: supine by +15 degrees is head down."""
     out = (ctypes.c_double * 3)()
     status = _c.posture_tilt(_three(posture), degrees, out)
     if status != 0:
@@ -89,21 +90,22 @@ def tilt(posture: Gravity, degrees: float) -> Doubles:
 
 
 def postures() -> tuple[str, ...]:
-    """Every posture's name."""
+    """Return the names of all postures."""
     return tuple(_c.string(_c.posture_name(i)) for i in range(_c.posture_count()))
 
 
 def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale: float = 1 / 3,
            rest_pressure: float = 5.0, course: str = "cosine",
            pv: Optional[ArrayLike] = None) -> Doubles:
-    """mL above rest at times in s, as `supine breathe` breathes; a breath begins at 0.
+    """Compute the volume in mL above rest at times in s, for repeated breaths as in `supine breathe`; one begins at 0.
 
+    tidal          mL inhaled
     rate           breaths a minute
-    inhale         share of the breath's time that is inhalation
+    inhale         fraction of the breath's time that is inhalation
     rest_pressure  cmH2O at the end of an exhalation
-    course         of the pressure: "cosine", "ramp"; "flow" is a constant flow
-    pv             [2, 9], inhale and exhale: P_low, P_high (cmH2O), V_low, V_high (mL) and c1 to c5, as
-                   `supine pv fit` finds them; a normal adult's by default
+    course         course of the pressure, "cosine" or "ramp"; or "flow", a constant flow
+    pv             [2, 9], for inhalation and exhalation: P_low, P_high (cmH2O), V_low, V_high (mL) and c1 to c5, as
+                   `supine pv fit` finds them; default: a normal adult's
     """
     times = np.asarray(times, np.float64)
     flat = np.ascontiguousarray(times).ravel()
@@ -118,13 +120,13 @@ class Pose(_c.CPose):
     """Weights and gains of one state of a basis; `Basis.pose` makes it."""
 
     def fill(self, gain: float) -> Pose:
-        """Sets every gain to one number, free of volumes: for open surfaces and fields."""
+        """Set every gain to one number, without regard to volumes: for open surfaces and fields."""
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
 
 
 def _address(array: Floats, count: int, name: str, writable: bool = True) -> int:
-    """Where the numbers of an array are that C reads or writes."""
+    """Check an array of `count` float32 numbers that C reads or writes; return its address."""
     if array.dtype is not _FLOAT and array.dtype != _FLOAT or array.size != count:
         raise ValueError(f"{name} must be an array of {count} numbers of type float32")
     if not array.flags.c_contiguous:
@@ -135,7 +137,7 @@ def _address(array: Floats, count: int, name: str, writable: bool = True) -> int
 
 
 def _state(state: Gravity, volume: str = "") -> Any:
-    """A state as C has it: supine, and of the default volume, where the text does not say."""
+    """Convert a state to a C struct; without a posture it is supine, without a volume it has the default volume."""
     wanted = _c.State(_SUPINE)
     if isinstance(state, str):
         _c.state_parse(state.encode(), wanted)
@@ -147,7 +149,7 @@ def _state(state: Gravity, volume: str = "") -> Any:
 
 
 class _Owner:
-    """The open basis; arrays that are views of its memory hold it."""
+    """The open basis, closed when the last array that is a view of its memory is gone."""
 
     def __init__(self, source: Source, options: _c.Options) -> None:
         self.pointer = ctypes.c_void_p()
@@ -162,7 +164,7 @@ class _Owner:
         _c.basis_close(self.pointer)
 
     def view(self, data: int, kind: Any, shape: Sequence[int]) -> NDArray[Any]:
-        """Memory of the basis as an array, read-only."""
+        """Return memory of the basis as a read-only array."""
         block = (kind * int(np.prod(shape, dtype=np.int64))).from_address(data or ctypes.addressof(self.pointer))
         block.owner = self
         array = np.frombuffer(block, np.dtype(kind)).reshape(shape)
@@ -171,18 +173,18 @@ class _Owner:
 
 
 class Basis:
-    """An open basis file; `supine.open` makes it. It is released when nothing uses it any more.
+    """An open basis file, made by `supine.open`. It is closed when nothing uses it any more.
 
-    vertices      float32 [N, 3], the file's surface, mm
+    vertices      float32 [N, 3], reference positions, mm
     triangles     uint32 [M, 3]
     coefficients  float32 [N, K], or [N, 3, K] where `vector`
     direction     float32 [N, 3]; None where `vector`
     modes         float64 [K, (band + 1)^2]
-    bounds        float32 [G, 2, 3], each lung's box
+    bounds        float32 [G, 2, 3], lowest and highest corner of the box around each lung, mm
     lungs         the vertices of each lung: name -> slice
-    metadata      the file's own words: key -> text
-    storage_error mm, the bound on what compact storage costs a breath of 500 mL
-    report        what the program said when `precompute` or `embed` made the basis
+    metadata      the metadata of the file: key -> text
+    storage_error bound on the error of storage and rounding 500 mL above the reference surface, mm
+    report        what the program printed when `precompute` or `embed` made the basis
     """
     report: str = ""
 
@@ -227,29 +229,29 @@ class Basis:
         return self._owner.view(tensor.data, _c.DTYPES[tensor.dtype], tensor.shape[:tensor.rank])
 
     def tensor(self, name: str) -> Optional[NDArray[Any]]:
-        """Any tensor of the file as a view; None where it has none of that name."""
+        """Return a tensor of the file as a view; None if the file has no tensor of that name."""
         return self._tensor(name) if _c.basis_tensor(self._c, name.encode()) else None
 
     @property
     def faces(self) -> NDArray[np.int64]:
-        """Triangles as pyvista.PolyData and vtkCellArray.ImportLegacyFormat take them: 3, a, b, c,
-        3, ...; made anew."""
+        """The triangles as a new array for pyvista.PolyData and vtkCellArray.ImportLegacyFormat: 3, a, b, c, 3, ..."""
         faces = np.empty((self.triangle_count, 4), np.int64)
         faces[:, 0] = 3
         faces[:, 1:] = self.triangles
         return faces.ravel()
 
     def pose(self, state: Gravity, volume: str = "", out: Optional[Pose] = None) -> Pose:
-        """Weights and gains of a state, once a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
-        `pose((0, 0.6, -0.8), "rest")`. Without a volume: rest where it is known."""
+        """Compute the weights and gains of a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
+        `pose((0, 0.6, -0.8), "rest")`. Without a volume, the state is at rest if the basis has rest. Give `out` to
+        write into a pose."""
         out = Pose() if out is None else out
         _c.basis_pose(self._c, _state(state, volume), out)
         return out
 
     def expected_error(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> Floats:
-        """Expected error [N] of the positions of a state, mm, 3-D RMS, counted from the scan or from another
-        state: half of all points lie within 0.9 times theirs, 95 % within 1.8. It was measured on full breaths
-        in one posture; for a change of posture it is an extrapolation."""
+        """Compute the expected error [N] of the positions of a state, mm, 3-D RMS, if the positions in the scan or in
+        state `since` are exact. Half of all points lie within 0.9 times their expected error, 95 % within 1.8 times.
+        It was measured on full breaths in one posture; for a change of posture it is an extrapolation."""
         sigma = np.empty(self.vertex_count, _FLOAT)
         _c.expected_error(self._c, _state(state, volume), None if since is None else _state(since),
                           _address(sigma, self.vertex_count, "sigma"))
@@ -257,7 +259,7 @@ class Basis:
 
     @property
     def points(self) -> dict[str, int]:
-        """The vertex of each named point of a file of `supine embed`: name -> index; made anew."""
+        """The vertex of each named point of a file of `supine embed`, as a new dict: name -> index."""
         names, part = self.tensor("names"), self.tensor("part")
         if names is None or part is None:
             return {}
@@ -267,22 +269,24 @@ class Basis:
 
     def locate(self, vertices: Sequence[int], positions: ArrayLike, state: Gravity = _SUPINE, volume: str = "", *,
                noise: float = 2.0, rigid: bool = False) -> Location:
-        """Finds the lungs from observed points of this basis, usually one of `supine embed`: their vertices,
-        and where they were seen [n, 3], mm, in any frame that the body is shifted to (and turned, where
-        `rigid`). Without a volume it is found too."""
+        """Find the lungs from observed points of this basis, usually one of `supine embed`: their vertices, and their
+        observed positions [n, 3], mm, in a frame that may be translated from the body's (and rotated, if `rigid`).
+        Without a volume, find it as well.
+
+        noise  standard deviation of a position per axis, mm"""
         return Location(self, vertices, positions, _state(state, volume), noise, rigid)
 
     def warp(self, image: NDArray[Any], states: Union[str, Sequence[str]], *, step: ArrayLike = (1.0, 1.0, 1.0),
              origin: ArrayLike = (0.0, 0.0, 0.0), labels: bool = False, density: bool = False, since: str = "") -> Any:
-        """Moves an image of the scan [z, y, x] into a state, or into each of a list of states, by the basis of a
-        grid (of `embed`) and the program, as `precompute`: the image on its own voxels, of
-        its own type; for a list, a list.
+        """Move an image [z, y, x] of the scan into a state, or into each of a list of states. This basis must be that
+        of a grid (`embed` with grid=...). It runs the program `supine`, as `precompute` does. Return an image on the
+        same voxels and of the same type; for a list of states, a list of images.
 
-        step     mm from voxel to voxel, (x, y, z), or a vector for each of the three, [3, 3], LPS
-        origin   of the first voxel's centre, mm, LPS
-        labels   takes the nearest voxel, for label maps
-        density  scales Hounsfield units by the change of volume, so that mass is kept
-        since    the state that the image is in, where it is not the scan
+        step     mm from voxel to voxel, (x, y, z); or a vector for each of the three axes, [3, 3], LPS
+        origin   centre of the first voxel, mm, LPS
+        labels   take the nearest voxel instead of interpolating, for label maps
+        density  scale Hounsfield units by the change of volume, so that mass is kept
+        since    state of the image, if it is not that of the scan
         """
         image = np.ascontiguousarray(image, image.dtype.newbyteorder("<"))
         if image.ndim != 3 or image.dtype.name not in _VOXELS:
@@ -316,15 +320,15 @@ class Basis:
         return moved[0] if isinstance(states, str) else moved
 
     def weights(self, pose: Pose) -> Doubles:
-        """The weights [K] of a pose: a view of it."""
+        """Return the weights [K] of a pose, as a view of it."""
         return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
 
     def gains(self, pose: Pose) -> Doubles:
-        """The gains [G, 3] of a pose, of each lung along x, y and z: a view of it."""
+        """Return the gains [G, 3] of a pose, those of each lung along x, y and z, as a view of it."""
         return np.ctypeslib.as_array(pose.gains)[:len(self.lungs)]
 
     def volumes(self, pose: Pose) -> Doubles:
-        """What each lung holds in a pose, gas and tissue, mL [G]."""
+        """Compute the volume [G] of each lung in a pose, gas and tissue, mL."""
         if not self.has_volume:
             raise OpenSurfaceError("the surface is open and encloses no volume")
         volumes = np.empty(len(self.lungs))
@@ -332,7 +336,7 @@ class Basis:
         return volumes
 
     def error(self, pose: Pose) -> float:
-        """Bound, mm, on what storage and rounding cost any vertex there."""
+        """Return a bound on the error of storage and rounding of any vertex in a pose, mm."""
         return _c.basis_error(self._c, pose)
 
     def _range(self, begin: int, end: Optional[int]) -> tuple[int, int]:
@@ -342,14 +346,14 @@ class Basis:
         return end, 3 * (end - begin)
 
     def deform(self, pose: Pose, out: Optional[Floats] = None, begin: int = 0, end: Optional[int] = None) -> Floats:
-        """Positions [N, 3] of the vertices, or of those in a range; into `out`, where it is given."""
+        """Compute the positions [N, 3], mm, of all vertices, or of those in a range; write them into `out` if given."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         _c.deform_range(self._c, pose, begin, end, _address(out, size, "out"))
         return out
 
     def displace(self, pose: Pose, out: Optional[Floats] = None, begin: int = 0, end: Optional[int] = None) -> Floats:
-        """Displacements [N, 3] from the file's surface, as `deform`."""
+        """Compute the displacements [N, 3] from the reference surface, mm; parameters as `deform`."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         _c.displace_range(self._c, pose, begin, end, _address(out, size, "out"))
@@ -357,7 +361,7 @@ class Basis:
 
     def deform_lit(self, pose: Pose, out: Optional[Floats] = None, normals: Optional[Floats] = None,
                    begin: int = 0, end: Optional[int] = None) -> tuple[Floats, Floats]:
-        """Positions and unit normals, without a look at triangles; needs `has_normals`."""
+        """Compute positions and unit normals, without a pass over the triangles; requires `has_normals`."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         normals = np.empty((end - begin, 3), _FLOAT) if normals is None else normals
@@ -369,7 +373,7 @@ class Basis:
 
     def deform_batch(self, poses: Sequence[Pose], out: Optional[Floats] = None, begin: int = 0,
                      end: Optional[int] = None) -> Floats:
-        """Positions [T, N, 3] in many poses at once."""
+        """Compute the positions [T, N, 3] in T poses at once."""
         count = len(poses)
         end, size = self._range(begin, end)
         out = np.empty((count, end - begin, 3), _FLOAT) if out is None else out
@@ -377,20 +381,20 @@ class Basis:
         return out
 
     def normals(self, xyz: Floats, out: Optional[Floats] = None) -> Floats:
-        """Unit normals [N, 3] of a deformed surface, exactly, from its triangles."""
+        """Compute the unit normals [N, 3] of a deformed surface from its triangles."""
         out = np.empty((self.vertex_count, 3), _FLOAT) if out is None else out
         _c.normals(self._c, _address(xyz, self._size, "xyz", False), _address(out, self._size, "out"))
         return out
 
 
 class Location:
-    """Lungs found from observed points; `Basis.locate` makes it.
+    """The result of `Basis.locate`: lungs found from observed points.
 
-    volume, volume_error   mL, and its standard deviation (0 where it was given)
+    volume, volume_error   volume of all lungs and its standard deviation, mL (0 if the volume was given)
     rotation, translation  observed = rotation @ (body + correction) + translation
-    distances, sigmas      [n] of each observed point from where all others put it, mm, and what was expected
-    outliers               [n] which observations did not fit and were left out
-    log_evidence           for comparing postures
+    distances, sigmas      [n] distance of each point from its prediction by all others, and its expected value, mm
+    outliers               [n] True for observations that do not fit and were left out
+    log_evidence           log likelihood, to compare results that differ only in the posture
     """
 
     def __init__(self, inside: Basis, vertices: Sequence[int], positions: ArrayLike, state: Any, noise: float,
@@ -416,34 +420,37 @@ class Location:
         self.outliers: NDArray[np.bool_] = np.array([r.outlier for r in residuals])
 
     def positions(self, basis: Basis) -> tuple[Floats, Floats]:
-        """Positions [N, 3] of a basis of the same lungs where the points were seen, and their expected errors
-        [N], mm."""
+        """Compute the positions [N, 3] of a basis of the same lungs in the frame of the observations, and their
+        expected errors [N], mm."""
         xyz, sigma = np.empty((basis.vertex_count, 3), _FLOAT), np.empty(basis.vertex_count, _FLOAT)
         _c.locate_positions(self._c, basis._c, xyz.ctypes.data, sigma.ctypes.data)
         return xyz, sigma
 
 
 def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> Basis:
-    """Opens a basis file, or one in memory (bytes), checked whole.
+    """Open a basis file, or one in memory (bytes), and check all of it.
 
-    storage  how coefficients are kept: "auto" is the smallest that errs by 0.005 mm at most; "exact"
-    normals  False leaves the normals out of memory
+    storage  how numbers are kept in memory: "exact", "int16", "mixed"; or "auto", the smallest of these whose error is
+             at most 0.005 mm
+    simd     instruction set: "portable", "avx2", "avx512"; or "auto", the widest of this processor
+    normals  False ignores the file's normals, to save memory
     """
     return Basis(source, storage=storage, simd=simd, normals=normals)
 
 
 def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
-    """Make a basis from lung surfaces by the program `supine`, beside this package or on PATH:
+    """Make a basis from lung surfaces with the program `supine`, beside this package or on PATH:
 
-        precompute(vertices, faces, scanned="supine:rest")      # both lungs, or one: [N, 3], [M, 3]
-        precompute((vertices, faces), (vertices, faces))        # a lung each
+        precompute(vertices, faces, scanned="supine:rest")      # one lung or both: [N, 3], [M, 3]
+        precompute((vertices, faces), (vertices, faces))        # one surface for each lung
         precompute("lungs.nii.gz", resting={"supine": "2600mL"}, output="lungs.safetensors")
 
-    The basis has the vertices of the left lung first, each in the order given. Options are those of `supine precompute
-    --help`: held_out=200 is --held-out 200, True a flag, a tuple one value of several numbers, a list the option once
-    for each. Without `output` the basis is in memory alone; warnings are Python's.
+    The basis has the vertices of the left lung first, those of each lung in the given order. Options are those of
+    `supine precompute --help`: held_out=200 gives --held-out 200, True gives a flag, a tuple one value of several
+    numbers, a dict one value a=b,c=d, a list repeats the option. Without `output`, the basis is only in memory.
+    Warnings of the program become Python warnings.
 
-    progress  called with the part that is done, 0 to 1; what it raises ends the program
+    progress  called with the fraction done, 0 to 1; an exception from it stops the program
     """
     if len(surfaces) == 2 and not isinstance(surfaces[0], (str, tuple, os.PathLike)):
         surfaces = (surfaces,)
@@ -451,13 +458,13 @@ def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **o
 
 
 def embed(lungs: Basis, *content: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
-    """Make a basis of what is inside the lungs of a basis and moves with them:
+    """Make a basis of content that is inside the lungs of a basis and moves with them:
 
         embed(lungs, {"nodule": (-80, -120, -90)})              # points by name; or an array [n, 3]
         embed(lungs, (vertices, faces), "airways.ply")          # meshes
-        embed(lungs, "labels.nii.gz", labels="7=nodule")        # and whatever `supine embed --help` has
+        embed(lungs, "labels.nii.gz", labels="7=nodule")        # and all options of `supine embed --help`
 
-    Options, output and progress are as `precompute` has them."""
+    Options, output and progress as in `precompute`."""
     return _made("embed", lungs._owner.source, content, options, progress)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The C library, call by call: its types, its functions and its statuses as exceptions."""
+"""Declare the types and functions of the C library, and its statuses as exceptions."""
 from __future__ import annotations
 
 import ctypes
@@ -12,7 +12,7 @@ MODES_MAX, LUNGS_MAX = 256, 16
 
 
 def _load() -> ctypes.CDLL:
-    """The library in this folder, as wheels have it; else the system's."""
+    """Load the library in this folder, where wheels have it, or else the system's."""
     beside = os.path.join(os.path.dirname(__file__), "libsupine_runtime.so")
     return ctypes.CDLL(beside if os.path.exists(beside) else ctypes.util.find_library("supine_runtime"))
 
@@ -21,7 +21,7 @@ _c = _load()
 
 
 class Error(Exception):
-    """What the C library refused; its text is the exception's."""
+    """A failure that the C library or the program reports, with its message."""
 
 
 class ArgumentError(Error, ValueError):
@@ -56,7 +56,7 @@ class NumericalError(Error, ArithmeticError):
     pass
 
 
-# By supine_status.
+# Exceptions in the order of supine_status.
 _ERRORS = (Error, ArgumentError, OutOfMemoryError, ReadError, FormatError, MeshError, OpenSurfaceError,
            UnsupportedError, Error, NumericalError, Error)
 for _kind in _ERRORS:
@@ -88,11 +88,11 @@ class CPose(ctypes.Structure):
 
 
 class GivenPose:
-    """A pose as an argument, which None is not."""
+    """Argument type of a pose: refuses None, which POINTER(CPose) would accept."""
     @staticmethod
     def from_param(pose: Any) -> Any:
         if not isinstance(pose, CPose):
-            raise TypeError("a pose is wanted: see Basis.pose")
+            raise TypeError("the argument must be a pose: make one with Basis.pose")
         return ctypes.byref(pose)
 
 
@@ -120,7 +120,7 @@ class Tensor(ctypes.Structure):
     _fields_ = [("name", c_char_p), ("dtype", c_int), ("rank", c_size_t), ("shape", c_size_t * 4), ("data", c_void_p)]
 
 
-# By supine_dtype.
+# Element types in the order of supine_dtype.
 DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16)
 
 
@@ -165,7 +165,7 @@ def _declare(name: str, result: Any, *arguments: Any) -> Any:
 
 
 def _checked(name: str, *arguments: Any) -> Any:
-    """A function whose last argument is a supine_error: raises where it fails."""
+    """Declare a function whose last argument is a supine_error; it raises an exception if it fails."""
     function = _declare(name, c_int, *arguments, POINTER(CError))
 
     def call(*given: Any) -> None:
@@ -177,7 +177,7 @@ def _checked(name: str, *arguments: Any) -> Any:
 
 
 def fail(status: int, message: bytes = b"") -> None:
-    """Raises the status's exception."""
+    """Raise the exception of a status."""
     text = message or status_string(status)
     raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text.decode(errors="replace"))
 
@@ -213,5 +213,5 @@ normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 
 
 def string(text: Optional[bytes]) -> str:
-    """UTF-8 as a str."""
+    """Decode UTF-8; None gives ""."""
     return (text or b"").decode(errors="replace")

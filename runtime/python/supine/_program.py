@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program `supine`, run for what the library cannot do: it makes bases."""
+"""Run the program `supine` for tasks that are not in the library: making bases and moving images."""
 from __future__ import annotations
 
 import csv
@@ -21,22 +21,22 @@ _EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: 
 
 
 def _find() -> str:
-    """The program beside this file, or on PATH."""
+    """Find the program beside this file, or on PATH."""
     found = shutil.which("supine", path=os.path.dirname(__file__)) or shutil.which("supine")
     if found is None:
         raise _c.UnsupportedError("the program 'supine' is neither on PATH nor beside the package: install it, as "
-                                  "precompute and embed run it")
+                                  "precompute, embed and warp run it")
     return found
 
 
 def _words(options: dict[str, Any]) -> list[str]:
-    """Options as the program takes them: held_out=200 is --held-out 200, True a flag, a tuple a,b,c, a dict a=b,c=d,
-    a list the option once for each."""
+    """Convert options to arguments of the program: held_out=200 gives --held-out 200, True a flag, a tuple a,b,c, a
+    dict a=b,c=d, and a list repeats the option."""
     words: list[str] = []
     for name, given in options.items():
         for value in given if isinstance(given, list) else [given]:
             if isinstance(value, np.ndarray):
-                raise TypeError(f"{name}: an array is no option's value: give a tuple, or a file")
+                raise TypeError(f"{name}: an option cannot be an array: give a tuple, or a file")
             if isinstance(value, dict):
                 value = tuple(f"{key}={part}" for key, part in value.items())
             if isinstance(value, tuple):
@@ -58,7 +58,7 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
         raise ValueError(f"faces must be integers [M, 3], not {corners.dtype} {list(corners.shape)}")
     records = np.empty(len(corners), [("count", "u1"), ("corner", "<i4", 3)])
     records["count"] = 3
-    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # what is out of range stays so, and the program names it
+    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # indices out of range stay so: the program reports them
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n"
                    b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
@@ -67,7 +67,7 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
 
 
 def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[float]]]) -> None:
-    """Write points [n, 3], or of each name one, as CSV."""
+    """Write points [n, 3], or a dict of names and points, as CSV."""
     names = [[name] for name in points] if isinstance(points, Mapping) else None
     places = np.asarray(list(points.values()) if isinstance(points, Mapping) else points, np.float64)
     if places.size == 0 or places.shape[-1] != 3:
@@ -80,7 +80,7 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
 
 
 def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
-    """What the program says on its terminal until it ends, without its progress, which goes to `progress`."""
+    """Read the program's terminal until it ends: call `progress` with its progress, and return all other lines."""
     said, line = "", b""
     if progress is not None:
         progress(0.0)
@@ -102,10 +102,11 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
 
 def run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
         progress: Optional[Progress]) -> str:
-    """Run a command; what it reports. Warnings become Python's, errors exceptions with its text.
+    """Run a command and return its standard output. Its warnings become Python warnings, its errors exceptions with
+    its message.
 
-    names  what files made from arrays are called there: path -> name"""
-    import pty  # which Windows has not
+    names  names of temporary files to show in messages instead of their paths: path -> name"""
+    import pty  # Windows does not have it
 
     arguments = [_find(), command, *_words(options), "--", *operands]
     terminal, other_end = pty.openpty()
@@ -114,7 +115,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
         os.close(other_end)
         try:
             said = _listen(terminal, command, progress)
-        except BaseException:  # as Ctrl+C, or of `progress`
+        except BaseException:  # also Ctrl+C and exceptions of `progress`
             process.terminate()
             raise
         finally:
@@ -143,10 +144,10 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
 
 def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, Any],
          progress: Optional[Progress]) -> tuple[Any, str]:
-    """Run a command that makes a basis; the basis, bytes or a path, and what the program reports.
+    """Run a command that makes a basis; return the basis, as bytes or as the path `output`, and the standard output.
 
     lungs    None, or a basis: its path, or its bytes
-    content  paths, (vertices, faces), points; arrays are written to a folder that goes afterwards"""
+    content  paths, (vertices, faces) or points; arrays are written to a temporary folder"""
     with tempfile.TemporaryDirectory(prefix="supine-") as folder:
         operands: list[str] = []
         names: dict[str, str] = {}
