@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The Gauss-Legendre x equispaced quadrature rule on the sphere. */
+/* Compute the Gauss-Legendre x equispaced quadrature rule on the sphere. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -8,10 +8,12 @@
 
 #include "sh/grid.h"
 
-/* GSL tabulates some sizes and computes the others to about 1e-11. One Newton step on P_n makes
- * those exact to rounding: its error is 1e-22. work: [2 (n + 1)]
+/* Refine nodes z and weights w to rounding error, by one Newton step on P_n: GSL tabulates rules of
+ * some sizes, but computes the others only to about 1e-11, whose error one step reduces to 1e-22.
  *
- *     w = 2 / ((1 - z^2) P_n'(z)^2) */
+ *     w = 2 / ((1 - z^2) P_n'(z)^2)
+ *
+ * `work` has room for 2 (n + 1) numbers. */
 static void refine(supine_sh_grid *grid, double *work) {
   const size_t n = grid->latitudes;
   double *p = work;

@@ -8,7 +8,7 @@
 
 #include <supine/status.h>
 
-/** Most latitudes or longitudes of a rule. */
+/** Largest number of latitudes or longitudes of a rule. */
 #define SUPINE_SH_GRID_MAX 16384
 
 /** A rule of latitudes x longitudes directions. Direction (j, k) has cos(colatitude) = z[j] and
@@ -23,8 +23,10 @@ typedef struct supine_sh_grid {
 /** Create the rule with the given numbers of latitudes and longitudes (1 to SUPINE_SH_GRID_MAX
  * each). It integrates products of two functions of band L exactly if latitudes > L and
  * longitudes > 2 L.
- * @retval SUPINE_ERROR_ARGUMENT  a number out of range
- * @retval SUPINE_ERROR_MEMORY    (if GSL runs out, after its error handler) */
+ * @param grid  written; free it with supine_sh_grid_destroy. NULL on failure
+ * @retval SUPINE_ERROR_ARGUMENT  a number is out of range
+ * @retval SUPINE_ERROR_MEMORY    an allocation failed; for GSL's own, its error handler runs first
+ */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
 /** Free a rule; NULL is legal. */

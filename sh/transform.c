@@ -15,12 +15,12 @@
 struct supine_sh_transform {
   size_t band, fields;
   const supine_sh_grid *grid;
-  double *legendre;       /* of one latitude, in GSL's order */
+  double *legendre;       /* Legendre functions at one latitude, in GSL's order */
   fftw_complex *spectrum; /* [longitudes / 2 + 1, fields] */
   fftw_plan fft;
 };
 
-/* FFTW_ESTIMATE makes the same plan every time, in microseconds. */
+/* Plan the FFT. FFTW_ESTIMATE makes the same plan every time, in microseconds. */
 static fftw_plan plan_fft(supine_sh_transform *plan) {
   const int longitudes = (int)plan->grid->longitudes;
   const int fields = (int)plan->fields;
@@ -72,8 +72,8 @@ void supine_sh_transform_destroy(supine_sh_transform *plan) {
   }
 }
 
-/* GSL's SPHARM functions are orthonormal with exp(i m phi); a real harmonic of m > 0 is sqrt(2)
- * times that. */
+/* GSL's SPHARM functions are normalised for exp(i m phi). The real harmonics of m > 0 have cos or
+ * sin (m phi) in its place, and so a factor sqrt(2). */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
                               double *coefficients) {
   const size_t count = supine_sh_count(plan->band);

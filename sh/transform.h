@@ -3,8 +3,9 @@
  *
  *     coefficient(l, m) = integral over the sphere of value(g) Y(l, m)(g)
  *
- * by the grid's quadrature: exact to rounding for fields of the plan's band; in others, higher
- * bands alias into it. Fields do not mix. */
+ * by the quadrature of the grid: exact to rounding for fields without bands above the plan's; in
+ * other fields, the higher bands alias into the coefficients. Each field is transformed on its own.
+ */
 #ifndef SUPINE_TRANSFORM_H
 #define SUPINE_TRANSFORM_H
 
@@ -13,11 +14,11 @@
 #include "sh/grid.h"
 #include <supine/status.h>
 
-/** A plan for one band, one grid and a number of fields, for one thread at a time. Only one
- * thread at a time may create or destroy plans (FFTW's planner). */
+/** A plan for one band, one grid and a number of fields. Only one thread at a time may use a plan,
+ * and only one in the process may create or destroy plans (FFTW's planner). */
 typedef struct supine_sh_transform supine_sh_transform;
 
-/** Make a plan.
+/** Create a plan.
  * @param band  0 to SUPINE_SH_BAND_MAX; the grid needs latitudes > band, longitudes > 2 band
  * @param grid  must outlive the plan
  * @param fields  at least 1
@@ -29,8 +30,8 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
 /** Free a plan; NULL is legal. */
 void supine_sh_transform_destroy(supine_sh_transform *plan);
 
-/** Add latitude j's part of the transform to the coefficients, so that a caller can make one
- * ring of the grid at a time. Zero the coefficients first; add each ring once, in any order.
+/** Add latitude j's part of the transform to the coefficients, so that a caller needs the values of
+ * only one latitude at a time. Zero the coefficients first; add each latitude once, in any order.
  * @param ring          values at latitude j, [longitudes, fields]
  * @param coefficients  [fields, (band + 1)^2] */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,

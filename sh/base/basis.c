@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Real spherical harmonics of a direction.
+/* Compute real spherical harmonics of a direction.
  *
  * Y(l, +-m) = q(l, m)(z) * { Re, Im } (x + i y)^m, where q is the normalised Legendre function
  * without its factor sin^m: a polynomial in z, regular at the poles. Its recurrence in l is
@@ -29,7 +29,7 @@ static void evaluate_order(size_t band, size_t m, double z, double top, double r
   for (size_t l = m;; ++l) {
     double *centre = y + l * l + l;
     centre[-(ptrdiff_t)m] = q * im;
-    centre[m] = q * re; /* written last, so that m = 0 keeps it */
+    centre[m] = q * re; /* written last, so that it holds for m = 0 */
     if (l == band) {
       return;
     }

@@ -5,7 +5,7 @@
 
 #include <time.h>
 
-/** Return the seconds since some moment in the past; monotonic. */
+/** Return the seconds since an arbitrary moment in the past; they never decrease. */
 static inline double supine_clock_seconds(void) {
   struct timespec time;
   (void)clock_gettime(CLOCK_MONOTONIC, &time);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Compile versions of a function for wider vector units; the loader chooses one. */
+/** @file Compile a function for several vector units; the loader chooses the version to run. */
 #ifndef SUPINE_CLONES_H
 #define SUPINE_CLONES_H
 
@@ -7,8 +7,8 @@
 #include <features.h> /* __GLIBC__ */
 #endif
 
-/** Mark a hot function. The targets are architecture levels, as processor names would match one
- * maker's models only. */
+/** Mark a function to be compiled in several versions. The targets are architecture levels, as
+ * processor names would match the models of one maker only. */
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12 &&            \
     !defined(SUPINE_NO_CLONES)
 #define SUPINE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))

@@ -115,10 +115,10 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
     }
     if (c < count && csv->column[c] != SIZE_MAX) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s:%zu: repeated column \"%s\" in the header", csv->path, csv->line,
-                              csv->field[f]);
+                              "%s:%zu: repeated column \"%s\" in the header: delete or rename one",
+                              csv->path, csv->line, csv->field[f]);
     }
-    if (c < count) { /* ignore unexpected columns */
+    if (c < count) { /* else the column is not expected: ignore it */
       csv->column[c] = f;
     }
   }

@@ -22,9 +22,11 @@ typedef struct supine_csv {
   size_t line;
   char separator;
   size_t field_count;
-  char *field[SUPINE_CSV_FIELDS_MAX]; /* of the last row read */
+  char *field[SUPINE_CSV_FIELDS_MAX]; /* fields of the last row read */
   size_t column_count;
-  size_t column[SUPINE_CSV_FIELDS_MAX]; /* which field holds each expected column; SIZE_MAX: none */
+  size_t
+      column[SUPINE_CSV_FIELDS_MAX]; /* index of the field of each expected column; SIZE_MAX: none
+                                      */
 } supine_csv;
 
 /* Open the file and read the header, which must have the first `required` of `names`, in any
@@ -36,10 +38,10 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
 /* Read a row; *more is false at the end. */
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);
 
-/* Find the text of a column of the row; NULL if the file lacks the column. */
+/* Return the text of an expected column of the last row; NULL if the file lacks the column. */
 const char *supine_csv_text(const supine_csv *csv, size_t column);
 
-/* Parse a column as a finite number. */
+/* Parse an expected column, which the file has, as a finite number; messages call it `name`. */
 supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
                                 double *number, supine_error *error);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Load shared libraries that few commands need at their first use: linked, they would
- * delay every command. List the functions once,
+/** @file Load shared libraries at their first use if only few commands need them, as linking them
+ * would delay the start of every command. List the functions once,
  *
  *     #define FUNCTIONS(EACH) EACH(cairo_, arc) EACH(cairo_, fill)
  *     static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;

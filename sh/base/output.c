@@ -15,9 +15,12 @@
 
 #include "sh/base/output.h"
 
-enum { LIVE_MAX = 16, BUFFER = 1 << 18 }; /* Most outputs open at once; buffer in bytes. */
+enum {
+  LIVE_MAX = 16,   /* largest number of temporary names that supine_output_abandon_all removes */
+  BUFFER = 1 << 18 /* bytes of the buffer of an output */
+};
 
-/* Original standard output after supine_output_take_standard; -1: not taken. */
+/* Descriptor of the original standard output after supine_output_take_standard; -1 before. */
 static atomic_int standard_output = -1;
 
 bool supine_output_is_standard(const char *path) {
@@ -35,6 +38,7 @@ bool supine_output_take_standard(void) {
 /* Existing temporary names, for supine_output_abandon_all. */
 static char *_Atomic live[LIVE_MAX];
 
+/* Replace one entry `from` of the list by `to`; NULL is a free entry. */
 static void set_live(char *from, char *to) {
   for (int i = 0; i < LIVE_MAX; ++i) {
     char *expected = from;
@@ -94,8 +98,9 @@ static void descriptor_path(int descriptor, char path[32]) {
   (void)snprintf(path, 32, "/proc/self/fd/%d", descriptor);
 }
 
-/* Give the output a unique temporary name beside its target: of a new file, whose descriptor is
- * returned, or of the file that `link` refers to. -1 sets errno. */
+/* Give the output a unique temporary name beside its target: create a file of that name and return
+ * its descriptor, or, unless `link` is NULL, give the name to the file that `link` refers to and
+ * return 0. Return -1 and set errno on failure. */
 static int take_temporary(supine_output *output, const char *link) {
   enum { TRIES = 100 };
   const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";
@@ -120,8 +125,8 @@ static int take_temporary(supine_output *output, const char *link) {
   return -1;
 }
 
-/* Open a file without a name in the target's folder if it can be named later, else with a
- * temporary name. -1 sets errno. */
+/* Open a file without a name in the target's folder if it can be named later, else a file with a
+ * temporary name. Return its descriptor, or -1 and set errno. */
 static int open_regular(supine_output *output) {
   char *folder = supine_path_beside(output->target, ".");
   if (folder == NULL) {
@@ -193,7 +198,7 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
   return SUPINE_OK;
 }
 
-/* Give the finished file its name; false sets errno. */
+/* Give the finished file its name; return false and set errno on failure. */
 static bool give_name(supine_output *output) {
   if (output->temporary == NULL) {
     char link[32];
@@ -210,7 +215,7 @@ static bool give_name(supine_output *output) {
   return rename(output->temporary, output->target) == 0;
 }
 
-/* Wait until the folder's entry is on the disk, if supported. */
+/* Wait until the file's entry in its folder is on the disk, if the file system supports that. */
 static void sync_folder(const char *target) {
   char *folder = supine_path_beside(target, ".");
   const int descriptor = folder != NULL ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
@@ -225,7 +230,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
   const int descriptor = fileno(output->file);
   struct stat made = {0};
   const bool flushed = fflush(output->file) == 0 && ferror(output->file) == 0;
-  if (!flushed) { /* the reason of an earlier failure is lost: meet it again */
+  if (!flushed) { /* errno of an earlier failure is lost: write again to set it */
     errno = write(descriptor, "", 1) == 1 ? EIO : errno;
     return output_fail(output, error, "cannot write");
   }
@@ -254,7 +259,7 @@ void supine_output_abandon(supine_output *output) {
     set_live(output->temporary, NULL);
   }
   if (output->file != NULL) {
-    __fpurge(output->file); /* else closing would write what is left into a pipe */
+    __fpurge(output->file); /* else fclose would write the rest of the buffer */
     (void)fclose(output->file);
   }
   free(output->temporary);
@@ -267,7 +272,8 @@ supine_status supine_output_try(const char *path, supine_error *error) {
   supine_output output;
   struct stat old;
   if (supine_output_is_standard(path) || (stat(path, &old) == 0 && S_ISFIFO(old.st_mode))) {
-    return SUPINE_OK; /* keep it open: a reader would take closing for success */
+    return SUPINE_OK; /* opening and closing a pipe would tell its reader that the output is
+                         complete */
   }
   const supine_status status = supine_output_open(path, &output, error);
   supine_output_abandon(&output);

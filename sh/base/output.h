@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /** @file Output files that appear whole or not at all.
  *
- * A file is written without a name (O_TMPFILE) in its folder, so that nothing is left of it
- * however the program ends; if the file system does not support that, under a temporary name. It
- * gets its name when it is complete and on the disk. */
+ * A file is written in its folder without a name (O_TMPFILE), so that nothing is left of it however
+ * the program ends; if the file system does not support that, it is written under a temporary name.
+ * It gets its own name when it is complete and on the disk. */
 #ifndef SUPINE_OUTPUT_H
 #define SUPINE_OUTPUT_H
 
@@ -22,9 +22,9 @@ typedef struct supine_output {
   bool standard;   /**< standard output */
 } supine_output;
 
-/** Begin a file. A new file gets its mode by the umask, an old one keeps its own; a symbolic
- * link stays, and its target is replaced. A path that names a device or pipe is written
- * directly, and so is standard output.
+/** Open an output file. A new file gets its mode from the umask; a replaced file keeps its mode. A
+ * symbolic link stays, and its target is replaced. A device, a pipe or standard output is written
+ * directly.
  * @retval SUPINE_ERROR_WRITE  the folder is missing or not writable, or the path is a folder or
  *   a read-only file
  * @retval SUPINE_ERROR_MEMORY */
@@ -35,7 +35,7 @@ supine_status supine_output_open(const char *path, supine_output *output, supine
  * @retval SUPINE_ERROR_WRITE  a write failed; the message says why: full disk, file too large */
 supine_status supine_output_commit(supine_output *output, supine_error *error);
 
-/** Drop the file; legal after a failed open, after commit, and on a zeroed struct. */
+/** Discard the file; legal after a failed open, after commit, and on a zeroed struct. */
 void supine_output_abandon(supine_output *output);
 
 /** Report whether the path is standard output: "-", or "-" and an ending that names a format,
@@ -50,8 +50,8 @@ bool supine_output_take_standard(void);
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY  as supine_output_open */
 supine_status supine_output_try(const char *path, supine_error *error);
 
-/** Find the path of `name` in the folder of the file `path`, to be freed; an absolute name is
- * kept. NULL if out of memory. */
+/** Make the path of `name` in the folder of the file `path`; an absolute `name` is kept. The caller
+ * frees it. Return NULL if out of memory. */
 char *supine_path_beside(const char *path, const char *name);
 
 /** Remove the temporary files of all outputs of the process; for handlers of fatal signals. */

@@ -9,18 +9,18 @@
 /** Work on items begin <= i < end; `thread`, 0 to threads - 1, selects per-thread space. */
 typedef void supine_range_function(void *context, size_t begin, size_t end, size_t thread);
 
-/** Find the default number of threads: the environment variable SUPINE_THREADS (1 to 256), else
- * the processors that this process may use. */
+/** Return the default number of threads: the environment variable SUPINE_THREADS (1 to 256) or, if
+ * it is not set or not valid, the number of processors that this process may use. */
 size_t supine_thread_count(void);
 
-/** Report whether SUPINE_THREADS is unset or valid. */
+/** Report whether the environment variable SUPINE_THREADS is unset or valid. */
 bool supine_thread_count_sound(void);
 
 /** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait.
  *
- * @param count    items
- * @param grain    least items of a thread (at least 1): a small count runs fewer threads
- * @param threads  at most this many; 0: supine_thread_count()
+ * @param count    number of items
+ * @param grain    smallest number of items of a thread, at least 1; small counts use fewer threads
+ * @param threads  largest number of threads; 0: supine_thread_count()
  *
  * Pieces begin at multiples of `grain` and depend only on the arguments. The piece of a thread
  * that cannot start runs in the caller's thread. */

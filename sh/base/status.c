@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Status codes in words, and the detail of an error. */
+/* Describe status codes in words, and set the detail of an error. */
 #include <stdarg.h>
 #include <stdio.h>
 

@@ -17,7 +17,7 @@ static inline void supine_cross(const double a[3], const double b[3], double pro
   product[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/** Compute a . (b x c), the determinant of the three. */
+/** Compute a . (b x c), the determinant of the three vectors. */
 static inline double supine_triple(const double a[3], const double b[3], const double c[3]) {
   double product[3];
   supine_cross(b, c, product);
@@ -65,8 +65,10 @@ static inline void supine_normal(const double p[3], const double q[3], const dou
   supine_cross(u, v, normal);
 }
 
-/** Find point `at`, 0 to `count` - 1 or between, of a golden-angle spiral of `count` directions
- * that covers the sphere evenly from +z to -z; `from` is its first longitude, rad. */
+/** Compute direction `at` of a golden-angle spiral of `count` directions that covers the sphere
+ * evenly from +z to -z.
+ * @param at    0 to count - 1, not necessarily an integer
+ * @param from  longitude at which the spiral begins, rad */
 static inline void supine_spiral(double at, double count, double from, double direction[3]) {
   static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
   const double z = 1.0 - (2.0 * at + 1.0) / count;
