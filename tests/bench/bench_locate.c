@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Points that were not observed, predicted from ten that were: law and kriging on five people's
- * landmarks, exhaled to inhaled and back. RMS in mm, and how many points the 95 % band holds.
+/* Measure the errors of law and kriging at held-out points: predict the landmarks of five people,
+ * from exhaled to inhaled and back, from ten observed ones. Print the RMS errors in mm and the
+ * percentage of points within the 95 % band; then the time of the run-time library for a surface.
  *
  *     bench_locate [FOLDER OF LANDMARKS]
  *
- * And how long the run-time library takes for a surface.
- *
- * The law has its closed form, its force as applied. The scale's prior is the mean of the other
- * four people, +- 30 %. */
+ * The law is evaluated in closed form, with the applied force. The prior of a person's scale is the
+ * mean of the other four people's, +- 30 %. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -28,12 +27,13 @@
 
 enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };
 
-static const double spread = 0.3; /* of the scale */
+static const double spread = 0.3; /* prior standard deviation of the scale, relative to its mean */
 
 typedef struct person {
-  size_t count;
-  double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX]; /* at scale 1 */
-  double central[POINTS_MAX]; /* distance from the box's middle, in half sides */
+  size_t count; /* number of landmarks, n */
+  /* [n, 3] positions before the motion, their displacements, and the law's at scale 1, mm */
+  double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
+  double central[POINTS_MAX]; /* [n] squared distance from the middle of the box, in half sides */
   size_t lung[POINTS_MAX];
 } person;
 
@@ -44,7 +44,7 @@ static void need(supine_status status, const supine_error *error) {
   }
 }
 
-/* The law of a supine lung at points, of whose box it has the coordinates. */
+/* Evaluate the law of a supine lung at points, with coordinates in the box around them. */
 static void find_law(person *p, const double *points) {
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const double *c = model.direction.c;
@@ -103,7 +103,7 @@ static void load(const char *folder, const char *name, bool inhaling, person *p)
   find_law(p, p->from);
 }
 
-/* The scale that fits best beside a free translation. */
+/* Compute the scale of the law that fits the displacements best, up to a free translation. */
 static double best_scale(const person *p) {
   double mean[2][3] = {{0}};
   double lu = 0;
@@ -120,7 +120,8 @@ static double best_scale(const person *p) {
   return lu / ll;
 }
 
-/* The law where the exhaled lung comes from: p + s F(p) d(p) = x. */
+/* Evaluate the law at inhaled positions p, which displacements by the law take to the exhaled ones:
+ * find p such that p - s F(p) d(p) = x, by iteration from x. */
 static void raise(person *p, double scale) {
   double full[3 * POINTS_MAX];
   for (int step = 0; step < 30; ++step) {
@@ -147,9 +148,14 @@ static void set_point(const person *p, size_t j, double scale, double prior,
   }
 }
 
-/* What one draw gives: squares of the errors, of the stated ones, points and points held. */
+/* Sums over the draws of one person. */
 typedef struct sums {
-  double error, stated, points, held, left_out, judged;
+  double error;    /* squared errors, mm^2 */
+  double stated;   /* variances stated by kriging, mm^2 */
+  double points;   /* number of held-out points */
+  double held;     /* number of these within the 95 % band */
+  double left_out; /* number of observed points judged as outliers */
+  double judged;   /* number of observed points */
 } sums;
 
 static void predict(const person *p, const size_t *drawn, size_t count, double prior, sums *s) {
@@ -229,7 +235,8 @@ static void study(const person *people, size_t number, double prior, bool centra
   gsl_rng_free(random);
 }
 
-/* Everybody's law, and the scale that the other four have in the mean. */
+/* Evaluate the law of all people, and set the prior of each person's scale to the mean of the other
+ * four people's. */
 static void prepare(const char *folder, bool inhaling, person *people, double *prior) {
   static const char *const names[PEOPLE] = {"054", "055", "056", "094", "097"};
   for (int pass = 0; pass < (inhaling ? 2 : 1); ++pass) {
@@ -248,7 +255,8 @@ static void prepare(const char *folder, bool inhaling, person *people, double *p
   }
 }
 
-/* Milliseconds from 20 points to 25,000 vertices with their errors, on one thread. */
+/* Print the time in ms from 20 observed points to 25,000 vertices with expected errors, on one
+ * thread. */
 static void clock_library(void) {
   enum { VERTICES = 25000, MODES = 16, SEEN = 20, REPEATS = 30 };
   static const double resting[9] = {1700 * -3.5449077018110318};
@@ -293,9 +301,10 @@ static void clock_library(void) {
       found_in = fmin(found_in, middle - begin);
     }
     (void)printf(
-        "%d points, %d vertices with their errors%s: %.2f ms, of which %.2f ms are the fit "
+        "%d points, %d vertices with expected errors%s: %.2f ms, of which %.2f ms are the fit "
         "(least of %d)\n",
-        SEEN, VERTICES, rigid == 1 ? ", a rotation too" : "", 1e3 * least, 1e3 * found_in, REPEATS);
+        SEEN, VERTICES, rigid == 1 ? ", with a rotation" : "", 1e3 * least, 1e3 * found_in,
+        REPEATS);
   }
   free(space);
   supine_basis_close(basis);

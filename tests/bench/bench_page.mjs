@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a frame of the exported page costs, pass by pass, in turns, the fastest of each:
+// Measure the time of a frame of the exported page and of each pass: in turns, the fastest of each.
 //
 //     node tests/bench/bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]
 //
-// Needs playwright-core (npm install in tests/export, or in the folder MODULES). CHROMIUM's flags choose the graphics: with
-// none, Chromium's software renderer; with a graphics card, --use-angle=gl or --use-angle=vulkan and
-// --enable-gpu, say. "still" draws the surface where it is, as a viewer of a plain mesh of as many
-// triangles would; "turning" is a frame in which the patient turns: weights, positions, normals and
-// that picture; "script" is all of it that is not the graphics card's. Turning over
-// still says what deforming costs over showing, whatever the graphics.
+// Needs playwright-core (npm install in tests/export, or in the folder of the environment variable MODULES). The FLAGs
+// of Chromium choose the renderer: without any, software; for a graphics card, --enable-gpu and --use-angle=gl or
+// --use-angle=vulkan. "still" draws the surface without deforming it, as a viewer of a mesh of as many triangles would;
+// "turning" is a frame in which the patient turns: weights, positions, normals and drawing; "script" is the part of
+// such a frame that the CPU computes. The ratio turning / still is the cost of deforming relative to drawing.
 import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
@@ -49,8 +48,8 @@ const found = await page.evaluate(() => {
     turning: () => { weights(); picture.deform('now', state.moment); picture.draw(panes()); },
   };
   const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
-  const some = 20; // frames at once: browsers' clocks tick in tenths of a millisecond
-  for (let i = 0; i < 60; ++i) { // as a page that has run for some seconds, the patient turning
+  const some = 20; // frames measured at once, as clocks of browsers have steps of 0.1 ms
+  for (let i = 0; i < 60; ++i) { // 1200 frames, so that the script is optimised as after some seconds of turning
     const begin = performance.now();
     for (let j = 0; j < some; ++j) {
       tilt += 1;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Precomputing both lungs as the command does by default, from files to basis file, beside what
- * assimp alone takes to load the same files with their identical vertices joined, one after the
- * other. Interleaved; the least of each is printed, then the growth from 5 thousand to 509 thousand
- * vertices.
+/* Measure the precomputation of both lungs with the default options, from mesh files to basis file,
+ * against the time that assimp alone takes to load the same files one after the other and join
+ * identical vertices. Runs alternate. Print the least time of each, then the growth from 5 thousand
+ * to 509 thousand vertices.
  *
  *     bench_precompute [REPEATS] */
 #include <stdio.h>
@@ -54,7 +54,7 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* When the last stage begins: the pipeline reports 0.9 before it writes. */
+/* Note the time at which the last stage begins: the pipeline reports 0.9 before it writes. */
 static bool note_write(void *context, double fraction) {
   double *time = context;
   if (fraction >= 0.9) {
@@ -63,7 +63,7 @@ static bool note_write(void *context, double fraction) {
   return true;
 }
 
-/* Seconds in all, and of each stage; negative where it failed. */
+/* Precompute a basis; return the time in s, and set that of each stage. Negative if it failed. */
 static double run_ours(pair *files, const char *out, double times[STAGES], size_t *vertices) {
   supine_lungs lungs = {0};
   supine_error error;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a call from Python costs more than the same call in C, in turns, the fastest of each.
+"""Measure how much longer a call from Python takes than the same call in C: in turns, the fastest of each.
 
     bench_python.py REFERENCE BASIS [TURNS]     REFERENCE: tests/python/reference.c; needs `import supine`"""
 import subprocess
@@ -14,7 +14,7 @@ reference, path = sys.argv[1:3]
 lungs = supine.open(path)
 pose = lungs.pose("prone")
 points = np.empty((lungs.vertex_count, 3), np.float32)
-CALLS = 20000  # as the reference makes
+CALLS = 20000  # the same number as in REFERENCE
 calls = {"deform into an array": lambda: lungs.deform(pose, points),
          "deform into a new one": lambda: lungs.deform(pose)}
 fastest = dict.fromkeys(calls, float("inf"))

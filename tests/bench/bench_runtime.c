@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The evaluator beside OpenBLAS and a plain loop, in turns in one process.
+/* Measure the evaluation against OpenBLAS and plain loops, in turns in one process.
  *
  *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES | BASIS]...
  *
- * A number makes random fields of 16 modes and normals of 6; a file is taken as it is. Each entry
- * counts by the fastest of nine runs. OpenBLAS 0.3.21 takes newer processors for old ones; the
+ * A number makes a random basis of that many vertices, with 16 modes and 6 modes of normals. Each
+ * entry is the fastest of nine runs. OpenBLAS 0.3.21 mistakes newer processors for old ones; the
  * variable names one that it knows. */
 #include <math.h>
 #include <stdint.h>
@@ -30,12 +30,13 @@ void openblas_set_num_threads(int threads);
 
 typedef struct bench {
   const supine_basis_info *info;
-  supine_basis *storage[SUPINE_STORAGE_COUNT]; /* opened in that storage */
-  supine_basis *simd[SUPINE_SIMD_COUNT];       /* in INT16, by that code; NULL: not here */
+  supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis in each storage */
+  supine_basis
+      *simd[SUPINE_SIMD_COUNT]; /* in INT16 for each instruction set; NULL: not available */
   supine_pose pose;
-  float weights[SUPINE_MODES_MAX]; /* times the gain */
+  float weights[SUPINE_MODES_MAX]; /* weights times the gain */
   float *xyz, *normals;            /* [N, 3] */
-  float *amount;                   /* [N] */
+  float *amount;                   /* [N] sum over the modes */
   float *columns;                  /* [K, N] coefficients, mode by mode */
   int16_t *counts;                 /* [K, N] the same as 16-bit counts */
   float units[SUPINE_MODES_MAX];   /* mm of one count, times the weight of its mode */
@@ -47,8 +48,8 @@ typedef struct entry {
   bench *work;
   const supine_basis *basis;
   size_t threads;
-  double bytes;   /* of a vertex, read and written */
-  double seconds; /* of all vertices, the least so far */
+  double bytes;   /* bytes read and written for each vertex */
+  double seconds; /* least time of all vertices so far, s */
 } entry;
 
 static void run_deform(void *context, size_t begin, size_t end, size_t thread) {
@@ -71,7 +72,7 @@ static void run_lit(void *context, size_t begin, size_t end, size_t thread) {
                                 e->work->normals + 3 * begin);
 }
 
-/* Of one thread: it knows no ranges. */
+/* Compute all normals from the triangles, in one thread, as supine_normals takes no range. */
 static void run_exact_normals(void *context, size_t begin, size_t end, size_t thread) {
   const entry *e = context;
   (void)begin, (void)end, (void)thread;
@@ -98,7 +99,7 @@ static void run_sgemv(void *context, size_t begin, size_t end, size_t thread) {
   displace(e->work, begin, end);
 }
 
-/* The loop that anyone would write, compiled with -march=native. */
+/* Evaluate by the simplest loop, compiled with -march=native. */
 static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   const bench *work = ((const entry *)context)->work;
   const supine_basis_info *m = work->info;
@@ -108,7 +109,7 @@ static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   for (size_t i = begin; i < end; ++i) {
     const float *c = m->coefficients + i * m->mode_count;
     float amount = 0;
-    if (m->mode_count == 16) { /* a number that the compiler knows */
+    if (m->mode_count == 16) { /* a constant, so that the compiler unrolls the loop */
       for (size_t k = 0; k < 16; ++k) {
         amount += w[k] * c[k];
       }
@@ -123,7 +124,7 @@ static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* The same product with the modes as columns of a column-major matrix. */
+/* Evaluate by sgemv with the modes as columns of a column-major matrix. */
 static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t thread) {
   const entry *e = context;
   const bench *work = e->work;
@@ -134,9 +135,9 @@ static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t th
   displace(work, begin, end);
 }
 
-enum { BLOCK = 16384 }; /* vertices whose amounts stay in the second-level cache */
+enum { BLOCK = 16384 }; /* number of vertices whose sums stay in the second-level cache */
 
-/* Add mode k to the amounts of vertices begin <= i < end. */
+/* Add mode k to the sums of vertices begin <= i < end. */
 typedef void add_mode(const bench *work, size_t k, size_t begin, size_t end);
 
 static void add_column(const bench *work, size_t k, size_t begin, size_t end) {
@@ -157,7 +158,7 @@ static void add_counts(const bench *work, size_t k, size_t begin, size_t end) {
   }
 }
 
-/* Evaluate a mode after the other over blocks of vertices: the best simple loop. */
+/* Evaluate mode by mode over blocks of vertices: the fastest simple loop. */
 static void run_blocks(const bench *work, add_mode *add, size_t begin, size_t end) {
   for (size_t at = begin; at < end; at += BLOCK) {
     const size_t last = end - at < BLOCK ? end : at + BLOCK;
@@ -200,7 +201,8 @@ static void make_columns(bench *work) {
 }
 
 #if defined(__x86_64__)
-/* The evaluator's loads and stores without its arithmetic: what memory allows at best. */
+/* Repeat the loads and stores of the evaluation without its arithmetic, to measure the limit by
+ * memory. */
 __attribute__((target("avx512f"))) static void run_traffic(void *context, size_t begin, size_t end,
                                                            size_t thread) {
   const entry *e = context;
@@ -273,7 +275,7 @@ static size_t add_entries(bench *work, entry *entries) {
   return count;
 }
 
-/* Take turns, each turn beginning with another entry. */
+/* Measure all entries in turns, each turn beginning with another entry. */
 static void measure(entry *entries, size_t count, size_t vertices) {
   const size_t rounds = 1 + ENOUGH / vertices;
   for (size_t turn = 0; turn < REPEATS; ++turn) {
@@ -332,7 +334,7 @@ static void print(const entry *entries, size_t count, size_t vertices) {
   }
 }
 
-/* What is measured side by side does the same work. */
+/* Check that the loops that are compared give the same positions. */
 static bool check_same(bench *work, entry *entries, size_t count) {
   const size_t n = work->info->vertex_count;
   float *expected = fixture_allocate(3 * n, sizeof *expected);

@@ -1,14 +1,18 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From pose sent to frame received, over loopback, through two processes:
+/* Measure the time from a pose sent to the frame received, over loopback, between two processes:
  *
  *     bench_stream SUPINE BASIS [SECONDS [WHAT...]]
  *
- * Poses leave 66.66 times a second, as from a tracker; a peer of the same machine receives weights,
- * points or surfaces. Prints one row for each: the median, the 99th percentile and the longest of
- * the time from the pose's first byte sent to the frame's last byte received; how old the poses
- * were that frames showed, in poses sent since, counted when the frame's last byte came: none is 0;
- * the server's memory after a second and at the end; and whether that holds which is wanted: no
- * pose older than one frame, and 99 % of weights within 2 ms, of points and surfaces within 15. */
+ * This program sends 66.66 poses a second, as a tracker does, to a server on the same machine, and
+ * receives weights, points or surfaces (WHAT). Print one row for each:
+ * - number of poses sent, and of poses answered by a frame
+ * - "old": number of frames of a pose that was no longer the newest when their last byte arrived
+ * - "oldest": largest number of poses sent since the pose of a frame
+ * - median, 99th percentile and maximum of the time from the first byte of a pose sent to the last
+ *   byte of its frame received, ms
+ * - memory of the server after 1 s and at the end, KiB
+ * - "holds" if no pose was older than one frame and 99 % of the frames came in time: weights within
+ *   2 ms, points and surfaces within 15 ms; else "misses" */
 #include <arpa/inet.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -27,14 +31,14 @@
 #include "program/stream/message.h"
 #include "sh/base/clock.h"
 
-static const double interval = 1.0 / 66.66; /* s */
+static const double interval = 1.0 / 66.66; /* time between poses, s */
 
 static int fail(const char *what) {
   perror(what);
   return 1;
 }
 
-/* Starts the server, whose output is to be closed; its port, or 0. */
+/* Start the server; return its port, or 0 on failure. The caller closes `lines`, its output. */
 static int serve(const char *supine, const char *basis, const char *what, pid_t *server,
                  FILE **lines) {
   int ends[2];
@@ -59,7 +63,7 @@ static int serve(const char *supine, const char *basis, const char *what, pid_t 
   return port;
 }
 
-/* Resident memory of a process, KiB. */
+/* Read the resident memory of a process, KiB; -1 if it is unknown. */
 static long memory_of(pid_t process) {
   char path[64];
   char line[256];
@@ -88,7 +92,7 @@ static int dial(int port) {
   return s;
 }
 
-/* A body that turns about its long axis, twice a minute. */
+/* Write the message of a pose: the body turns about its long axis, twice a minute. */
 static void make_pose(double time, uint64_t stamp, unsigned char bytes[SUPINE_STREAM_HEADER + 48]) {
   const double angle = time * (2.0 * M_PI / 30.0);
   const float columns[12] = {(float)cos(angle),
@@ -116,17 +120,18 @@ static int compare(const void *a, const void *b) {
 }
 
 typedef struct tally {
-  double *sent;    /* [poses] s, when each left; by stamp */
-  double *latency; /* [poses] of the answered */
-  size_t poses, answered;
-  size_t old;         /* answers after another pose was sent */
-  size_t oldest;      /* poses sent since the one answered, at most */
-  size_t got, wanted; /* bytes of the message that is coming */
+  double *sent;           /* [poses] time at which the pose of stamp i + 1 was sent, s */
+  double *latency;        /* [answered] time from pose sent to frame received, s */
+  size_t poses, answered; /* number of poses sent, and of frames received */
+  size_t old;             /* number of frames whose pose was no longer the newest */
+  size_t oldest;          /* largest number of poses sent since the pose of a frame */
+  size_t got, wanted;     /* bytes received of the current message, and its size so far known */
   unsigned char head[SUPINE_STREAM_HEADER];
   supine_stream_header header;
 } tally;
 
-/* Takes in what has come; false where the server has gone. */
+/* Receive the bytes that have arrived, without waiting; return false if the connection is closed or
+ * a message is malformed. */
 static bool take(int s, tally *t) {
   static unsigned char bytes[1 << 20];
   for (;;) {
@@ -172,7 +177,7 @@ static int measure(const char *supine, const char *basis, const char *what, doub
              .latency = calloc(count + 1, sizeof(double)),
              .wanted = SUPINE_STREAM_HEADER};
   if (s < 0 || t.sent == NULL || t.latency == NULL) {
-    return fail("the server");
+    return fail("cannot start the server, or out of memory");
   }
   const double begun = supine_clock_seconds();
   long before = -1;
@@ -208,7 +213,7 @@ static int measure(const char *supine, const char *basis, const char *what, doub
                t.answered, t.old, t.oldest, 1e3 * t.latency[t.answered / 2], 1e3 * within,
                1e3 * t.latency[t.answered == 0 ? 0 : t.answered - 1], before, after,
                t.answered > 0 && t.oldest <= 1 && within <= wanted ? "holds" : "misses");
-  while (lines != NULL && fgets(line, sizeof line, lines) != NULL) { /* what it says of itself */
+  while (lines != NULL && fgets(line, sizeof line, lines) != NULL) { /* the server's own report */
     if (strstr(line, "pose received to") != NULL) {
       (void)printf("         %s", line);
     }
@@ -218,7 +223,7 @@ static int measure(const char *supine, const char *basis, const char *what, doub
   (void)fflush(stdout);
   free(t.sent);
   free(t.latency);
-  return alive ? 0 : fail("the server has gone");
+  return alive ? 0 : fail("the server closed the connection");
 }
 
 int main(int count, char **word) {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The validations of [Santhanam2008] as figures: CSV files, and PNG where gnuplot is there.
+/* Repeat the validations of [Santhanam2008] as figures: CSV files, and PNG if gnuplot is installed.
  *
  *     bench_validation [FOLDER [DATA]]
  *
- * FOLDER (default: validation) is made where it is missing. DATA holds the real lungs (default: the
- * test data); without them a made pair stands in at three resolutions. */
+ * FOLDER (default: validation) is created if it is missing. DATA is the folder of the real lungs
+ * (default: the test data); without them, a synthetic pair at three resolutions is used. */
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -38,7 +38,7 @@ static FILE *begin_csv(const char *name, const char *header) {
   return file;
 }
 
-/* Ends the CSV and draws NAME.png with gnuplot commands in which %s stands for the CSV's name. */
+/* Close the CSV, and draw NAME.png with gnuplot commands, in which `csv` is the CSV's path. */
 static void end_figure(FILE *csv, const char *name, const char *commands) {
   need(fclose(csv) == 0, "cannot write");
   FILE *gnuplot = popen("gnuplot 2>/dev/null", "w"); /* NOLINT(cert-env33-c) */
@@ -51,17 +51,16 @@ static void end_figure(FILE *csv, const char *name, const char *commands) {
                 "csv = '%s/%s.csv'\n%s\n",
                 folder, name, folder, name, commands);
   const int code = pclose(gnuplot);
-  (void)printf("%s/%s.csv%s\n", folder, name,
-               code == 0 ? ", .png" : " (no picture: gnuplot is not there)");
+  (void)printf("%s/%s.csv%s\n", folder, name, code == 0 ? ", .png" : " (no PNG: install gnuplot)");
 }
 
-/* Where a method's curve goes. */
+/* The convergence curve of one method. */
 typedef struct curve {
-  FILE *csv;
+  FILE *csv; /* the file to which points are written */
   const char *method;
-  size_t count;
-  const double *exact;
-  double links; /* visits for each unit of its own work */
+  size_t count;        /* number of displacements */
+  const double *exact; /* [count] exact displacements */
+  double links;        /* link visits for each step or evaluation of the method */
 } curve;
 
 static void add_point(const curve *c, double work, const double *found) {
@@ -80,7 +79,7 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Fig. 7. The work is visits of a link from one of its ends. */
+/* Draw Fig. 7, convergence. The unit of work is a visit of a link from one of its ends. */
 static void convergence(void) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -92,7 +91,7 @@ static void convergence(void) {
   need(frame_solve(&f, NULL, force, exact) == SUPINE_OK, "no solution");
   FILE *csv = begin_csv("fig7_convergence", "method,link_visits,relative_rms_error");
   curve c = {csv, "Pitcher/Catcher", n, exact,
-             2.0 * links / (double)(n + f.topology.edge_count)}; /* of a node's clique, mean */
+             2.0 * links / (double)(n + f.topology.edge_count)}; /* mean over the cliques */
   for (int k = 1; k <= 13; ++k) {
     size_t steps = 0;
     need(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, pow(10.0, -k), found,
@@ -118,7 +117,7 @@ static void convergence(void) {
   free(found);
 }
 
-/* Fig. 8. */
+/* Draw Fig. 8, a plane sheet solved by both methods. */
 static void plane(void) {
   enum { SIDE = 31 };
   frame f = frame_plane(SIDE, 10.0);
@@ -148,7 +147,8 @@ static void plane(void) {
   free(theirs);
 }
 
-/* Fig. 9: rings before and after, a third of them stiffer. */
+/* Draw Fig. 9: rings before and after deformation, of uniform stiffness and with a stiffer third.
+ */
 static void ring(void) {
   enum { COUNT = 90 };
   static const double factors[] = {1.0, 2.0, 4.0};
@@ -179,7 +179,7 @@ static void ring(void) {
   free(force);
 }
 
-/* Lungs at one of three resolutions; false where there are none. */
+/* Load the lungs at one of three resolutions, 0 to 2, or make synthetic ones. */
 static bool load_lungs(int resolution, supine_lungs *lungs) {
   static const char *const names[3][2] = {{"chaste_left_5k.obj", "chaste_right_5k.obj"},
                                           {"chaste_left.ply", "chaste_right.ply"},
@@ -197,7 +197,7 @@ static bool load_lungs(int resolution, supine_lungs *lungs) {
   } else {
     static const size_t vertices[3] = {10000, 40000, 500000};
     count = 1;
-    (void)printf("no real lungs in %s: a made pair stands in\n", data);
+    (void)printf("no real lungs in %s: a synthetic pair is used\n", data);
     need(supine_phantom_create(vertices[resolution], 6000.0, &meshes[0], &error) == SUPINE_OK,
          error.message);
   }
@@ -208,7 +208,7 @@ static bool load_lungs(int resolution, supine_lungs *lungs) {
   return good;
 }
 
-/* III-C, IV-B: largest displacement against volume. */
+/* Draw the largest displacement against the volume ([Santhanam2008] III-C, IV-B). */
 static void linearity(const supine_lungs *lungs) {
   const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   double cubic[4][3];
@@ -271,7 +271,8 @@ static void regional_ventilation(const supine_lungs *lungs) {
              "plot for [i=2:5] csv using i:1 with linespoints title columnheader(i)");
 }
 
-/* Drift of the displacements and of the spread of a unit force, with reaches from 0. */
+/* Draw the drift of displacements between resolutions, and print the spread of a unit force, for
+ * several reaches in mm. */
 static void resolution(void) {
   static const double reaches[] = {0.0, 3.0, 5.0, 10.0, 20.0};
   static const char *const names[] = {"5k", "20k", "250k"};

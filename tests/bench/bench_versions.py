@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare two versions of the program: each command in turn by the old and by the new one.
+"""Compare two versions of the program: run each command in turn with the old and the new one.
 
     bench_versions.py path/to/old/supine path/to/new/supine [--vertices N] [--rounds R] [--folder F]
                       [--stream path/to/bench_stream]
 
-Inputs are made by the old one. Prints the least wall and processor seconds and the most memory of
-the rounds, and new over old. Outputs that differ in a byte are named, but for compressed VTP. The
-library that a program was built with is found beside it, as runtime/libsupine_runtime.so; --stream
-adds the least median time from a pose sent to the last point received."""
+The old version makes the inputs. Print the least wall and processor seconds and the largest memory
+of all rounds, and the ratios of new to old; mark commands whose outputs differ, except compressed
+VTP. The library of a program is runtime/libsupine_runtime.so beside it. --stream adds the least
+median time from a pose sent to the last point received."""
 import argparse
 import filecmp
 import os
@@ -22,7 +22,7 @@ VOXELS = (512, 512, 248)
 
 
 def write_image(path, label):
-    """NIfTI around the synthetic lungs: noise of 16 bits, or labels of 8."""
+    """Write a NIfTI image around the synthetic lungs: 16-bit noise, or 8-bit labels."""
     step, origin = (0.7, 0.7, 1.2), (-2.0 - 0.35 * 512, -173.0 - 0.35 * 512, -130.0 - 0.6 * 248)
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
@@ -49,7 +49,7 @@ def write_image(path, label):
 
 
 def run(command):
-    """Wall and processor seconds, and MB, of a command that must succeed."""
+    """Run a command that must succeed; return its wall seconds, processor seconds and memory in MiB."""
     start = time.perf_counter()
     null = os.open(os.devnull, os.O_WRONLY)
     child = os.posix_spawn(command[0], command, os.environ,
@@ -69,17 +69,17 @@ def compare(name, programs, arguments, rounds, output=None):
             wall, cpu, memory = run([program] + arguments)
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
-            if output is not None:  # the same name for both, as files carry the command
+            if output is not None:  # both versions write the same name, as files contain the command line
                 os.replace(output, f"{which}-{output}")
     differs = output is not None and not filecmp.cmp("0-" + output, "1-" + output, False)
     old, new = best
     print(f"{name:28} {old[0]:8.3f} {new[0]:8.3f} {new[0] / old[0]:6.2f}   "
           f"{old[1]:8.3f} {new[1]:8.3f} {new[1] / old[1]:6.2f}   "
           f"{old[2]:7.0f} {new[2]:7.0f} {new[2] / old[2]:6.2f}"
-          f"{'   other bytes' if differs else ''}", flush=True)
+          f"{'   outputs differ' if differs else ''}", flush=True)
 
 
-# Opens a basis a few times, which `info` does and more: prints the least processor seconds.
+# Open a basis five times and print the least processor seconds: `info` would do more than open it.
 OPEN = """
 import ctypes, sys, time
 library, basis = ctypes.CDLL(sys.argv[1]), ctypes.c_void_p()
@@ -95,7 +95,7 @@ print(least)
 
 
 def compare_numbers(name, commands, rounds, number):
-    """Run a command of each program in turn; print the least number in what they say."""
+    """Run a command of each program in turn; print the least number that `number` reads from its output."""
     best = [float("inf"), float("inf")]
     for _ in range(rounds):
         for which, command in enumerate(commands):
