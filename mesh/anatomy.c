@@ -18,17 +18,18 @@
 
 #include "mesh/anatomy.h"
 
-/* Least margin by which other axes must fit better; the true ones led by 0.35 to 0.7. */
+/* Smallest margin by which other axes must fit better; the true ones led by 0.35 to 0.7. */
 static const double clearly = 0.2;
-/* Bound of the logarithm of the volumes' ratio, so that a collapsed lung does not decide. */
+/* Bound of the logarithm of the ratio of volumes, so that a collapsed lung does not decide alone.
+ */
 static const double most_ratio = 0.25;
 /* Largest ratio of a lung's standard deviations, side to side over depth: lungs have 0.6 to 0.7. */
 static const double thin = 0.85;
-/* Least ratio of width to depth of two lungs in one surface, whose distribution is flatter than
- * uniform (kurtosis 1.8). */
+/* Smallest ratio of the standard deviation from side to side to the others of two lungs in one
+ * surface; their kurtosis from side to side is below that of a uniform distribution, 1.8. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-/* Least concavity towards the heart that tells a single lung's side. */
+/* Smallest concavity towards the heart that determines the side of a single lung. */
 static const double least_side = 0.12;
 
 typedef struct shape {
@@ -50,7 +51,7 @@ static void add_point(const double p[3], double w, double sum[3], double square[
   }
 }
 
-/* Find the mean of x^4 over a tetrahedron with one corner at x = 0: the sum of all products of
+/* Return the mean of x^4 over a tetrahedron with one corner at x = 0: the sum of all products of
  * four of the other corners' x, over 35. */
 static double mean_fourth(double a, double b, double c) {
   double ab = 1.0; /* complete sums of products of degree n of a and b, and of a, b and c */
@@ -150,7 +151,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   return isfinite(s->deviation[0]) && isfinite(s->deviation[1]) && isfinite(s->deviation[2]);
 }
 
-/* Axes to test: the moment m_abc in them takes old coordinate `from`, times `sign`. */
+/* Axes to test: their coordinate a is coordinate from[a] of the surface, times sign[a]. */
 typedef struct view {
   int from[3];
   double sign[3];

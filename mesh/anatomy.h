@@ -8,8 +8,8 @@
 typedef struct supine_mesh_anatomy {
   supine_axes axes; /**< axes that the coordinates seem to be in; LPS if right */
   bool certain;     /**< no other axes fit nearly as well */
-  int side;         /**< of a single lung in LPS: +1 left, -1 right, 0 unknown */
-  bool joined;      /**< a single surface as wide as both lungs */
+  int side;         /**< side of a single lung in LPS: +1 left, -1 right, 0 unknown */
+  bool joined;      /**< a single surface seems to hold both lungs */
 } supine_mesh_anatomy;
 
 /** Find the axes by third moments of volume: lungs are narrow at the head, reach deepest at the

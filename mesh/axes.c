@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The 48 ways to assign a file's coordinates to the patient's axes. */
+/* Convert between the 48 ways to assign a file's coordinates to the patient's axes. */
 #include <math.h>
 #include <string.h>
 

@@ -13,9 +13,9 @@
 
 #include <supine/status.h>
 
-/** Axes of a file's coordinates: any of the 48 choices of three letters, each the direction in
- * which a coordinate grows (Left, Right, Posterior, Anterior, Superior, Inferior), as in Slicer
- * and nibabel. supine_mesh_axes_parse gives those without a name here. */
+/** Axes of a file's coordinates, one of 48: three letters, each the direction in which a coordinate
+ * grows (Left, Right, Posterior, Anterior, Superior, Inferior), as in Slicer and nibabel.
+ * supine_mesh_axes_parse returns also those without a name here. */
 typedef enum supine_axes {
   SUPINE_AXES_AUTO = 0, /**< by the file's SPACE tag; LPS without one */
   SUPINE_AXES_LPS = 1,
@@ -25,6 +25,7 @@ typedef enum supine_axes {
 
 /** Parse three letters, such as "RAI"; false for anything else. */
 bool supine_mesh_axes_parse(const char *letters, supine_axes *axes);
+/** Write the three letters of axes and a NUL; AUTO is LPS. */
 void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
 /** Find the signed permutation from these axes to LPS; AUTO is LPS. */
 void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
@@ -43,7 +44,7 @@ typedef struct supine_mesh {
   uint32_t *triangles; /**< [triangle_count, 3] counter-clockwise seen from outside */
 } supine_mesh;
 
-/** How to read a file. Zero-initialised: axes as the file says, 1 mm a unit. */
+/** How to read a file. Zero-initialised: axes as the file says, units of 1 mm. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
   double millimetres_per_unit; /**< scale to mm; 0: 1 */
@@ -83,14 +84,14 @@ typedef struct supine_mesh_report {
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
-/** Report whether lungs can have a box with this longest side, mm.
- * @param other  written: the unit other than mm, a literal, in which lungs could have it; or NULL
- */
+/** Report whether the bounding box of lungs can have this longest side, mm.
+ * @param other  output: the unit other than mm, a literal, in which this number is most likely;
+ * NULL if there is none */
 bool supine_mesh_unit_is_likely(double side, const char **other);
-/** Find the millimetres of "mm", "cm", "m", "um" or "in"; false for any other name. */
+/** Find the length of "mm", "cm", "m", "um" or "in" in mm; return false for any other name. */
 bool supine_mesh_unit_find(const char *name, double *millimetres);
 /** Name a unit of length: "mm", "cm", "m", "um", "in" or, for any other, "2.5 mm".
- * @param text  [24], written */
+ * @param text  [24] output */
 void supine_mesh_unit_name(double millimetres, char *text);
 
 /** Free the arrays and zero the struct; a zeroed struct is legal. */
@@ -100,8 +101,8 @@ void supine_mesh_free(supine_mesh *mesh);
 typedef struct supine_topology {
   size_t edge_count;
   uint32_t *edges;           /**< [edge_count, 2] vertex pairs, first < second, sorted */
-  size_t boundary_edges;     /**< edges of one triangle */
-  size_t non_manifold_edges; /**< edges of three or more triangles */
+  size_t boundary_edges;     /**< edges that belong to one triangle */
+  size_t non_manifold_edges; /**< edges shared by three or more triangles */
   size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
   size_t component_count;    /**< connected components, over shared vertices */
   uint32_t *component;       /**< [vertex_count] component of each vertex, numbered by first
@@ -137,19 +138,19 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
  * vertex; 0 if undefined. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
-/** Find the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
- * vertices move to `vertices` [vertex_count, 3]: above a few in a thousand the surface looks
- * torn. */
+/** Return the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
+ * vertices move to `vertices` [vertex_count, 3]. Above a few in a thousand the surface looks torn.
+ */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
-/** Numbers of a whole surface, for VTP's field data. */
+/** Numbers that describe a whole surface, for the field data of VTP. */
 typedef struct supine_mesh_field {
   const char *name; /**< including its unit: "volume_mL" */
   size_t count;
-  const double *values; /**< [frames, count]; frames: 1 except in a series */
+  const double *values; /**< [frames, count]; one frame except in a series */
 } supine_mesh_field;
 
-/** Optional content of a file. */
+/** How to write a file, and its optional content. */
 typedef struct supine_mesh_save_options {
   supine_axes axes;    /**< of the file, written as its SPACE tag; AUTO: LPS */
   const double *rest;  /**< optional [vertex_count, 3]: VTP and PLY then carry the displacement
@@ -186,8 +187,9 @@ typedef struct supine_mesh_series supine_mesh_series;
 
 /** Begin a series. All arguments must outlive it; before each frame the caller updates the
  * arrays of `mesh->vertices` and `options->normals`.
- * @param times  [frames] s Statuses as supine_mesh_save, and
- * @retval SUPINE_ERROR_WRITE  the path is a pipe or device: offsets are written last
+ * @param times  [frames] s
+ * @retval SUPINE_ERROR_WRITE  also if the path is a pipe or device: offsets are written last
+ * @retval those of supine_mesh_save
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options, size_t frames,
@@ -195,7 +197,7 @@ supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       supine_error *error);
 /** Add the next frame. Statuses as supine_mesh_save. */
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
-/** Give the file its name, after all frames. Statuses as supine_mesh_save. */
+/** Complete the file after all frames and give it its name. Statuses as supine_mesh_save. */
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
 /** Free a series, and drop it if it was not committed. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);
@@ -204,7 +206,7 @@ void supine_mesh_series_close(supine_mesh_series *series);
  * mesh/io. This is the only list of them. */
 #define SUPINE_MESH_FORMATS(FIRST, NEXT) FIRST(ply) NEXT(obj) NEXT(stl) NEXT(vtp)
 
-/** List the endings in words. */
+/** The endings as text: ".ply, .obj, .stl, .vtp". */
 #define SUPINE_MESH_ENDINGS SUPINE_MESH_FORMATS(SUPINE_MESH_ENDING, SUPINE_MESH_NEXT_ENDING)
 #define SUPINE_MESH_ENDING(name) "." #name
 #define SUPINE_MESH_NEXT_ENDING(name) ", ." #name

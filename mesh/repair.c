@@ -10,12 +10,12 @@
 #include "mesh/repair.h"
 #include "mesh/sides.h"
 
-/* Largest share of loose triangles that is dropped. */
+/* Largest share of loose triangles that are dropped; with more, the mesh is not a surface. */
 static const double few = 0.01;
 
 typedef struct links {
-  uint32_t *parent; /* [triangles] */
-  uint8_t *turned;  /* faces against its parent */
+  uint32_t *parent; /* [triangles] union-find tree of each surface */
+  uint8_t *turned;  /* [triangles] 1 if a triangle faces against its parent */
 } links;
 
 static uint32_t opposite(const supine_mesh *mesh, const supine_mesh_side *s) {
@@ -38,7 +38,7 @@ static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sid
   }
 }
 
-/* Mark faces that share no edge with exactly one other face. */
+/* Mark triangles that share no edge with exactly one other triangle. */
 static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -50,8 +50,7 @@ static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, u
       drop[sides[i + s].at / 3] = 0;
     }
   }
-  if ((double)loose >
-      few * (double)mesh->triangle_count) { /* unconnected triangles are no defect of a surface */
+  if ((double)loose > few * (double)mesh->triangle_count) { /* not a surface with a small defect */
     memset(drop, 0, mesh->triangle_count);
   }
 }
@@ -69,7 +68,7 @@ static size_t drop_marked(supine_mesh *mesh, const uint8_t *drop) {
   return dropped;
 }
 
-/* Find the first triangle of t's surface; `turned` says whether t faces against it. */
+/* Return the first triangle of t's surface; set `turned` to 1 if t faces against it, else 0. */
 static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
   uint8_t sum = 0;
   uint32_t root = t;
@@ -89,7 +88,8 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
   return root;
 }
 
-/* Link triangles over edges of two; false if they form a one-sided surface. */
+/* Link triangles across edges that belong to two of them; return false if they form a one-sided
+ * surface. `closed` is true if every edge belongs to an even number of triangles. */
 static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides, const links *l,
                            bool *closed) {
   const size_t count = 3 * mesh->triangle_count;
@@ -122,7 +122,7 @@ static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *side
   return sound;
 }
 
-/* Reverse the minority of each surface's triangles.
+/* Reverse the minority of each surface's triangles; return how many were reversed.
  * @param count  [triangles, 2] zeros, used as work space */
 static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)[2]) {
   size_t reversed = 0;
@@ -182,7 +182,7 @@ static supine_status part_touching(supine_mesh *mesh, const links *l, size_t *pa
   return status;
 }
 
-/* Reverse and separate linked triangles. */
+/* Reverse the triangles that face against their surface, and separate surfaces that touch. */
 static supine_status mend_links(supine_mesh *mesh, const supine_mesh_side *sides,
                                 supine_mesh_repair_report *report) {
   const size_t n = mesh->triangle_count;

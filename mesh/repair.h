@@ -7,9 +7,9 @@
 
 typedef struct supine_mesh_repair_report {
   size_t duplicates; /**< triangles dropped: same corners as an earlier one */
-  size_t loose;      /**< faces dropped: no edge has exactly two triangles */
-  size_t reversed;   /**< triangles reversed to face as most of their surface */
-  size_t parted;     /**< vertices doubled where closed surfaces touched */
+  size_t loose;      /**< triangles dropped: none of their edges has exactly two triangles */
+  size_t reversed;   /**< triangles reversed to face like most of their surface */
+  size_t parted;     /**< vertices added where closed surfaces shared one */
 } supine_mesh_repair_report;
 
 /** Repair a surface in place. A surface without defects is not changed.
@@ -17,12 +17,12 @@ typedef struct supine_mesh_repair_report {
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
 /** Drop vertices in no triangle, keeping the order of the others; return how many.
- * @param space  [vertex_count] overwritten */
+ * @param space  [vertex_count] work space */
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
-/** Drop connected pieces with a volume below this share of all pieces' volume.
- * @param pieces  written: number kept
- * @param specks  written: number dropped
+/** Drop connected pieces with a volume below this share of the volume of all pieces.
+ * @param pieces  output: number of pieces kept
+ * @param specks  output: number of pieces dropped
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *pieces,
                                       size_t *specks);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file The sides of triangles, sorted by edge. */
+/** @file Sort the sides of triangles by edge. */
 #ifndef SUPINE_MESH_SIDES_H
 #define SUPINE_MESH_SIDES_H
 
@@ -14,7 +14,7 @@ typedef struct supine_mesh_side {
 /** Sort all sides by low, then high, then at; NULL if out of memory. The caller frees them. */
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
 
-/** Count the sides from i on that are of the same edge. */
+/** Return the number of sides, from side i on, that belong to its edge. */
 size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t count);
 
 #endif

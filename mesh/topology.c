@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Find edges by sorting the triangles' sides, and components by joining their ends. */
+/* Find edges by sorting the sides of the triangles, and components by union-find over the edges. */
 #include <stdlib.h>
 
 #include "mesh/sides.h"
 
-enum { FEW = 24 }; /* most sides that insertion sort sorts faster than qsort */
+enum { FEW = 24 }; /* up to so many sides, insertion sort is faster than qsort */
 
 static int compare_sides(const void *left, const void *right) {
   const supine_mesh_side *a = left;
@@ -13,7 +13,7 @@ static int compare_sides(const void *left, const void *right) {
                             : (a->at > b->at) - (a->at < b->at);
 }
 
-/* Sort sides of one lower end. */
+/* Sort sides with the same lower end. */
 static void sort_sides(supine_mesh_side *sides, size_t count) {
   if (count > FEW) {
     qsort(sides, count, sizeof *sides, compare_sides);
@@ -31,7 +31,8 @@ static void sort_sides(supine_mesh_side *sides, size_t count) {
 
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
   const size_t count = 3 * mesh->triangle_count;
-  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next); /* place of a vertex's next side */
+  uint32_t *next =
+      calloc(mesh->vertex_count + 2, sizeof *next); /* index for the next side of a vertex */
   supine_mesh_side *sides = malloc((count + 1) * sizeof *sides);
   if (next == NULL || sides == NULL) {
     free(next);
@@ -69,7 +70,7 @@ size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t
   return size;
 }
 
-/* Count the edges, by the number and direction of their sides. */
+/* Count the edges, and classify them by the number and direction of their sides. */
 static void edges_count(const supine_mesh *mesh, const supine_mesh_side *sides,
                         supine_topology *topology) {
   const size_t count = 3 * mesh->triangle_count;

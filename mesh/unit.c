@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Units of length, and a guess of a file's unit from the size of its box. */
+/* Convert units of length, and guess a file's unit from the size of its box. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

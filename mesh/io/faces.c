@@ -7,14 +7,16 @@
 
 #include "mesh/io/read.h"
 
-/* Find twice the area of the triangle abc, signed as seen against `normal`. */
+/* Return twice the area of the triangle abc times the length of `normal`: positive if its corners
+ * run counter-clockwise about `normal`. */
 static double turn(const double normal[3], const double *a, const double *b, const double *c) {
   double own[3];
   supine_normal(a, b, c, own);
   return supine_dot(normal, own);
 }
 
-/* Sum the corners' cross products about the first. */
+/* Compute a normal of the face, as long as twice its area: the sum over the triangles at its first
+ * corner. */
 static void find_normal(const double *vertices, const uint32_t *corner, size_t count,
                         double normal[3]) {
   memset(normal, 0, 3 * sizeof *normal);
@@ -43,8 +45,9 @@ static bool is_ear(const double *vertices, const uint32_t *corner, size_t count,
   return ear;
 }
 
-/* Cut one ear after another, starting at corner 1; in a face that crosses itself and has no ear,
- * cut the present corner. `corner` is overwritten; `out` takes 3 (count - 2). */
+/* Cut one ear after another into a triangle, starting at corner 1. A face that crosses itself may
+ * have no ear; then cut off the next corner. `corner` is overwritten; `out` takes 3 (count - 2)
+ * indices. */
 static void cut(const double *vertices, uint32_t *corner, size_t count, uint32_t *out) {
   double normal[3];
   find_normal(vertices, corner, count, normal);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Check that a compressed stream is complete: readers of voxels stop when they have enough. */
+/* Check that a gzip stream is complete, because readers of voxels stop when they have enough. */
 #include <fcntl.h>
 #include <unistd.h>
 

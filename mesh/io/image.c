@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* An image in memory: voxels as numbers, positions in voxels and mm. */
+/* Access an image in memory: voxels as numbers, and positions in voxels and mm. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>

@@ -26,7 +26,7 @@ typedef enum supine_image_voxel {
  *
  *     origin + i step[0] + j step[1] + k step[2]
  *
- * Zero-initialise; supine_image_free releases what was read. */
+ * Zero-initialise; supine_image_free frees the voxels. */
 typedef struct supine_image {
   size_t size[3];
   double origin[3];  /**< mm, LPS */
@@ -35,16 +35,16 @@ typedef struct supine_image {
   size_t channels; /**< numbers per voxel: 1 when read; 3 for a displacement field */
   void *values;
   supine_axes axes;         /**< axes assumed for the header's coordinates */
-  const char *frame_source; /**< where the frame of a file was: "sform", "qform" or "space
-                                 directions", a literal */
-  bool frames_differ;       /**< a NIfTI file's other form differs by half a voxel somewhere */
+  const char *frame_source; /**< header field that gives the frame: "sform", "qform", "space
+                                 directions" or "TransformMatrix", a literal */
+  bool frames_differ;       /**< NIfTI: qform and sform differ by half a voxel or more somewhere */
 } supine_image;
 
 /** Report whether the name ends in .nrrd, .nii, .nii.gz or .mha. */
 bool supine_image_supports(const char *path);
 
-/** Report whether the name ends so or as another image format (.mhd, .nhdr, .mgz, .dcm, .hdr,
- * .img), which is refused as unsupported: no maintained C library was at hand. */
+/** Report whether the name ends in one of those or in .mhd, .nhdr, .mgz, .dcm, .hdr or .img, image
+ * formats that are not supported. */
 bool supine_image_is_named(const char *path);
 
 /** Read an image of one number per voxel. A NIfTI image's slope and intercept are applied, to
@@ -69,23 +69,23 @@ void supine_image_free(supine_image *image);
 supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
                                  supine_error *error);
 
-/** Find the bytes of one number. */
+/** Return the size of one number, bytes. */
 size_t supine_image_voxel_size(supine_image_voxel voxel);
 /** Read a number as a double. */
 double supine_image_get(const supine_image *image, size_t index);
-/** Read the numbers from + index[0 .. count - 1], or `count` of them from `begin`, as doubles. */
+/** Read the numbers at from + index[0 .. count - 1] as doubles. */
 void supine_image_gather(const supine_image *image, size_t from, const size_t *index, size_t count,
                          double *values);
 /** Store `count` numbers from `begin` on, rounded and clipped to the type. */
 void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
-/** Interpret the header's coordinates in other axes than it says; AUTO: no change. */
+/** Interpret the coordinates of the header in these axes instead of its own; AUTO: no change. */
 void supine_image_set_axes(supine_image *image, supine_axes axes);
 
-/** Compute the centre of voxel `index`, i + size[0] (j + size[1] k), mm. */
+/** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */
 void supine_image_place(const supine_image *image, size_t index, double point[3]);
 
-/** Convert a point to voxel coordinates: (0, 0, 0) is the first voxel's centre. */
+/** Convert a point, mm, LPS, to voxel coordinates: (0, 0, 0) is the centre of the first voxel. */
 void supine_image_locate(const supine_image *image, const double point[3], double voxel[3]);
 
 #endif

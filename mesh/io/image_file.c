@@ -24,7 +24,7 @@ static const struct {
 
 enum { FORMATS = sizeof formats / sizeof *formats };
 
-/* Find the format; FORMATS if there is none. */
+/* Return the index of the format by the ending; FORMATS if there is none. */
 static size_t format_of(const char *path) {
   size_t f = 0;
   while (f < FORMATS && !supine_text_ends_in_any_case(path, formats[f].ending)) {
@@ -46,8 +46,8 @@ bool supine_image_is_named(const char *path) {
   return is;
 }
 
-/* Report whether the frame is finite and its three directions are independent: edges at least a
- * thousandth of a right angle apart. */
+/* Report whether the frame is finite and its three directions are independent: they span a volume
+ * of more than a thousandth of that of orthogonal ones. */
 static bool is_frame(const supine_image *image) {
   double lengths = 1.0;
   for (int a = 0; a < 3; ++a) {

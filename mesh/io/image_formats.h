@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Internal declarations of this folder's formats. */
+/* Internal declarations of the image formats. */
 #ifndef SUPINE_IMAGE_FORMATS_H
 #define SUPINE_IMAGE_FORMATS_H
 
@@ -10,8 +10,8 @@
 supine_status supine_image_check_size(const char *path, const supine_image *image, size_t file_size,
                                       supine_error *error);
 
-/* Read a gzip stream from `offset` of a file to its end: SUPINE_ERROR_FORMAT unless it is
- * complete and its checksum right. */
+/* Read a gzip stream from `offset`, bytes, of a file to its end. Return SUPINE_ERROR_FORMAT unless
+ * the stream is complete and its checksum is right. */
 supine_status supine_image_check_gzip(const char *path, long offset, supine_error *error);
 
 supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_image *image,

@@ -34,13 +34,13 @@ typedef struct assimp {
 /* Limits of an importer, far above what it needs for a lung. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
-/* Result of the child process, followed by the vertices and triangles. */
+/* Result of the child process; in the stream, its vertices and triangles follow. */
 typedef struct outcome {
   supine_error error;
   size_t dropped, vertex_count, triangle_count;
 } outcome;
 
-/* The scene's surface, gathered node by node. */
+/* The surface of a scene, collected node by node. */
 typedef struct gathering {
   assimp ai;
   const struct aiScene *scene;
@@ -66,7 +66,7 @@ static supine_status import_fail(const char *path, const char *words, supine_err
 /* Import the bytes of an OBJ file, or a file by its path. */
 static const struct aiScene *import(const assimp *ai, const mesh_file *file, bool obj) {
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
-  /* Otherwise importers make up a surface for files that hold only bones. */
+  /* Without this, importers add a surface to files that hold only a skeleton. */
   ai->SetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
   const struct aiScene *scene =
       obj ? ai->ImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size,
@@ -99,7 +99,7 @@ static bool take_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *t
   return true;
 }
 
-/* Add the faces of a part whose vertices are the mesh's last. */
+/* Add the faces of a part, whose vertices are the last ones of the mesh. */
 static bool take_faces(const struct aiMesh *part, bool mirrored, gathering *out) {
   const size_t first = out->mesh.vertex_count - part->mNumVertices;
   bool good = true;
@@ -142,9 +142,9 @@ static void confine(size_t bytes) {
 #endif
   static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
   for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
-    (void)signal(signals[i], SIG_DFL); /* the program's own handlers delete its outputs */
+    (void)signal(signals[i], SIG_DFL); /* handlers of the parent would delete its outputs */
   }
-  (void)alarm(10 * (unsigned)seconds); /* ends it if it blocks */
+  (void)alarm(10 * (unsigned)seconds); /* ends the process if it blocks */
   (void)freopen("/dev/null", "w", stderr);
 }
 
@@ -230,8 +230,8 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
   return import_file(file, false, mesh, dropped, error);
 }
 
-/* Check that coordinates are numbers, and turn lines that name a file of materials into comments:
- * a surface needs no colours. */
+/* Check that coordinates are numbers, and turn lines that name a file of materials into comments,
+ * because a surface needs no colours. */
 supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   mesh_text text = {file->bytes, file->bytes + file->size};

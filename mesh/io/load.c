@@ -17,11 +17,11 @@ static supine_status cannot_read(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
 }
 
-/* Find the reader by the name's ending, or else by the first word; NULL: none. */
+/* Return the reader by the ending of the name, else by the first word of the file; NULL if none. */
 static mesh_reader *find_reader(const mesh_file *file) {
   static const struct {
     const char *ending;
-    const char *word; /* that files begin with, if only they do */
+    const char *word; /* first word that identifies the format; NULL: none */
     mesh_reader *read;
   } known[] = {{".ply", "ply", supine_mesh_read_ply},
                {".vtp", NULL, supine_mesh_read_vtp},
@@ -82,7 +82,8 @@ static supine_status open_regular(const char *path, FILE **stream, size_t *size,
     return cannot_read(path, error);
   }
   *size = (size_t)about.st_size;
-  return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: the file is empty", path)
+  return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                       "%s: the file is empty; save the mesh again", path)
                     : SUPINE_OK;
 }
 

@@ -13,7 +13,7 @@ static const int types[SUPINE_VOXEL_COUNT] = {nrrdTypeChar,   nrrdTypeUChar, nrr
                                               nrrdTypeUShort, nrrdTypeInt,   nrrdTypeUInt,
                                               nrrdTypeFloat,  nrrdTypeDouble};
 
-/* Fail with the last line of teem's message. */
+/* Set the error to the last line of teem's message. */
 static supine_status teem_fails(const char *path, supine_status status, supine_error *error) {
   char *text = biffGetDone(NRRD);
   char *last = text;
@@ -82,7 +82,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   return supine_image_check_size(path, image, file_size, error);
 }
 
-/* Find the bytes before the voxels: the header ends in an empty line. */
+/* Return the number of bytes before the voxels: the header ends with an empty line. */
 static long header_length(const char *path) {
   FILE *file = fopen(path, "rb");
   int before = 0;

@@ -11,7 +11,7 @@
 
 /* ---- text.c: lines and words of a file with any content. ---- */
 
-/** Bytes at <= p < end, not NUL-terminated. */
+/** The bytes from `at` up to `end`, not NUL-terminated. */
 typedef struct mesh_text {
   const unsigned char *at;
   const unsigned char *end;
@@ -23,7 +23,7 @@ bool supine_mesh_text_line(mesh_text *text, mesh_text *line);
 bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
 /** Report whether the word is `expected`, in any case. */
 bool supine_mesh_text_is(mesh_text word, const char *expected);
-/** Parse decimal digits only; false for anything else or beyond 2^63. */
+/** Parse decimal digits; return false for anything else or values beyond 2^63. */
 bool supine_mesh_text_count(mesh_text word, uint64_t *value);
 /** Remove the next word from `text` and parse it as a decimal number, nan or inf; false if there
  * is none or it is invalid. A 0 byte must follow the file's last. */
@@ -39,7 +39,7 @@ typedef struct mesh_type {
   bool is_real;
 } mesh_type;
 
-/** Find a type by its name in PLY or VTP, in any case; NULL: none. */
+/** Return the type with this name in PLY or VTP, in any case, or NULL. */
 const mesh_type *supine_mesh_type_find(mesh_text name);
 /** Decode a number; big: most significant byte first. */
 double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big);
@@ -54,8 +54,8 @@ typedef struct mesh_file {
   bool mentions_ras; /**< a comment contains the word RAS */
 } mesh_file;
 
-/** Refuse NUL bytes and CR without LF in a text, which readers would take differently: they end
- * words at a NUL, and lines at a LF. False: error set, SUPINE_ERROR_FORMAT. */
+/** Refuse a text with NUL bytes or with a CR that no LF follows, which other readers would split
+ * differently. Return false, with SUPINE_ERROR_FORMAT set, if it is refused. */
 bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- space.c ---- */
@@ -67,7 +67,7 @@ void supine_mesh_space_note(mesh_file *file, size_t size);
 /* ---- faces.c: faces added to a mesh that has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< of a face: cutting it takes time up to their cube */
+  MESH_CORNERS_MAX = 1024, /**< corners of a face: the time to cut it grows with up to their cube */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
@@ -89,8 +89,8 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
 /* ---- ply.c, stl.c, vtp_read.c, import.c: one function for each format. ---- */
 
 /** Read a surface in the file's units and axes, not welded, in single precision. The caller frees
- * `mesh` even after a failure; `dropped` counts points and lines. The SPACE tag is noted if the
- * head did not show it. */
+ * `mesh`, also after a failure. `dropped` is set to the number of faces that are points or lines.
+ * If the format has its own place for a SPACE tag, that is noted in `file`. */
 typedef supine_status mesh_reader(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                   supine_error *error);
 mesh_reader supine_mesh_read_ply;
@@ -104,8 +104,8 @@ bool supine_mesh_import_knows(const char *ending);
 
 /* ---- weld.c ---- */
 
-/** Weld vertices of equal bits (the caller turned -0 into 0), drop degenerate triangles, then
- * unused vertices. Works in place; adds to the counts. */
+/** Weld vertices at equal positions (the caller has turned -0 into 0), drop degenerate triangles,
+ * then unused vertices, in place. Add to the counts of the report. */
 supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
 
 #endif

@@ -21,9 +21,9 @@ typedef struct mesh_writer {
   char comment[256];       /**< one printable line, or "" */
 } mesh_writer;
 
-/** Find vertex i in the file's axes and units. */
+/** Compute vertex i in the file's axes and units. */
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]);
-/** Find the displacement of vertex i in the file's axes and units, and its length. */
+/** Compute the displacement of vertex i in the file's axes and units, followed by its length. */
 void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]);
 
 /** Find the normal of vertex i in the file's axes. */
@@ -39,7 +39,7 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 
-/** Put little-endian bytes of `count` values at *at, and advance it. */
+/** Write `count` values as little-endian bytes at *at, and advance *at. */
 void supine_mesh_put_f32(unsigned char **at, const float *values, size_t count);
 void supine_mesh_put_u32(unsigned char **at, const uint32_t *values, size_t count);
 

@@ -43,7 +43,7 @@ struct vtp {
   size_t threads;
   unsigned char *raw;    /* a block for each thread */
   unsigned char *packed; /* room for the blocks of any array */
-  uint64_t *sizes;       /* of its blocks */
+  uint64_t *sizes;       /* header of an array: 3 numbers, then the size of each block */
   const vtp_array *packing;
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Shared by all formats: numbers in the file's axes and units, and their bytes. */
+/* Convert numbers to the axes and units of a file, and to bytes, for all formats. */
 #include <float.h>
 #include <math.h>
 #include <string.h>

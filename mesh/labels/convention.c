@@ -139,7 +139,7 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
   return false;
 }
 
-/* Set sides as requested; `name` is the convention's. */
+/* Set the sides of labels as requested; set `name` to that of the convention used, if any. */
 static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
                             const char *wanted, uint8_t *side, const char **name,
                             supine_error *error) {
@@ -177,7 +177,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
   return SUPINE_OK;
 }
 
-/* Check that both lungs are present if both are named; `doubted` unless the left one lies left. */
+/* Check that both lungs are present if both are named; set `doubted` unless the left one lies to
+ * the left of the other. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
                            const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A mask averaged over cubes, in steps along its own axes, and corrected so that no two inner or
+/* Average a mask over cubes, in steps along its own axes, and correct these so that no two inner or
  * outer cubes meet only in an edge or a corner: its surface is then a manifold [Latecki1995]. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Exact distances from every voxel to a set of voxels: along the first axis by counting, along
- * the others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2 + f(y)
+/* Compute exact distances from every voxel to a set of voxels: along the first axis by counting,
+ * along the others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2 + f(y)
  * [Felzenszwalb2012]. */
 #include <math.h>
 #include <stdlib.h>
@@ -15,8 +15,8 @@ typedef struct sweep {
   bool zero;
   float *squares;
   int axis;
-  size_t length; /* of the longest side */
-  double *space; /* of each thread, 3 x (length + 1) */
+  size_t length; /* larger of size[1] and size[2] */
+  double *space; /* [threads, 3, length + 2] work space */
 } sweep;
 
 static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
@@ -41,8 +41,8 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Transform one line of n values, `stride` apart; v: places of the parabolas, z: where each
- * becomes the lowest, f: the values. */
+/* Transform one line of n values, `stride` apart. Work space: v, indices of the lowest parabolas;
+ * z, where each becomes the lowest, mm; f, the values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;

@@ -14,7 +14,7 @@ static const double least_edge = 0.2; /* mm: a hundredth of it would give a bill
 static const double most_edge = 20.0; /* mm: a larger one leaves nothing of a lung */
 static const double most_closing = 20.0;
 static const double least_lung = 1.0;      /* mL: the least volume of a lung */
-static const double longest_lung = 1000.0; /* mm: the cubes of a longer one exceed any memory */
+static const double longest_lung = 1000.0; /* mm: the voxels' size must be wrong beyond it */
 
 typedef struct work {
   const char *path; /* first file, for messages */
@@ -23,7 +23,7 @@ typedef struct work {
   double edge;
   supine_image image; /* freed when the mask is made */
   labels_mask both;
-  size_t from[3]; /* voxel of the image at the mask's origin */
+  size_t from[3]; /* voxel of the image at the mask's first voxel inside the margin */
   size_t cut[2];  /* voxels of each side at the image's border */
   bool doubted;   /* by the header, the left lung is not left of the right one */
 } work;
@@ -222,7 +222,7 @@ static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mas
   }
 }
 
-/* Keep one piece, and fill its cavities. */
+/* Close gaps as requested, keep the largest piece, and fill its cavities. */
 static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);

@@ -29,10 +29,10 @@ typedef struct supine_labels_lung {
   int side;        /**< +1 left, -1 right */
   double mask;     /**< volume of the voxels that the surface is made of */
   double closed;   /**< part of it added by closing */
-  size_t islands;  /**< number of pieces dropped, */
-  double dropped;  /**< and their volume */
-  size_t cavities; /**< number filled, */
-  double filled;   /**< and their volume */
+  size_t islands;  /**< number of pieces dropped */
+  double dropped;  /**< volume of the pieces dropped */
+  size_t cavities; /**< number of cavities filled */
+  double filled;   /**< volume of the cavities filled */
   double surface;  /**< volume of the surface */
   double farthest; /**< largest distance of a vertex from the mask's surface, mm */
   double held;     /**< bound of that distance, half a voxel, mm */
@@ -45,7 +45,7 @@ typedef struct supine_labels_report {
   size_t size[3];
   double spacing[3];  /**< mm */
   char axes[64];      /**< "i to the left, j to the back, k to the head" */
-  const char *source; /**< "sform", "qform" or "space directions", a literal */
+  const char *source; /**< frame_source of the image, a literal */
   bool frames_differ; /**< sform and qform are both present and differ */
   char taken[256];    /**< "labels 1 right, 2 left" */
   double parted;      /**< widest neck at which touching lungs were split, mm; 0: none */
@@ -54,8 +54,8 @@ typedef struct supine_labels_report {
   supine_axes coordinates;    /**< coordinates assumed for the header */
 } supine_labels_report;
 
-/** Make the surfaces of the lungs from a label map (.nrrd, .nii, .nii.gz), or from several masks
- * in one frame, each a part given by its nonzero voxels.
+/** Make the surfaces of the lungs from a label map (.nrrd, .nii, .nii.gz, .mha), or from several
+ * masks in one frame, each a part given by its nonzero voxels.
  *
  * The largest piece of each lung is kept and its cavities are filled. The map is averaged over
  * cubes of `edge`, in steps along its own axes; cubes at least half filled are inside, corrected

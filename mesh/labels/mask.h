@@ -43,7 +43,9 @@ typedef struct labels_tally {
   uint32_t low[3], high[3];
 } labels_tally;
 
-/** @param tally  [LABELS_MAX], written */
+/** Count the voxels of each label and find their boxes.
+ * @param tally  [LABELS_MAX] output
+ * @retval SUPINE_ERROR_FORMAT  a voxel is not a label */
 supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
                                   supine_error *error);
 typedef struct labels_choice {
@@ -51,7 +53,8 @@ typedef struct labels_choice {
   bool doubted; /**< by the header, the left lung does not lie left of the other */
 } labels_choice;
 
-/** @param side  [LABELS_MAX], written: 0, LABELS_LEFT, ... */
+/** Choose the side of each label: as `wanted`, or by the labels present if that is NULL.
+ * @param side  [LABELS_MAX] output: 0, LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER */
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
                                    labels_choice *choice, supine_error *error);
@@ -90,18 +93,19 @@ supine_status supine_labels_fill_cavities(labels_mask *mask, size_t *cavities, s
 
 /* ---- distance.c ---- */
 
-/** Find the squared distances, mm^2, from every voxel's centre to the nearest zero voxel
- * (`zero`), else nonzero voxel. Steps are taken as orthogonal.
- * @param squares  [size], written */
+/** Compute the squared distance, mm^2, from the centre of every voxel to that of the nearest zero
+ * voxel or, unless `zero`, nonzero voxel. The steps are assumed to be orthogonal.
+ * @param squares  [size] output */
 supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *squares);
-/** Close the mask: fill all that a ball of this radius, mm, cannot reach from outside. The
- * margin must be wider. */
+/** Close the mask: fill all voxels that a ball of this radius, mm, cannot reach from outside. The
+ * mask's margin must be wider than the radius.
+ * @param added  output: number of voxels filled */
 supine_status supine_labels_close(labels_mask *mask, double radius, size_t *added);
 
 /* ---- part.c ---- */
 
-/** Turn LABELS_EITHER into left or right.
- * @param neck  written: width of the widest neck cut, mm; 0: none
+/** Replace LABELS_EITHER by LABELS_LEFT or LABELS_RIGHT.
+ * @param neck  output: width of the widest neck cut, mm; 0: none
  * @retval SUPINE_ERROR_MESH  one lung, or two that cannot be separated */
 supine_status supine_labels_part(const char *path, labels_mask *both, double *neck,
                                  supine_error *error);
@@ -116,7 +120,8 @@ typedef struct labels_cubes {
   float *share;     /**< [size] 0 to 1; 0 in the outermost layers */
 } labels_cubes;
 
-/** @param one  keep the largest piece, without cavities */
+/** Average a mask over cubes of `edge` mm.
+ * @param one  keep only the largest piece, and fill its cavities */
 supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
                                          labels_cubes *cubes);
 void supine_labels_cubes_free(labels_cubes *cubes);

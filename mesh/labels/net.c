@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The surface of a mask by surface nets: a vertex in each cell that the surface runs through, a
- * quadrilateral across each edge between an inner and an outer cube [Gibson1998]. */
+/* Make the surface of a mask by surface nets: a vertex in each cell that the surface runs through,
+ * a quadrilateral across each edge between an inner and an outer cube [Gibson1998]. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -167,7 +167,8 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
   return SUPINE_OK;
 }
 
-/* 1 / 0.5 - 1 / 0.51 = 0.04: keeps waves longer than some 16 cubes, removes terraces of slices. */
+/* Factors of the smoothing. The pass band, 1 / 0.5 - 1 / 0.51 = 0.04, keeps waves longer than some
+ * 16 cubes, and removes the steps between slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
 enum { TURNS = 40 };
@@ -209,7 +210,7 @@ static supine_status relax(surface_net *net) {
   return SUPINE_OK;
 }
 
-/* Convert a vertex to voxels of the mask. */
+/* Compute the position of a vertex in voxels of the mask. */
 static void in_voxels(const surface_net *net, const labels_cubes *cubes, size_t vertex,
                       double voxel[3]) {
   for (size_t a = 0; a < 3; ++a) {

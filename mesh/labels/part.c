@@ -7,9 +7,9 @@
 
 #include "mesh/labels/mask.h"
 
-/* Least volume of the smaller lung over the larger. */
+/* Smallest ratio of the smaller lung's volume to that of the larger. */
 static const double least_share = 0.1;
-/* Widest neck between lungs. */
+/* Widest neck between lungs that is cut. */
 static const double widest_neck = 40.0; /* mm */
 
 typedef struct pair {
@@ -107,12 +107,12 @@ supine_status supine_labels_part(const char *path, labels_mask *both, double *ne
     goto cleanup;
   }
   status = SUPINE_OK;
-  bool all = false; /* volume of both pieces */
+  bool all = false; /* whether the two pieces hold all voxels of the mask */
   for (double depth = 0.0; status == SUPINE_OK && !parted && 2.0 * depth <= widest_neck;
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
-    if (depth == step) { /* most lungs separate before this depth */
+    if (depth == step) { /* not needed by most lungs, which do not touch */
       status = supine_labels_distance(both, true, squares);
     }
     erode(both, squares, depth, worn.at);

@@ -113,7 +113,7 @@ void supine_labels_pieces_free(labels_pieces *pieces) {
   *pieces = (labels_pieces){0};
 }
 
-/* Set the voxels of all pieces but one. */
+/* Set the voxels of all pieces except `kept` to `value`; return how many. */
 static size_t change_others(labels_mask *mask, const labels_pieces *pieces, uint32_t kept,
                             uint8_t value) {
   size_t changed = 0;

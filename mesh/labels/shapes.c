@@ -9,7 +9,8 @@
 
 enum { ALL_MOST = 256 }; /* more labels suggest that it is no label map */
 
-/* Distance between vertices over the cube root of a large part's volume: 15,000 in a lobe. */
+/* Distance between vertices relative to the cube root of a large part's volume; gives 15,000
+ * vertices in a lobe. */
 static const double edge_share = 0.02;
 
 /* Make one part. `value` [LABELS_MAX] holds zeros before and after. */

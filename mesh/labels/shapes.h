@@ -12,9 +12,9 @@ typedef struct supine_labels_shape {
   supine_mesh surface;
 } supine_labels_shape;
 
-/** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz): surface nets as of
- * supine_labels_surfaces, with all pieces and cavities. Edges have a voxel's size; in large
- * parts, 1/50 of the cube root of the volume.
+/** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz, .mha): surface nets as by
+ * supine_labels_surfaces, with all pieces and cavities. Vertices are about one voxel apart; in
+ * large parts, 1/50 of the cube root of the volume.
  * @param wanted  labels, 1 to 65535; count 0: all labels present
  * @param parts   [*count] written, in the given order, or by label; supine_labels_shapes_free
  * @retval SUPINE_ERROR_MESH    a label is absent, or there is none
