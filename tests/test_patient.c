@@ -366,7 +366,7 @@ static void test_impossible_pairs_are_refused(void **state) {
   for (size_t i = 0; i < n; ++i) {
     pairs.to[3 * i + 2] += 5.0;
   }
-  refused(&pairs, true, "nothing to fit");
+  refused(&pairs, true, "give a state in which the lungs have moved");
   for (size_t i = 0; i < n; ++i) { /* each point's place that of another */
     memcpy(pairs.to + 3 * i, pairs.from + 3 * ((i * 7 + 3) % n), 3 * sizeof(double));
   }

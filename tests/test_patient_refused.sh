@@ -45,9 +45,9 @@ refused 2 'mm apart: different frames? --translation' --landmarks apart.csv
 changed beyond '$6 += 5000'
 refused 2 'mm apart: different frames?' --landmarks beyond.csv
 changed centimetres '$4 /= 10; $5 /= 10; $6 /= 10'
-refused 2 'in cm; landmarks are in mm' --landmarks centimetres.csv
+refused 2 'as if in cm; give landmarks in mm' --landmarks centimetres.csv
 changed both '$1 /= 10; $2 /= 10; $3 /= 10; $4 /= 10; $5 /= 10; $6 /= 10'
-refused 2 'in cm; landmarks are in mm' --landmarks both.csv
+refused 2 'as if in cm; give landmarks in mm' --landmarks both.csv
 changed inches '$4 *= 2.54; $5 *= 2.54; $6 *= 2.54'
 refused 2 'times as large as rest: are both in mm' --landmarks inches.csv --translation
 changed sides '$4 = -$4'
@@ -57,9 +57,9 @@ refused 2 'they are in different axes' --landmarks ras.csv --translation
 changed same '$4 = $1; $5 = $2; $6 = $3'
 refused 2 'the same as rest' --landmarks same.csv
 changed shifted '$4 = $1; $5 = $2; $6 = $3 + 5'
-refused 2 'there is nothing to fit' --landmarks shifted.csv --translation
+refused 2 'give a state in which the lungs have moved' --landmarks shifted.csv --translation
 changed flat '$2 = 17 + 0.3 * $1; $5 = $2 - 3'
-refused 2 'of one plane' --landmarks flat.csv
+refused 2 'points lie in one plane' --landmarks flat.csv
 awk -F, -v OFS=, 'NR == 1 { print; next } { from[NR] = $1 OFS $2 OFS $3; to[NR] = $4 OFS $5 OFS $6 }
   END { for (i = 2; i <= NR; ++i) { print from[i], to[2 + (7 * i) % (NR - 1)] } }' good.csv >shuffled.csv
 refused 2 'in the same order' --landmarks shuffled.csv

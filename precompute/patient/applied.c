@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The force that a measured displacement implies. */
+/* Find the force that a measured displacement implies. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,11 +14,12 @@
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS };
 
-/* Least length of a direction, relative to their RMS: shorter ones say little about the force. */
+/* Length of a direction, relative to their RMS, below which its share of the force is damped: short
+ * ones say little about the force. */
 static const double shortest = 0.1;
 
-/* Find the force after spreading, [N]: the law's, corrected by the other surface along its normal.
- */
+/* Find the spread force [N]: the law's, corrected by the remaining distance to the other surface
+ * along its normal. */
 static void find_catch(supine_patient_matching *m, const supine_patient *patient, double *caught,
                        supine_patient_applied *applied) {
   supine_patient law = *patient;
@@ -42,8 +43,10 @@ static void find_catch(supine_patient_matching *m, const supine_patient *patient
   }
 }
 
-/* Sum each vertex's columns of (18), height along gravity and force into its block, by area: means
- * [blocks] of each, one after another, and areas [blocks]. */
+/* Average the columns of (18), the height along gravity and the force over each block, weighted by
+ * area.
+ * @param means  [COLUMNS + 2, blocks] written
+ * @param area   [blocks] written, mm^2 */
 static void average(const supine_patient_matching *m, const double *force, const double gravity[3],
                     double *vertex_area, size_t blocks, double *means, double *area) {
   supine_mesh_vertex_area(&m->rest->mesh, vertex_area);
@@ -132,7 +135,8 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
     if (!fit_force(means, area, blocks, applied)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
-          "the displacement determines no force: it is nowhere along the law's directions");
+          "the displacement along the law's directions does not determine the force: check "
+          "that both surfaces are of the same whole lungs");
     }
   }
   free(caught);

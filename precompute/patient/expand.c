@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability from motion, and whether it improves held-out blocks. */
+/* Fit expandability to motion, and test whether it improves the prediction of held-out blocks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,10 +16,10 @@
 
 enum {
   REGIONS = SUPINE_PATIENT_MODES,
-  LANES = 16, /* regions solved for at once */
-  ROUNDS = 3, /* rounds of finding the nearest points */
-  TURNS = 30, /* most alternations between regions and law */
-  HELD_TURNS = 8,
+  LANES = 16,     /* regions solved for at once */
+  ROUNDS = 3,     /* rounds of finding the nearest points */
+  TURNS = 30,     /* most alternations between regions and law */
+  HELD_TURNS = 8, /* the same without a fold */
   FOLDS = SUPINE_PATIENT_FOLDS
 };
 
@@ -27,11 +27,11 @@ enum {
 static const double neighbours_differ = 0.3;
 static const double regions_differ = 1.0;
 static const double noise_least = 0.3; /* Least noise of a surface point, mm. */
-static const double together = 10.0;   /* neighbouring rows of equal error: they count as one */
+static const double together = 10.0;   /* neighbouring rows with a common error: count as one */
 
-static const double near_by = 1.7;  /* largest distance of neighbours over the least one */
-static const double least = 0.02;   /* Least a of a region. */
-static const double worth = 0.95;   /* ratio of held-out RMS, with over without, to keep it */
+static const double near_by = 1.7; /* largest distance of neighbouring centres over the least one */
+static const double least = 0.02;  /* Least a of a region. */
+static const double worth = 0.95;  /* ratio of held-out RMS, with over without, to keep it */
 static const double settled = 1e-3; /* Change of every a at which the alternation ends. */
 
 /* The regions' values and the law fitted with them. */
@@ -44,37 +44,39 @@ typedef struct estimate {
 typedef struct study {
   supine_patient_matching *m;
   const supine_patient_fit_options *options;
-  supine_patient_power mean;        /* of the law, before the fit */
-  supine_patient_stiffness regions; /* centres and radii */
-  size_t count;                     /* regions of both lungs */
-  double *response;                 /* [rows, count] F_k of each region */
-  double belief[REGIONS * REGIONS]; /* precision of the prior of a - 1, times the squared noise */
-  size_t *fold;                     /* [rows] */
+  supine_patient_power mean;           /* of the law, before the fit */
+  supine_patient_stiffness regions;    /* centres and radii */
+  size_t count;                        /* regions of both lungs */
+  double *response;                    /* [rows, count] F_k of each region */
+  double precision[REGIONS * REGIONS]; /* [count, count] prior precision of a - 1 */
+  size_t *fold;                        /* [rows] */
 } study;
 
 /* --- the linear problem ---------------------------------------------------------------------- */
 
-static void believe(study *s) {
+/* Compute the prior precision of a - 1. */
+static void set_precision(study *s) {
   const supine_patient_mode *mode = s->regions.mode;
   double nearest = INFINITY;
   for (size_t i = 0; i < s->count * s->count; ++i) {
     const size_t j = i / s->count;
     const size_t k = i % s->count;
     nearest = j != k ? fmin(nearest, supine_distance(mode[j].centre, mode[k].centre)) : nearest;
-    s->belief[i] = j == k ? pow(regions_differ, -2.0) : 0.0;
+    s->precision[i] = j == k ? pow(regions_differ, -2.0) : 0.0;
   }
   for (size_t i = 0; i < s->count * s->count; ++i) {
     const size_t j = i / s->count;
     const size_t k = i % s->count;
     if (j != k && mode[j].side == mode[k].side &&
         supine_distance(mode[j].centre, mode[k].centre) < near_by * nearest) {
-      s->belief[j * s->count + j] += pow(neighbours_differ, -2.0);
-      s->belief[i] -= pow(neighbours_differ, -2.0);
+      s->precision[j * s->count + j] += pow(neighbours_differ, -2.0);
+      s->precision[i] -= pow(neighbours_differ, -2.0);
     }
   }
 }
 
-/* Find the most likely a of all regions under a fixed law. `space` is [(2 count + 1) count]. */
+/* Find the most likely a of all regions under a fixed law. `space` is [(2 count + 1) count].
+ * Return false if the matrix is singular. */
 static bool solve_regions(const study *s, const supine_patient_row *rows, double *space,
                           estimate *e) {
   const size_t n = s->count;
@@ -105,7 +107,7 @@ static bool solve_regions(const study *s, const supine_patient_row *rows, double
   for (size_t j = 0; j < n; ++j) {
     for (size_t k = 0; k <= j; ++k) { /* the lower triangle of a symmetric matrix */
       normal[j * n + k] = normal[k * n + j];
-      whole[j * n + k] = whole[k * n + j] = normal[j * n + k] + noise * s->belief[j * n + k];
+      whole[j * n + k] = whole[k * n + j] = normal[j * n + k] + noise * s->precision[j * n + k];
     }
     right[j] += noise * pow(regions_differ, -2.0); /* (a - 1)^2; differences have mean 0 */
   }
@@ -290,7 +292,7 @@ static supine_status settle(const study *s, bool with, estimate *e, supine_patie
   return status;
 }
 
-/* Store the regions' values, and find the range of the seen ones. */
+/* Store the regions' values, and find the range of E of the seen ones. */
 static void note_regions(study *s, const estimate *e, supine_patient_expand_report *report) {
   double stiffness[REGIONS];
   double logarithms = 0.0;
@@ -319,7 +321,7 @@ static supine_status compare(study *s, supine_patient *patient, supine_patient_s
                              supine_patient_expand_report *report, supine_error *error) {
   const size_t n = s->m->rest->mesh.vertex_count;
   double *tissue = malloc(n * sizeof *tissue);
-  estimate found[2] = {{.power = s->mean}}; /* even tissue; fitted tissue */
+  estimate found[2] = {{.power = s->mean}}; /* without and with expandability */
   supine_status status = tissue == NULL
                              ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for tissue")
                              : SUPINE_OK;
@@ -370,7 +372,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu regions", s->count)
           : find_responses(s, model, error);
   if (status == SUPINE_OK) {
-    believe(s);
+    set_precision(s);
     status = compare(s, patient, stiffness, report, error);
   }
   free(s->fold);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a law and its correction, and hold blocks out. */
+/* Fit a law and its correction, and measure its error on held-out blocks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,14 +18,14 @@ enum {
 const char *const supine_patient_score_names[SUPINE_PATIENT_SCORES] = {
     "none", "translation", "affine", "law", "corrected"};
 
-/* Half widths of the 95 % interval over the expected error: of a point, of one component. */
+/* Half widths of the 95 % interval over the expected error, for a point and for one component. */
 static const double band_point = 1.8;
 static const double band_component = 1.96;
 
 /* Factor on the expected error within 8 mm of the surface, measured on ten patients. */
 static const double near_surface = 1.3;
 
-/* Sums over rows of weighted squares, mm^2. */
+/* Sums over rows of weighted squares, mm^2, and of weights; counts of points. */
 typedef struct squares {
   double of[SCORES], expected, weight;
   size_t points, within;
@@ -41,7 +41,7 @@ typedef struct study {
   supine_status failed[ITEMS];
 } study;
 
-/* Add the squared residuals of rows under a fit, and under maps fitted to the same rows as it. */
+/* Add the squared residuals of rows predicted by a fit, and by maps fitted to the same rows. */
 static void add_rows(const study *s, const supine_patient_row *rows, size_t count,
                      supine_patient_krige *krige, squares *to) {
   const double band = s->components == 3 ? band_point : band_component;
@@ -77,7 +77,7 @@ static void add_rows(const study *s, const supine_patient_row *rows, size_t coun
 
 static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *to) {
   const size_t n = s->row_count;
-  supine_patient_row *rows = malloc(n * sizeof *rows); /* those kept, then those held out */
+  supine_patient_row *rows = malloc(n * sizeof *rows); /* kept rows, then held-out rows */
   supine_patient_krige krige = {0};
   supine_status status = rows == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   size_t kept = 0;

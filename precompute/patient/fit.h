@@ -21,18 +21,18 @@ typedef enum supine_patient_score {
 /** "none", "translation", "affine", "law", "corrected". */
 extern const char *const supine_patient_score_names[SUPINE_PATIENT_SCORES];
 
-/** Errors are in mm RMS. */
+/** Result of a fit; errors are in mm RMS. */
 typedef struct supine_patient_fit_report {
   size_t count;      /**< landmarks, or points of a surface */
   size_t blocks;     /**< cubes of 40 mm with points in them */
   size_t components; /**< components measured per point: 3 if all are landmarks, else 1 */
-  double fitted[SUPINE_PATIENT_SCORES];
+  double fitted[SUPINE_PATIENT_SCORES];   /**< on the fitted points */
   double held_out[SUPINE_PATIENT_SCORES]; /**< on held-out blocks */
-  double baseline;                        /**< held out, of the motion between the scans alone */
-  double band;                            /**< share of held-out points within the 95 % band */
+  double baseline;  /**< on held-out blocks: of a translation if the scans moved, else of none */
+  double band;      /**< share of held-out points within the 95 % band */
   double expected;  /**< expected error of held-out points (of one component, if one is measured) */
   double explained; /**< held-out share of the squared displacement that the law explains */
-  double explained_fitted; /**< the same of the fitted points */
+  double explained_fitted; /**< the same share of the fitted points */
   double expected_point;   /**< expected error of points of the surface in three dimensions */
   double moved;            /**< mean displacement of the fitted points, mm */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
@@ -42,7 +42,7 @@ typedef struct supine_patient_fit_report {
  * @param rows     [single + 3 triples]; their `block` is written
  * @param single   rows of points with one known component; they come first
  * @param triples  landmarks, three rows each
- * @param patient  its frame is that of the rows
+ * @param patient  in: the frame of the rows; out: the law and its correction
  * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_fit(const supine_patient_fit_options *options,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The gain from scans in other postures. */
+/* Fit the gain to scans in other postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,21 +10,21 @@
 #include "precompute/patient/matching.h"
 #include "sh/base/vec3.h"
 
-static const double gain_most = 2.0;
+static const double gain_most = 2.0;     /* largest gain of the search */
 static const double at_bound = 0.01;     /* distance to a bound at which a gain is undetermined */
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
 static const double matched_least = 0.3; /* least share of a surface's vertices that must match */
 static const double settled = 1e-4;      /* change of a scale between rounds at which they end */
 enum { SEARCH_STEPS = 40, ROUNDS = 20, VERTICES_MAX = 2000, UNKNOWNS = 4, EIGHTHS = 8 };
 
-/* A further state as rows, axis . (s now / then u + t) = value. */
+/* A further state as rows, axis . (s (now / then) u + t) = value, with now / then of ratio_at. */
 typedef struct state {
   supine_patient_told *told;
   supine_patient_matching matching; /* of a state given as a surface */
   size_t count;
-  supine_patient_row *rows;  /* [count]; block: the eighth of the lungs */
-  double *u;                 /* [count, 3] from full inflation to rest in the fitted posture, mm */
-  double *heights;           /* [count, 2] spread, in the fitted posture and in this one */
+  supine_patient_row *rows; /* [count]; block: the eighth of the lungs */
+  double *u;                /* [count, 3] from full inflation to rest in the fitted posture, mm */
+  double *heights; /* [count, 2] spread heights, 0 to 1, in the fitted posture and this one */
   double unknowns[UNKNOWNS]; /* s, t */
   double weight;             /* sum over the rows */
 } state;
@@ -32,7 +32,8 @@ typedef struct state {
 typedef struct problem {
   supine_patient_record *record;
   bool moved;
-  double gains[2][3]; /* share of the way of the fuller and the emptier state, by axis */
+  double gains[2][3]; /* part of the way from full inflation to rest of the fuller and the
+                         emptier state, by axis */
   state states[SUPINE_PATIENT_OTHERS_MAX];
   size_t state_count;
   size_t without; /* the eighth that is left out; EIGHTHS: none */
@@ -136,8 +137,8 @@ static supine_status find_range(const problem *p, const state *s, const double g
   return SUPINE_OK;
 }
 
-/* Make the rows of a state: three of each pair, whose force does not spread, or the vertices of
- * `rest` that take part. */
+/* Make the rows of a state: three for each pair, whose force is not spread, or one for each vertex
+ * of `rest` that takes part. */
 static supine_status take_rows(const problem *p, state *s, const supine_lungs *rest,
                                supine_error *error) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -195,7 +196,7 @@ static supine_status begin(const problem *p, state *s, const supine_lungs *rest,
                                   place.side);
     }
     supine_patient_displacement(patient, &place, 1.0, s->u + 3 * i);
-    for (size_t k = 0; k < 3; ++k) { /* to that from full inflation to rest */
+    for (size_t k = 0; k < 3; ++k) { /* scale to the way from full inflation to rest */
       s->u[3 * i + k] /= p->gains[1][k] - p->gains[0][k];
     }
   }
@@ -222,8 +223,8 @@ static supine_status match_surface(const problem *p, state *s, double gain, supi
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
                                 "only %.0f %% of the vertices find a further state's surface "
-                                "facing the same way: other axes, another person, or triangles "
-                                "inwards",
+                                "facing the same way: check that axes and person are the same, "
+                                "and that no triangles face inwards",
                                 100.0 * matched);
 }
 

@@ -13,15 +13,16 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  LAW = SUPINE_PATIENT_CONSTANTS, /* the first columns; the motion follows */
+  LAW = SUPINE_PATIENT_CONSTANTS, /* terms of the constants; those of the motion follow */
   SCALE = TERMS - 1,
   WIDTH = TERMS + 1, /* of the design: the terms, then the residual */
   STEPS = 60
 };
 
-static const double scale_spread = 0.3;  /* prior deviation of the size of a known shape */
+static const double scale_spread = 0.3;  /* prior deviation of the size of a law of known shape,
+                                          * relative */
 static const double settled = 1e-10;     /* relative decrease of the squares that ends the fit */
-static const double damping_most = 1e10; /* damping at which no step decreases the squares */
+static const double damping_most = 1e10; /* damping at which no step decreases the squares: end */
 
 /* Beyond these exponents all motion is at one face; beyond these slopes the force changes sign. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
@@ -36,7 +37,7 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
   double u[3];
   supine_patient_direction(law, place, supine_patient_force_at(law, place), u);
   centre.size = supine_length(u);
-  memcpy(centre.at, place->arm, sizeof centre.at); /* from the box's centre: distances count */
+  memcpy(centre.at, place->arm, sizeof centre.at); /* relative, as only distances count */
   return centre;
 }
 
@@ -89,7 +90,7 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
 
 /* Factor the covariance of the rows: noise plus g. If the law keeps its known shape, the size of
  * g follows the least-squares size of that law.
- * @return the logarithm of half its determinant; NAN where it is not positive definite */
+ * @return half the logarithm of its determinant; NAN if it is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
   double logarithm = 0.0;
@@ -118,7 +119,7 @@ static double factor(supine_patient_krige *k) {
 }
 
 /* Build the normal equations of the terms at the present law, and the squared residual. */
-static void look(supine_patient_krige *k) {
+static void linearise(supine_patient_krige *k) {
   const int n = (int)k->count;
   for (size_t i = 0; i < k->count; ++i) {
     double *row = k->design + WIDTH * i;
@@ -169,7 +170,7 @@ static bool factor_terms(supine_patient_krige *k) {
 /* Minimise the squares over the law; false where the rows do not determine it. */
 static bool descend(supine_patient_krige *k) {
   double damping = 0.0;
-  look(k);
+  linearise(k);
   for (size_t steps = 0; steps < STEPS && damping < damping_most; ++steps) {
     const supine_patient_power before = k->law;
     const double squares = k->squares;
@@ -178,7 +179,7 @@ static bool descend(supine_patient_krige *k) {
       return false;
     }
     k->law = moved_by(&before, step);
-    look(k);
+    linearise(k);
     if (k->squares <= squares && squares - k->squares <= settled * squares) {
       break;
     }
@@ -186,7 +187,7 @@ static bool descend(supine_patient_krige *k) {
     damping = nearer ? 0.1 * damping : fmax(1e-3, 10.0 * damping);
     if (!nearer) {
       k->law = before;
-      look(k);
+      linearise(k);
     }
   }
   return true;
@@ -210,8 +211,8 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   return likelihood - 0.5 * k->squares;
 }
 
-/* Choose the sill and the noise of the largest likelihood, one after the other, where they are not
- * given: the sill once more under the noise that was chosen. */
+/* Choose the sill and the noise, unless given, that maximise the likelihood: first the sill, then
+ * the noise, then the sill again under that noise. */
 static void choose(supine_patient_krige *k, const supine_patient_fit_options *options) {
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
@@ -279,8 +280,8 @@ void supine_patient_krige_free(supine_patient_krige *krige) {
 
 static supine_status undetermined(supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "the points do not determine the law, as if they lay in one plane or "
-                          "were not numbers: give points all over the lungs");
+                          "the points do not determine the law: give finite points spread over "
+                          "the lungs, not in one plane");
 }
 
 supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
@@ -302,7 +303,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   choose(k, options);
   /* Fit the law, then the correction of its residual, in units of that law's size. */
   right = !isnan(factor(k)) && descend(k) && !isnan(factor(k));
-  look(k);
+  linearise(k);
   if (!right || !factor_terms(k)) {
     return undetermined(error);
   }
@@ -328,7 +329,7 @@ supine_status supine_patient_law_fit(const supine_patient_fit_options *options,
   return status;
 }
 
-/* Solve with the triangular factor of the normal matrix, so that x . x is a variance. */
+/* Compute the variance of the combination x of the terms; x is overwritten. */
 static double variance_of(const supine_patient_krige *k, double x[TERMS]) {
   cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, TERMS, k->normal, TERMS, x, 1);
   return cblas_ddot(TERMS, x, 1, x, 1);

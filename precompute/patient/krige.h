@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measurements as rows: a landmark gives three, a point of a surface one, along the normal of the
- * other surface. A law and the kriging of its residual are fitted together to rows:
+/* Fit a law to measurements. A landmark gives three rows, a point of a surface one, along the
+ * normal of the other surface. A law and the kriging of its residual are fitted together to rows:
  *
  *     value = axis . (u(c) + motion + g) + noise
  *
@@ -19,11 +19,11 @@
 
 typedef struct supine_patient_row {
   supine_patient_place place;
-  double axis[3];
-  double value;  /* mm */
-  double weight; /* of the squared residual */
-  double noise;  /* standard deviation, mm */
-  size_t block;
+  double axis[3]; /* unit */
+  double value;   /* displacement along the axis, mm */
+  double weight;  /* of the squared residual */
+  double noise;   /* standard deviation, mm */
+  size_t block;   /* index of the block that it is held out with */
 } supine_patient_row;
 
 /* Make three rows of each pair into rows [3 count]. */
@@ -35,8 +35,9 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed);
 
-/* The same, and assign blocks at random to folds: [count] the fold of each row. Return the number
- * of blocks; 0: no memory. */
+/* Assign each row to a block, and each block at random to a fold. Return the number of blocks; 0:
+ * no memory.
+ * @param fold  [count] written: the fold of each row */
 size_t supine_patient_rows_fold(const supine_patient_frame *frame, supine_patient_row *rows,
                                 size_t count, unsigned long seed, size_t *fold);
 
@@ -46,14 +47,14 @@ enum { SUPINE_PATIENT_FOLDS = 5 };
 /* --- the law at a row ------------------------------------------------------------------------ */
 
 /* Unknowns: c1, c3, c5; logarithms of c2, c4, c6; c7 to c9; translation; small rotation;
- * all of the law. */
+ * scale of the whole law. */
 enum { SUPINE_PATIENT_TERMS = 16 };
 
-/* Compute the derivative of a row by each unknown, and return the law's residual, mm. */
+/* Compute the derivative of a row by each unknown; return the law's value less the row's, mm. */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]);
 
-/* Compute the residual of a row, mm. */
+/* Compute the law's value less the row's, mm. */
 double supine_patient_power_residual(const supine_patient_power *law,
                                      const supine_patient_row *row);
 
@@ -61,12 +62,12 @@ double supine_patient_power_residual(const supine_patient_power *law,
 
 enum { SUPINE_PATIENT_AFFINE = 12 };
 
-/* Fit a translation or an affine map x -> t + M x, about the box's centre; 0 where the rows do not
- * determine it. */
+/* Fit a displacement t or t + M x, x from the box's centre in units of 100 mm; 0 if the fit fails.
+ * @param map  t (mm), then M by rows */
 void supine_patient_affine_fit(const supine_patient_row *rows, size_t count, bool translation,
                                double map[SUPINE_PATIENT_AFFINE]);
 
-/* Compute a map's residual of a row, mm. */
+/* Compute the map's value less the row's, mm. */
 double supine_patient_affine_residual(const double map[SUPINE_PATIENT_AFFINE],
                                       const supine_patient_row *row);
 
@@ -78,37 +79,37 @@ typedef struct supine_patient_fit_options {
   supine_patient_moved moved;
   bool uncorrected;  /* leave g out */
   double gravity[3]; /* of the emptier state; all 0: supine */
-  double way[3];     /* share of full inflation to rest between the states, by axis
-                      * (supine_patient_deep); all 0: 1 */
+  double way[3];     /* by axis, as for supine_patient_deep */
   double sill;       /* factor on the covariance of g; 0: the most likely one */
   double noise;      /* factor on the noise of the rows; 0: the most likely one */
 } supine_patient_fit_options;
 
-/* A fit. */
+/* A fit and its working space. */
 typedef struct supine_patient_krige {
   const supine_patient_row *rows;
   size_t count;
   supine_patient_law kind;
   supine_patient_moved moved;
-  bool size_only;             /* the law's size and the motion alone are unknown */
+  bool size_only;             /* only the law's size and the motion are unknown */
   double sill, noise;         /* factors in use; a sill of 0: no g */
   supine_patient_power mean;  /* prior mean of the constants */
   supine_patient_power alone; /* the law fitted without g */
   supine_patient_power law;
   double scaled_sill;            /* factor on the covariance of g, for a law of size 1 */
-  supine_patient_centre *centre; /* [count] of each row, with weight 0 */
+  supine_patient_centre *centre; /* [count] kernel of each row, without its weight */
   double *factor;                /* [count, count] Cholesky factor of the covariance, if g */
   double *design;                /* [count, TERMS + 1] whitened derivatives and residual */
-  double *weight;                /* [count] */
+  double *weight;                /* [count] weight of each row's kernel */
   double *scratch;               /* [count] */
-  double normal[SUPINE_PATIENT_TERMS * SUPINE_PATIENT_TERMS]; /* of the terms, Cholesky-factored */
-  double right[SUPINE_PATIENT_TERMS];
-  double squares; /* squared whitened residual, with the prior's */
+  /* Normal matrix, in the end its Cholesky factor. */
+  double normal[SUPINE_PATIENT_TERMS * SUPINE_PATIENT_TERMS];
+  double right[SUPINE_PATIENT_TERMS]; /* right-hand side of the normal equations */
+  double squares;                     /* squared whitened residual, plus the prior's */
 } supine_patient_krige;
 
-/* Fit the size of the deep law, which is the prior's mean, then the law and g. Where g is smaller
- * than in other patients, `deep` varies all constants by 30 %; `paper` leaves them free. Rows of
- * weight 0 are ignored.
+/* Fit the size of the deep law, which gives the prior's mean, then the law and g. `deep` keeps the
+ * shape of that law if the sill is at least 1, that of other patients; otherwise its constants have
+ * a prior deviation of 30 %. Those of `paper` have a wide prior. Rows of weight 0 are ignored.
  * @param rows   [count], must outlive the fit
  * @param krige  freed with supine_patient_krige_free, after a failure too
  * @retval SUPINE_ERROR_NUMERICAL  the rows do not determine the law
@@ -118,16 +119,16 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        supine_patient_krige *krige, supine_error *error);
 void supine_patient_krige_free(supine_patient_krige *krige);
 
-/* Compute the standard errors of c1 to c9. */
+/* Compute the standard errors of c1 to c9; 0 for those that are not fitted. */
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
-/* Predict a row's value, mm.
- * @param variance  of the prediction without noise, mm^2 */
+/* Predict a row's value, mm. Overwrites the fit's scratch space, so one thread at a time.
+ * @param variance  written: variance of the prediction without noise, mm^2 */
 double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
                                     double *variance);
 
-/* Write law, correction and motion into a patient whose frame is set. */
+/* Copy the law, its correction and the motion into a patient whose frame is set. */
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient);
 
 /* Fit a law without g.

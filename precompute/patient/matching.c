@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Nearest points with compatible normals, and their weights. */
+/* Match vertices to nearest points with compatible normals, and weight them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,9 +15,9 @@
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5;    /* cosine between normals: 60 degrees */
+static const double compatible = 0.5;    /* least cosine between normals: 60 degrees */
 static const double biweight = 4.685;    /* cutoff over the scale: 95 % efficiency */
-static const double surface_noise = 0.5; /* mm along the normal */
+static const double surface_noise = 0.5; /* standard deviation along the normal, mm */
 static const double scale_least = 0.02;  /* least scale, mm: surfaces are no more precise */
 
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Vertices of the reference surface matched to nearest points of the surface in another state:
+/* Match vertices of the reference surface to the nearest points of the surface in another state, as
  * the data of a fit to surfaces. */
 #ifndef SUPINE_PATIENT_MATCHING_H
 #define SUPINE_PATIENT_MATCHING_H
@@ -9,8 +9,8 @@
 #include "precompute/physics/model.h"
 
 typedef struct supine_patient_matching {
-  const supine_lungs *rest;
-  const supine_mesh *state;
+  const supine_lungs *rest; /* the reference surface */
+  const supine_mesh *state; /* the surface in the other state */
   supine_patient_frame frame;
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
@@ -20,17 +20,17 @@ typedef struct supine_patient_matching {
   double *state_normals;        /* [state vertices, 3], unit */
   size_t count;                 /* vertices that take part */
   size_t *vertex;               /* [count] indices in the reference surface */
-  double *moved;                /* [count, 3] moved by the law */
+  double *moved;                /* [count, 3] positions after the law, mm */
   supine_patient_row *rows;     /* [count + 3 landmarks] */
-  double *distance;             /* [count] along the normal, mm */
-  supine_inside_place *nearest; /* [count] */
-  double *space;                /* [count] */
+  double *distance;             /* [count] from the moved vertex along the normal, mm */
+  supine_inside_place *nearest; /* [count] places of the moved vertices */
+  double *space;                /* [count] working space */
   bool warm;                    /* nearest holds first guesses */
   size_t landmark_rows_count;
 } supine_patient_matching;
 
-/* Set up the force's columns and `most` vertices of the reference surface, with room for the rows
- * of the landmarks. Zero-initialise before; free even after a failure.
+/* Set up the force's columns and at most `most` vertices of the reference surface, with room for
+ * the rows of the landmarks. Zero-initialise before; free even after a failure.
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
                                              const supine_model *model, size_t most,
@@ -38,12 +38,13 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
                                              supine_error *error);
 void supine_patient_matching_free(supine_patient_matching *matching);
 
-/* Let other vertices take part, at most `most`, spread evenly; all rows are new.
+/* Choose the vertices that take part, at most `most` at even steps of the index, and make their
+ * rows anew, with room for three rows of each landmark.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_matching_choose(supine_patient_matching *matching, size_t most,
                                              size_t landmarks, supine_error *error);
 
-/* Spread the force's columns under a stiffness [N] (NULL: 1), into caught and the rows.
+/* Spread the force's columns under a stiffness [N] (NULL: 1); write them to `caught` and the rows.
  * @retval as the solve */
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const double *stiffness, supine_error *error);
@@ -57,16 +58,17 @@ void supine_patient_matching_append(supine_patient_matching *matching,
 double supine_patient_matching_place(supine_patient_matching *matching,
                                      const supine_patient *patient);
 
-/* Set row i to the tangent plane of the other surface at the point nearest to the moved vertex
- * i; weight 1, or 0 if the normals are incompatible. */
+/* Set row i to the tangent plane of the other surface at its point nearest to the moved vertex i;
+ * weight 1, or 0 if the normals are incompatible. */
 void supine_patient_matching_find(supine_patient_matching *matching);
 
 /* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the
- * distances. Find the share of vertices with weight and the weighted RMS distance.
- * @param scale  least scale, mm; INFINITY: keep the weights */
+ * distances. Return the share of vertices that had weight before.
+ * @param scale  least scale, mm; INFINITY: keep the weights
+ * @param rms    written: weighted RMS distance, mm */
 double supine_patient_matching_weigh(supine_patient_matching *matching, double scale, double *rms);
 
-/** Spread regions over the lungs' surface, some 45 mm apart, of a = 1. */
+/** Spread regions with a = 1 over the lungs' surface, some 45 mm apart. */
 void supine_patient_stiffness_spread(const supine_lungs *lungs,
                                      supine_patient_stiffness *stiffness);
 
@@ -74,7 +76,7 @@ void supine_patient_stiffness_spread(const supine_lungs *lungs,
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
                                      const supine_lungs *lungs, size_t vertex, double *shares);
 
-/** Find E [N] of every vertex, relative. */
+/** Compute the relative stiffness E [N] of every vertex. */
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e);
 
@@ -98,7 +100,7 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
  * kept.
  * @param options    of the paper's law; the gravity of the other state
  * @param model      its force is held fixed
- * @param patient    in: the law without; out: the law that is kept
+ * @param patient    in: the law fitted without expandability; out: the law that is kept
  * @param stiffness  no regions if it was not kept
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,
@@ -107,7 +109,8 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
                                     supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error);
 
-/** Find the force at every vertex of the reference surface.
+/** Find the force that the displacement to the other surface implies, averaged over blocks, and fit
+ * (18) to it.
  * @param matching  solved with the stiffness; afterwards it holds every vertex
  * @param patient   the law fitted to the matching; its correction is not used
  * @param gravity   of the other state

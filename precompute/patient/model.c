@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law as the model of a basis, and the scan that the law starts from. */
+/* Make the model of a basis from a patient's law, and find the state of its scan. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,15 +12,17 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance of the surface's box from the nearest state's, over its width, and difference
- * of their sizes. Boxes of landmarks are estimates and may differ more. */
+/* Largest distance between the centres of the surface's box and the nearest state's, over the width
+ * of the latter, and largest ratio of their sizes: if the state's box is of landmarks, which is an
+ * estimate, and if it is of a surface. */
 static const double apart_most[2] = {0.3, 0.15};
 static const double size_most[2] = {1.6, 1.25};
 
-/* Least force that a correction is divided by, relative to its mean of 1. */
+/* Least force, relative to its mean of 1, that a displacement is divided by. */
 static const double force_least = 0.2;
 
-/* Least part of the way from full inflation to rest between two states. */
+/* Least part of the way from full inflation to rest between the two states; if it is less, they
+ * count as full inflation and rest. */
 static const double part_least = 0.02;
 
 /* Range of a lung's volume at rest over its full volume. */
@@ -110,7 +112,7 @@ static void move(work *w) {
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Find the force of the fitted posture after spreading over (18), at each vertex. */
+/* Find the ratio of the spread force to (18) at each vertex, in the fitted posture. */
 static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
                                 supine_error *error) {
   const supine_patient_record *record = w->record;
@@ -147,7 +149,8 @@ static double gain_towards(const supine_volume_form *form, const double part[2],
   return supine_volume_form_at(form, towards);
 }
 
-/* Find the ways of the three axes that give the volumes at full inflation and rest. */
+/* Find the part of the way from full inflation to rest between the states, by axis, that gives the
+ * lungs their volumes at full inflation and at rest. */
 static supine_status find_way(const work *w, const supine_resting *resting, double way[3],
                               supine_error *error) {
   enum { ROUNDS = 30 };
@@ -249,7 +252,7 @@ void supine_patient_field_free(supine_patient_field *field) {
   *field = (supine_patient_field){0};
 }
 
-/* d = -u / f, f by the lungs' own box. */
+/* Compute the directions d = -u / f, with f by the lungs' own box. */
 static void direct(const void *context, const supine_lungs *lungs, double *directions) {
   const supine_patient_field *field = context;
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {

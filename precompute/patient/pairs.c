@@ -197,7 +197,7 @@ typedef struct summary {
   double turn;      /* best rotation, degrees */
   double growth;    /* determinant of the best affine map; negative: mirrored */
   double left;      /* RMS residual of that map, mm */
-  double moved;     /* RMS motion, mm; where it is allowed, less a translation between the scans */
+  double moved;     /* RMS motion, mm; less its mean if motion between the scans is allowed */
 } summary;
 
 static summary measure(const supine_patient_pairs *pairs, bool moved) {
@@ -245,19 +245,21 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                                          supine_error *error) {
   if (pairs->count < PAIRS_LEAST) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%zu pairs of points determine no law: give at least %d, spread over "
-                            "both lungs",
-                            pairs->count, PAIRS_LEAST);
+                            "%zu pair%s of points determine%s no law: give at least %d, spread "
+                            "over both lungs",
+                            pairs->count, pairs->count == 1 ? "" : "s",
+                            pairs->count == 1 ? "s" : "", PAIRS_LEAST);
   }
   const summary s = measure(pairs, moved);
   for (int state = 0; state < 2; ++state) {
     const char *unit = NULL;
     if (!supine_mesh_unit_is_likely(s.side[state], &unit)) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "the points %s extend over %.3g: no lung in mm%s%s; landmarks are in "
-                              "mm, spread over the lungs",
-                              state == 0 ? "at rest" : "of the other state", s.side[state],
-                              unit == NULL ? "" : ", but one in ", unit == NULL ? "" : unit);
+      return supine_error_set(
+          error, SUPINE_ERROR_FORMAT,
+          "the points %s extend over %.3g: too small or large for lungs in mm%s%s; "
+          "give landmarks in mm, spread over the lungs",
+          state == 0 ? "at rest" : "of the other state", s.side[state],
+          unit == NULL ? "" : ", as if in ", unit == NULL ? "" : unit);
     }
   }
   const double size = s.spread[1] / s.spread[0];
@@ -268,7 +270,7 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   }
   if (s.thinnest < flattest) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "all points lie within %.2g mm of one plane: landmarks must spread "
+                            "all points lie in one plane (%.2g mm RMS): give landmarks spread "
                             "over the lungs",
                             s.thinnest);
   }
@@ -300,8 +302,8 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   }
   if (s.moved < stillest) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the other state is the same as rest (%.2g mm RMS%s): there is "
-                            "nothing to fit",
+                            "the other state is the same as rest (%.2g mm RMS%s): give a state "
+                            "in which the lungs have moved",
                             s.moved, moved ? " beside a translation" : "");
   }
   return SUPINE_OK;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Matched points of one person in two states, and maps without a law between them. */
+ * Read and check matched points of one person in two states, and fit maps between them. */
 #ifndef SUPINE_PATIENT_PAIRS_H
 #define SUPINE_PATIENT_PAIRS_H
 
@@ -23,7 +23,7 @@ typedef struct supine_patient_pairs {
  *
  * @param reverse  read them as from the other state to rest
  * @param pairs    zero-initialised; written only on success
- * @retval SUPINE_ERROR_READ    missing or unreadable
+ * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  no such columns, a number that is not finite (line named), no
  *                              pairs, a duplicate point (both lines named)
  * @retval SUPINE_ERROR_MEMORY */
@@ -32,7 +32,7 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
 
 /** Compute the volume ratio of the other state to rest: the determinant of the best affine map.
- * @return 1 if the points determine none */
+ * @return 1 if the points determine none, or a mirror image */
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
 /** Check by the best affine map that the pairs can be two states of one chest.
@@ -55,7 +55,7 @@ typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_RIGID = SUPINE_PATIENT_MAP_COUNT /**< not among the baselines */
 } supine_patient_map;
 
-/** x -> m x + t, row by row. */
+/** The map x -> m x + t, with m by rows. */
 typedef struct supine_patient_affinity {
   double m[9], t[3];
 } supine_patient_affinity;

@@ -57,7 +57,7 @@ typedef struct supine_patient_power {
                         u + motion is what was measured */
 } supine_patient_power;
 
-/** A kernel of the correction. */
+/** One kernel of the correction. */
 typedef struct supine_patient_centre {
   double at[3];     /**< mm */
   double side;      /**< of its lung: +1 left, -1 right */
@@ -78,11 +78,11 @@ typedef struct supine_patient_place {
   double box[3];                        /**< X, Y, Z; 0 to 1 inside */
   double side;                          /**< +1 left, -1 right */
   double arm[3];                        /**< from the box's centre, mm */
-  double force[SUPINE_PATIENT_COLUMNS]; /**< the columns here; of a surface, after spreading */
+  double force[SUPINE_PATIENT_COLUMNS]; /**< columns of the force; of a surface, after spreading */
 } supine_patient_place;
 
-/** Find a point's place; its force is not spread, and keeps the value at the nearest face outside
- * the box.
+/** Find a point's place; its force is not spread; outside the box it has the value of the nearest
+ * face.
  * @param side  of the point's lung, +1 or -1; 0: by the midline */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
@@ -105,12 +105,12 @@ int supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 /** Find the place of a vertex in the box of its own lungs. */
 supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex);
 
-/** Express the deep law by nine constants for gravity along a unit vector (all 0: supine). `way`
- * scales its lengths along x, y and z by the share of full inflation to rest between the two
- * states (all 0: 1). */
+/** Express the deep law by nine constants for gravity along a unit vector (all 0: supine). Its
+ * lengths along x, y and z are scaled by `way`, the part of the way from full inflation to rest
+ * that lies between the two states (all 0: 1). */
 supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]);
 
-/** Give the nine constants in their order, the force scaled to 1 at the box's centre. */
+/** Copy the constants c1 to c9 in this order, the force scaled to 1 at the box's centre. */
 void supine_patient_constants(const supine_patient_power *power,
                               double c[SUPINE_PATIENT_CONSTANTS]);
 
@@ -133,7 +133,7 @@ double supine_patient_covariance(const supine_patient_centre *a, const supine_pa
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
                             double u[3]);
 
-/** Compute the displacement u at a place, mm, less the motion between the scans.
+/** Compute the displacement u at a place, mm, without the motion between the scans.
  * @param spread  factor on the law's force there */
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
                                  double spread, double u[3]);
@@ -146,8 +146,8 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
 void supine_patient_settle(const supine_patient *patient, const double point[3], double side,
                            double spread, double at[3], double u[3]);
 
-/** Compute the force of a patient's law, whose slopes turn with gravity by the share `gain`. In
- * the fitted posture the field does not depend on the gain. */
+/** Split the force of a patient's law into a part that follows gravity, of slope `gain`, and one
+ * that is fixed to the body. In the fitted posture their sum does not depend on the gain. */
 supine_force_law supine_patient_force(const supine_patient_power *power, double gain,
                                       const double gravity[3]);
 

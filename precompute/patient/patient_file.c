@@ -14,16 +14,17 @@
 static const char format[] = "supine-patient";
 enum { VERSION = 2, CENTRE = sizeof(supine_patient_centre) / sizeof(double) };
 
-/* Numbers of a record: the key of their object (NULL: the root), their own, how many, and where. */
+/* A number of a record, or an array of numbers. */
 typedef struct numbers {
-  const char *group, *key;
-  size_t count; /* 1: no array */
-  size_t offset;
+  const char *group; /* key of the object that holds them; NULL: the root */
+  const char *key;
+  size_t count;  /* 1: no array */
+  size_t offset; /* in the record, bytes */
 } numbers;
 
 #define AT(member) offsetof(supine_patient_record, member)
 
-/* All are written, and must be there when read. */
+/* All of them are written, and required when reading. */
 static const numbers table[] = {{NULL, "points", 1, AT(points)},
                                 {NULL, "held_out_rms_mm", 1, AT(held_out)},
                                 {NULL, "held_out_baseline_mm", 1, AT(held_out_baseline)},

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file patient.json: a patient's law with its force and states, how it was fitted and its
- * held-out error; and the model that it gives for a surface. */
+/** @file Write and read patient.json, a patient's law with its force, states, fit and held-out
+ * error, and make the model that the law gives for a surface. */
 #ifndef SUPINE_PATIENT_FILE_H
 #define SUPINE_PATIENT_FILE_H
 
@@ -22,7 +22,7 @@ typedef struct supine_patient_told {
   supine_state state;
   const supine_patient_pairs *pairs; /**< NULL if the state is a surface */
   const supine_mesh *surface;        /**< used if pairs is NULL */
-  double scale;        /**< fitted: 1 where it is as far from full inflation as rest */
+  double scale;                      /**< fitted: distance from full inflation, 1 at rest */
   double left;         /**< RMS residual of the fit, mm; of a surface along its normals */
   double left_without; /**< the same at a gain of 0, with all of the force fixed to the body */
 } supine_patient_told;
@@ -60,7 +60,7 @@ typedef struct supine_patient_expand_report {
   double held_out[2]; /**< the same on held-out blocks */
   double softest, stiffest; /**< range of E that holds nine tenths of the seen regions; the
                              * geometric mean of all is 1 */
-  size_t regions, unseen;
+  size_t regions, unseen;   /**< number of regions, and of those that do not count as seen */
 } supine_patient_expand_report;
 
 /** The force that a measured displacement shows ([Santhanam2008] IV-B.3), with no assumption about
@@ -97,7 +97,7 @@ typedef struct supine_patient_record {
   double volume[2];       /**< mL; 0: unknown */
   double emptier[2][3];   /**< box of the emptier state, mm; the fuller one's is the frame */
   bool from_surface;      /**< the boxes are of surfaces, else of landmarks */
-  double points;
+  double points;          /**< number of fitted points */
   double held_out, held_out_baseline, fitted; /**< mm RMS */
   double explained;                           /**< % of the squared displacement */
   double expected_constant;           /**< mm: expected square error per mm of displacement */
@@ -122,24 +122,28 @@ typedef struct supine_patient_record {
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
                                    const char *made_by, supine_error *error);
 
-/** Print the same as text, for standard output; free() it; NULL: no memory. */
+/** Print the text of the file, for standard output; the caller frees it. NULL: no memory. */
 char *supine_patient_text(const supine_patient_record *record, const char *made_by);
 
-/** @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (names what is missing or wrong) */
+/** Read a record.
+ * @retval SUPINE_ERROR_READ
+ * @retval SUPINE_ERROR_FORMAT  the message names the key that is missing or invalid */
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
 /** Displacement of a surface's vertices by a patient's law, (15)-(17) and the correction. */
 typedef struct supine_patient_field {
   const supine_patient_record *record; /**< owned by the caller; must outlive the field */
-  double way[3];                       /**< share of full inflation to rest, by axis */
-  double *moved;                       /**< [N, 3] mm to rest, for a spread force of 1 */
+  double way[3];                       /**< part of the way from full inflation to rest between
+                                            the states, by axis */
+  double *moved;                       /**< [N, 3] mm from full inflation to rest, where the spread
+                                            force equals (18) */
 } supine_patient_field;
 
 /** Find the displacement of every vertex between the two fitted states; free it afterwards.
  * @param resting    volumes at rest
  * @param state      of the surface: 0 the fuller, 1 the emptier
- * @param stiffness  optional [N]: E, relative, of a record that has one
+ * @param stiffness  [N], written: relative E by the record's regions; NULL: even tissue
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
 supine_status supine_patient_field_find(const supine_patient_record *record,
                                         const supine_resting *resting, const supine_lungs *lungs,
@@ -166,12 +170,13 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
  * volumes. Where neither tells, the fuller state counts as full and the emptier one as at rest. */
 void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
-/** Scale the shares at rest to the one that the two states show, where they show it. */
+/** Scale the resting shares to that of the two states, if one of them is at rest and the volume of
+ * the other is relative to full inflation. */
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting);
 
-/** Find what a scan shows that is one of the two states.
+/** Find the state and volume of a scan of one of the two states.
  * @param volume  of the scan, mL
- * @return not known where nothing tells how far it is from full inflation */
+ * @return `known` is false if its distance from full inflation is undetermined */
 supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
                                 const supine_resting *resting);
 
@@ -179,7 +184,7 @@ supine_scan supine_patient_scan(const supine_patient_record *record, size_t stat
 
 /** Data and options of a fit to surfaces. */
 typedef struct supine_patient_surface_task {
-  const supine_lungs *rest;
+  const supine_lungs *rest;  /**< surface of the fuller state */
   const supine_mesh *state;  /**< the same lungs, mm, same frame */
   const supine_model *model; /**< stiffness and spreading of the force; with expandability its
                               * force is held fixed */
@@ -206,8 +211,7 @@ supine_status supine_patient_fit_surface(const supine_patient_surface_task *task
 
 /* --- from scans in other postures ------------------------------------------------------------ */
 
-/** Move points [count, 3] of the emptier state to their places in the fuller one, where they came
- * from. */
+/** Move points [count, 3] of the emptier state to their places in the fuller one. */
 void supine_patient_refer(const supine_patient *patient, size_t count, double *points);
 
 /** Find the gain from the record's further states, with the fitted field u of the law, scaled to

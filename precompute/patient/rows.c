@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Rows of landmarks, the blocks that are held out together, and what laws and maps say of a row. */
+/* Make rows of landmarks, group rows into blocks to hold out, and compute residuals of laws and
+ * maps. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -126,7 +127,7 @@ double supine_patient_power_residual(const supine_patient_power *law,
   return supine_patient_power_design(law, row, x);
 }
 
-/* axis . (t + M arm), arm in units of 100 mm. */
+/* Compute the derivatives of axis . (t + M arm) by t and M, with arm in units of 100 mm. */
 static void affine_design(const supine_patient_row *row, double x[SUPINE_PATIENT_AFFINE]) {
   for (size_t a = 0; a < 3; ++a) {
     x[a] = row->axis[a];

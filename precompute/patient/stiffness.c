@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Smooth regions of expandability in a lung. */
+/* Spread smooth regions of expandability over each lung. */
 #include <math.h>
 #include <string.h>
 
@@ -7,8 +7,8 @@
 
 #include "sh/base/vec3.h"
 
-static const double apart = 35.0;      /* largest distance of a vertex from a centre, mm */
-static const double overlapping = 1.5; /* radius over that distance */
+static const double apart = 35.0; /* largest distance of a vertex from the nearest centre, mm */
+static const double overlapping = 1.5; /* radius of a region over that distance */
 
 enum { LOOKED_AT = 8192 }; /* most vertices considered as centres */
 

@@ -15,14 +15,14 @@ enum {
 
 static const double settled = 2e-3;      /* RMS change between rounds that ends the fit, mm */
 static const double near_by = 0.5;       /* the same, for the first fit of a law of known shape */
-static const double outlying = 1.0;      /* least cutoff of the weights, mm: kriging corrects the
+static const double outlying = 1.0;      /* least scale of the weights, mm: kriging corrects the
                                           * law's residual, which weights must not remove */
 static const double same_state = 0.02;   /* RMS distance of equal surfaces, mm */
-static const double matched_least = 0.3; /* share of the vertices */
+static const double matched_least = 0.3; /* least share of the vertices that match */
 
 typedef supine_patient_matching matching;
 
-/* Make the first rows by mapping each lung's box to the other state's, axis by axis. */
+/* Make the first rows by mapping the lungs' box to that of the other state. */
 static void start_rows(matching *m) {
   const double *low = m->rest->minimum;
   double to[2][3];
@@ -107,7 +107,7 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
                                 "the other surface is the same as the one at rest (%.2g mm RMS "
-                                "apart): there is nothing to fit",
+                                "apart): give two different states",
                                 report->before);
 }
 

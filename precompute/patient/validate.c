@@ -41,7 +41,7 @@ static void explain(supine_patient_moved moved,
   }
 }
 
-/* Give the map to fit: of the prediction, the one that removes a motion between the scans. */
+/* Choose the map to fit: for the prediction, the one that removes the motion between the scans. */
 static supine_patient_map map_of(int kind, supine_patient_moved moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID
@@ -51,7 +51,7 @@ static supine_patient_map map_of(int kind, supine_patient_moved moved) {
 
 static supine_status undetermined(supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "the points determine no affine map: they lie in one plane");
+                          "the points lie in one plane: give points spread over the lungs");
 }
 
 supine_status supine_patient_validate_points(
@@ -82,7 +82,7 @@ supine_status supine_patient_validate_points(
 
 /* --- surfaces -------------------------------------------------------------------------------- */
 
-/* Pool the distances in both directions. */
+/* Summarise the distances of the vertices of each surface to the other, taken together. */
 static supine_status surface_distance(const supine_mesh *rest, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
@@ -104,7 +104,7 @@ static supine_status surface_distance(const supine_mesh *rest, const double *mov
   return status;
 }
 
-/* Fit the map of a kind to surfaces by iterated nearest points. */
+/* Fit the map of a kind to surfaces by iterated nearest points; write all n mapped vertices. */
 static bool settle(supine_patient_map kind, size_t n, const double *vertices,
                    const supine_inside_surface *tree, double *space, double *moved) {
   const size_t count = n < FITTED_MAX ? n : FITTED_MAX;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Error of a prediction against another state of the same lungs, beside maps that are fitted
- * to that state itself. */
+/** @file Measure the error of a prediction against another state of the same lungs, and of maps
+ * that are fitted to that state itself. */
 #ifndef SUPINE_PATIENT_VALIDATE_H
 #define SUPINE_PATIENT_VALIDATE_H
 
@@ -21,8 +21,8 @@ supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_m
 typedef struct supine_patient_distance {
   double mean, rms, p95;
   double largest;   /**< of surfaces: Hausdorff distance */
-  double explained; /**< share of the squared distance without any map, or of a translation where
-                         the motion between the scans is taken out; NAN where nothing moved */
+  double explained; /**< explained share of the squared distance without a map, or of that after a
+                         translation if motion between the scans is removed; NAN if nothing moved */
 } supine_patient_distance;
 
 /** Compute distances of points that are known in both states.
@@ -34,7 +34,7 @@ supine_status supine_patient_validate_points(
     supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
 
 /** Compute distances between surfaces of any meshing, of the vertices of each to the other surface.
- * The maps are fitted to nearest points, over and over.
+ * The maps are fitted by iterated nearest points.
  * @param rest       the surface that motion starts from
  * @param moved      motion between the scans that is taken out of the prediction
  * @param predicted  [rest vertices, 3]; the motion is added to it
