@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Error of a compressed field against the full solve on held-out directions. */
+/* Measure the error of a compressed field against the full solve at held-out directions. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -15,14 +15,15 @@
 #include "precompute/projection/compression.h"
 #include "precompute/projection/tally.h"
 
-/* Vertices are summed in PARTS, whatever the number of threads, BLOCK at a time. */
+/* Vertices are summed in PARTS, BLOCK at a time; the number of parts is fixed, so that the sum does
+ * not depend on the number of threads. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
 /* Sums over one part of the vertices. */
 typedef struct tally {
-  double field2;
-  supine_tally error;    /* at equal gains */
-  supine_tally error_mm; /* at equal volumes */
+  double field2;         /* sum of the squared displacements at gain 1, mm^2 */
+  supine_tally error;    /* at gain 1, mm */
+  supine_tally error_mm; /* at equal volumes, mm */
 } tally;
 
 typedef struct accuracy_work {
@@ -30,12 +31,12 @@ typedef struct accuracy_work {
   const supine_compression *compression;
   const double *directions; /* [N, 3] */
   const double *weights;    /* [D, K] */
-  const double *scales;     /* [D, 2] true and compressed gain; NULL: open */
-  tally *tallies;           /* [PARTS] */
-  double *space;            /* [threads, BLOCK, K + 2 D] */
+  const double *scales; /* [D, 2] gains of the full solve and the compression; NULL: open surface */
+  tally *tallies;       /* [PARTS] */
+  double *space;        /* [threads, BLOCK, K + 2 D] */
 } accuracy_work;
 
-/* out = |a is - b should| length */
+/* Compute out = |a is - b should| length. */
 SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {
@@ -91,8 +92,8 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Find the gains at which both sides hold a part of the volumes [D]; return false if some
- * direction does not reach it. */
+/* Find the gains at which the full solve and the compression each reach `part` times the volumes
+ * [D]; return false if they do not in some direction. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
                         const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {
@@ -113,15 +114,16 @@ double supine_accuracy_state_volume(const supine_accuracy_state *state, const do
   if (state->resting == NULL) {
     return state->volume;
   }
-  (void)supine_sh_evaluate(2, g, y); /* of unit length */
+  (void)supine_sh_evaluate(2, g, y); /* cannot fail: g is a unit vector */
   for (size_t t = 0; t < 9; ++t) {
     volume += state->resting[t] * y[t];
   }
   return volume;
 }
 
-/* Find the gains at which both sides hold the state's volumes, or half of them, a quarter, ...: the
- * largest part that every direction reaches. Return that part; 0: there is none. */
+/* Find the gains at which the full solve and the compression each reach the volumes [D], or else
+ * half of them, a quarter, ...: the largest part reached in every direction. Return that part; 0 if
+ * there is none. */
 static double find_part(const accuracy_work *work, const supine_volume_forms *forms,
                         const double *volumes, double *scales) {
   double part = 1.0;
@@ -133,7 +135,7 @@ static double find_part(const accuracy_work *work, const supine_volume_forms *fo
   return 0.0;
 }
 
-/* State the error from the sums over all parts. */
+/* Merge the sums of all parts and compute the errors. */
 static void conclude(const accuracy_work *work, supine_accuracy *made) {
   const double samples =
       (double)work->compression->vertex_count * (double)work->truth->direction_count;
@@ -181,8 +183,9 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
     const double part = find_part(&work, forms, volumes, scales);
     if (part == 0.0) {
       status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the lungs do not reach even a thousandth of the %g mL that their "
-                                "error is stated at: the surface folds before",
+                                "the error cannot be measured: the surface folds before the lungs "
+                                "reach a thousandth of %g mL; check the surface and the constants "
+                                "of the law",
                                 volumes[0]);
       goto cleanup;
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The error of a compressed field against the full solve, on directions that no grid used, and the
- * share of triangles that the field turns over. */
+ * Measure the error of a compressed field against the full solve, at directions that no grid used,
+ * and the share of triangles that the field turns over. */
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
@@ -12,26 +12,27 @@
 /** Errors of displacement over all vertices and held-out directions. */
 typedef struct supine_accuracy {
   size_t direction_count;
-  double relative_rms, relative_p95, relative_max; /**< at equal gains, of the RMS displacement */
-  /** The volume at which the errors in mm are stated: mL, or of lungs whose rest is known, the part
-   * of the way from the reference to rest; 0: the surface is open, and there are no such errors. */
+  double relative_rms, relative_p95, relative_max; /**< at equal gains, over the RMS displacement */
+  /** The volume at which the errors in mm hold: the part, 0 to 1, of the volume from the reference
+   * to rest if rest is known, else mL. 0: the surface is open, and there are no errors in mm. */
   double volume;
   double rms_mm, p95_mm, max_mm; /**< at equal volumes */
 } supine_accuracy;
 
-/** The full solve at directions that no grid used: columns x functions^T, as exact as the
- * projection's span. */
+/** The full solve at D held-out directions, which no grid used: columns x functions^T, as exact as
+ * the projection's span. */
 typedef struct supine_truth {
   size_t direction_count;
   double *directions; /**< [D, 3] unit */
   size_t rank;
-  const double *columns; /**< [N, rank] the projection's */
+  const double *columns; /**< [N, rank] owned by the projection */
   double *functions;     /**< [D, rank] */
-  double *cubic;         /**< [D, 3] volume as a polynomial of the gain, mL; NULL: open surface */
+  double *cubic; /**< [D, 3] coefficients of the volume, mL, in the gain; NULL: open surface */
 } supine_truth;
 
-/** Find the full solve at `count` held-out directions.
- * @param directions  [N, 3] d
+/** Find the full solve at `count` held-out directions. The projection must outlive it.
+ * @param directions  [N, 3] d, mm
+ * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
                                            const double *directions,
@@ -39,11 +40,10 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            supine_truth *truth, supine_error *error);
 void supine_accuracy_truth_free(supine_truth *truth);
 
-/** A volume to compare at, mL beyond the reference. */
+/** The volume at which fields are compared, mL beyond the reference. */
 typedef struct supine_accuracy_state {
-  const double
-      *resting; /**< [9] harmonics of the resting volume; NULL: `volume` in every posture */
-  double volume;
+  const double *resting; /**< [9] harmonics of the resting volume; NULL: use `volume` */
+  double volume;         /**< in every posture */
 } supine_accuracy_state;
 
 /** Compute the state's volume with gravity along the unit vector g, mL. */
@@ -53,11 +53,13 @@ double supine_accuracy_state_volume(const supine_accuracy_state *state, const do
  * node of a product grid. */
 void supine_accuracy_held_out_directions(size_t count, double *directions);
 
-/** Measure the error. The 95th percentiles come from a histogram whose bins are 0.4 % wide.
- * @param directions  [N, 3] d
+/** Measure the error. The 95th percentiles come from a histogram whose bins are at most 0.4 % wide.
+ * @param directions  [N, 3] d, mm
  * @param forms       of the compression's coefficients; NULL: open surface
- * @param state       to compare at; halved until every direction reaches it
- * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (no volume is reached) */
+ * @param state       volume for the errors in mm; halved until the field reaches it in every
+ *                    direction
+ * @retval SUPINE_ERROR_NUMERICAL  not even a thousandth of the volume is reached
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
@@ -67,8 +69,8 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
 /** Find the share, 0 to 1, of the triangles whose normal turns by more than a right angle on the
  * way to a state: the largest of the six postures with gravity along an axis that reach it, over up
  * to 50,000 evenly chosen triangles. Above a few in a thousand the surface looks torn.
- * @param directions  [N, 3] d
- * @param forms       of the compression's coefficients: the surface is closed
+ * @param directions  [N, 3] d, mm
+ * @param forms       of the compression's coefficients; the surface must be closed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A field compressed to a few functions of orientation. */
+/* Compress a field to a few functions of orientation, and evaluate it. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,7 +86,7 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
   return SUPINE_OK;
 }
 
-/* Move the first `count` values of each row of `width` to the front. */
+/* Keep the first `count` of `width` values in each row, without gaps; `size` is bytes per value. */
 static void keep_columns(void *data, size_t rows, size_t width, size_t count, size_t size) {
   unsigned char *bytes = data;
   for (size_t r = 1; r < rows; ++r) {
@@ -100,7 +100,7 @@ void supine_projection_compression_truncate(supine_compression *compression, siz
   if (count < width) {
     keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
     keep_columns(compression->mix, rank, width, count, sizeof(double));
-    compression->mode_count = count; /* modes are rows: the first ones stand where they should */
+    compression->mode_count = count; /* each mode is a row, so the first ones are in place */
   }
 }
 
@@ -108,7 +108,7 @@ void supine_projection_compression_weights(const supine_compression *compression
                                            double *weights) {
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
   const size_t terms = supine_sh_count(compression->band);
-  (void)supine_sh_evaluate(compression->band, g, y); /* of unit length */
+  (void)supine_sh_evaluate(compression->band, g, y); /* cannot fail: g is a unit vector */
   for (size_t k = 0; k < compression->mode_count; ++k) {
     weights[k] = 0.0;
     for (size_t t = 0; t < terms; ++t) {

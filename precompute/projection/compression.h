@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Functions that make and use a compression, within precompute. */
+/* Create and evaluate a compression, within precompute. */
 #ifndef SUPINE_COMPRESSION_H
 #define SUPINE_COMPRESSION_H
 
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/projection.h"
 
-/* Allocate `mode_count` modes of a projection; the modes are zero. */
+/* Allocate a compression of a projection to `mode_count` modes. Modes and mix are zero; the
+ * coefficients are not set.
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_compression_create(const supine_projection *projection,
                                                    size_t mode_count, supine_compression *made);
 
@@ -14,8 +16,10 @@ supine_status supine_projection_compression_create(const supine_projection *proj
 void supine_projection_compression_mix(const supine_projection *projection,
                                        supine_compression *made);
 
-/* Find the `count` leading eigenpairs of a symmetric matrix [n, n], of which one triangle is read
- * and which is overwritten: values [n], the first `count` falling, and vectors [count, n]. */
+/* Find the `count` leading eigenpairs of a symmetric matrix [n, n]: values [n], of which the first
+ * `count` are written, falling, and vectors [count, n]. The matrix is overwritten; only its lower
+ * triangle in column-major order is read.
+ * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, size_t count,
                                                    double *values, double *vectors);
 
@@ -23,12 +27,13 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
 void supine_projection_compression_weights(const supine_compression *compression, const double g[3],
                                            double *weights);
 
-/* Compute the field at weights [K], F [N]. */
+/* Compute the field F [N] from the weights [K]. */
 void supine_projection_compression_field(const supine_compression *compression,
                                          const double *weights, double *field);
 
-/* Find the volume forms of the coefficients as they are stored. directions [N, 3]; NULL: a vector
- * field. */
+/* Find the volume forms of the coefficients as they are stored, in single precision.
+ * @param share       [G] each lung's share of its healthy volume; NULL: 1
+ * @param directions  [N, 3] d, mm; NULL: a vector field */
 supine_status supine_projection_compression_volume_forms(
     const supine_compression *compression, const supine_lungs *lungs, const double *share,
     const double *directions, supine_volume_forms *forms, supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Error against the number of functions: of the first harmonics, and of the first modes. */
+/* Tabulate the error by the number of harmonics, and by the number of modes. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Error against the number of functions, by which a user chooses it. */
+/* Tabulate the error by the number of functions, from which a user can choose it. */
 #ifndef SUPINE_ERROR_TABLE_H
 #define SUPINE_ERROR_TABLE_H
 
@@ -8,9 +8,9 @@
 /* Relative RMS errors on the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
   size_t band_count; /* L + 1 */
-  double *harmonics; /* [L + 1] with the first (l + 1)^2 harmonics */
-  size_t mode_count;
-  double *modes; /* [K] with the first k + 1 modes */
+  double *harmonics; /* [L + 1] error with the first (l + 1)^2 harmonics */
+  size_t mode_count; /* K */
+  double *modes;     /* [K] error with the first k + 1 modes */
 } supine_error_table;
 
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,

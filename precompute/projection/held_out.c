@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The full solve at directions that no grid used. */
+/* Find the full solve at directions that no grid used. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>

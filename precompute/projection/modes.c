@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The best functions of orientation: a singular value decomposition through small Gram matrices. */
+/* Find the best functions of orientation by a singular value decomposition through small Gram
+ * matrices. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -10,7 +11,8 @@
 #include "precompute/projection/compression.h"
 #include "sh/base/lapack.h"
 
-/* Relative singular value below which a mode is rounding error: the Gram matrix squares them. */
+/* Relative singular value below which a mode is rounding error, as the Gram matrix squares singular
+ * values. */
 static const double rank_tolerance = 1e-7;
 
 /* Compute gram = columns^T diag(weight) columns, [R, R], its lower triangle in column-major order.
@@ -69,9 +71,10 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
   return status;
 }
 
-/* Find the squares of the singular values of C = sqrt(W) columns x functions and its right singular
- * vectors [count, P]: with H^T H = columns^T W columns, C has those of A = H functions, which has
- * only R rows. They come from the R x R eigenproblem of A A^T. */
+/* Find the squares [R] of the singular values of C = sqrt(W) columns x functions, its leading right
+ * singular vectors, modes [count, P], and the sum of all squares. C shares them with A = H
+ * functions, where H^T H = columns^T W columns, because C^T C = A^T A. A has only R rows, so an R x
+ * R eigenproblem of A A^T gives them. gram [R, R], columns^T W columns, is overwritten. */
 static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = projection->rank;
@@ -86,7 +89,8 @@ static supine_status find_modes(const supine_projection *projection, double *gra
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  for (size_t k = 0; k < rank; ++k) { /* H: eigenvectors as rows, by the roots of their values */
+  for (size_t k = 0; k < rank;
+       ++k) { /* H: rows are eigenvectors times the roots of their eigenvalues */
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
   }
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)rank, (int)terms, (int)rank, 1.0,
@@ -120,8 +124,8 @@ supine_status supine_projection_compress_modes(const supine_projection *projecti
   supine_compression made = {0};
   double energy = 0.0;
   if (mode_max < 1 || mode_max > SUPINE_MODES_MADE_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes asked, 1 to %d are possible",
-                            mode_max, SUPINE_MODES_MADE_MAX);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu modes: give 1 to %d", mode_max,
+                            SUPINE_MODES_MADE_MAX);
   }
   double *gram = malloc(rank * rank * sizeof *gram);
   double *values = malloc(rank * sizeof *values);
@@ -143,7 +147,8 @@ supine_status supine_projection_compress_modes(const supine_projection *projecti
     ++count;
   }
   if (count == 0) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the field is zero everywhere");
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the field is zero everywhere: change the constants of the force");
     goto cleanup;
   }
   status = supine_projection_compression_create(projection, count, &made);

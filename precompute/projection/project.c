@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The field over orientation: solve for a few directions, and transform their weights. */
+/* Project the field over orientation: solve for a few directions, and transform their weights. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,9 +8,9 @@
 #include <supine/sh.h>
 
 enum {
-  LATITUDES_PER_BAND = 8, /* of the grid; longitudes are twice as many */
+  LATITUDES_PER_BAND = 8, /* of the grid; it has twice as many longitudes */
   LATITUDES_MIN = 32,
-  AT_ONCE = 16 /* right-hand sides of one solve */
+  AT_ONCE = 16 /* forces in one solve */
 };
 
 void supine_projection_free(supine_projection *projection) {
@@ -22,12 +22,13 @@ void supine_projection_free(supine_projection *projection) {
 
 /* --- functions of gravity -------------------------------------------------------------------- */
 
-/* Directions of the grid and the lungs' extent along each, [latitudes * longitudes]. */
+/* Directions of the grid [count, 3], and the lungs' least and largest g.p along each [count], mm.
+ */
 typedef struct grid_heights {
   double *directions, *minimum, *maximum;
 } grid_heights;
 
-/* Find the extents along half of the grid; those of the opposite directions follow. */
+/* Find the extents along half of the directions, and negate them for the opposite ones. */
 static supine_status find_heights(const supine_lungs *lungs, bool pair, const supine_sh_grid *grid,
                                   grid_heights *made) {
   const size_t width = grid->longitudes;
@@ -138,7 +139,7 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
   supine_projection made = {.vertex_count = n, .band = band};
   supine_status status = supine_physics_model_check(model, error);
   if (status == SUPINE_OK && band > SUPINE_SH_BAND_MAX) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu is above %d", band,
+    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu: give at most %d", band,
                               SUPINE_SH_BAND_MAX);
   }
   if (status != SUPINE_OK) {

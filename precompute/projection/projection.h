@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The field over orientation, projected on spherical harmonics:
+ * Project the field over orientation on spherical harmonics:
  *
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
@@ -18,8 +18,8 @@
 typedef struct supine_projection {
   size_t vertex_count;
   size_t band;
-  supine_span *span; /**< directions of the columns; NULL: another simulator's field */
-  size_t rank;       /**< R */
+  supine_span *span; /**< directions of the columns; NULL: a field of another simulator */
+  size_t rank;       /**< R, number of columns */
   double *columns;   /**< [N, R] */
   double *functions; /**< [R, (band + 1)^2] */
 } supine_projection;
@@ -30,8 +30,9 @@ void supine_projection_free(supine_projection *projection);
 typedef bool supine_progress_function(void *context, double fraction);
 
 /** Project the field. The span's weights have kinks where another vertex becomes the lowest or
- * highest; a grid eight times finer than the band keeps them from aliasing.
- * @param progress  optional
+ * highest; a grid eight times finer than the band keeps them from aliasing. The caller frees the
+ * projection with supine_projection_free.
+ * @param progress  NULL: not wanted
  * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
  * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach, a band above
  *                                   SUPINE_SH_BAND_MAX, bad stiffness
@@ -54,7 +55,7 @@ typedef struct supine_compression {
 
 void supine_projection_compression_free(supine_compression *compression);
 
-/** Take the harmonics themselves as modes: K = (band + 1)^2, the paper's form.
+/** Use the harmonics themselves as modes: K = (band + 1)^2, the paper's form.
  * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX harmonics
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_compress_harmonics(const supine_projection *projection,
@@ -65,12 +66,13 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
  * coefficient matrix, from the Gram matrix of the columns.
  *
  * @param weight     [N] weight of each vertex's square, such as |d_i|^2; NULL: 1
- * @param mode_max   most modes, 1 to SUPINE_MODES_MADE_MAX; fewer come back where the matrix has
- * lower rank
- * @param singular   [mode_max] singular values of the modes that came back, falling, 0 beyond;
- * optional
+ * @param mode_max   largest number of modes, 1 to SUPINE_MODES_MADE_MAX; there are fewer if the
+ * matrix has lower rank
+ * @param singular   [mode_max] singular values of the modes found, falling, then 0; optional
  * @param total      sum of the squares of all singular values; optional
- * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (the field is zero) */
+ * @retval SUPINE_ERROR_ARGUMENT   `mode_max` is out of range
+ * @retval SUPINE_ERROR_NUMERICAL  the field is zero, or an eigenvalue problem failed
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_compress_modes(const supine_projection *projection,
                                                const double *weight, size_t mode_max,
                                                supine_compression *compression, double *singular,

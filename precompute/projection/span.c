@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Directions of gravity of whose forces the force at any direction is a sum. */
+/* Choose a few directions of gravity whose forces add up to the force for any direction. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -9,11 +9,11 @@
 #include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 
-/* The vertices and directions that crosses are chosen from. */
+/* Numbers of vertices, at most, and of directions that the cross approximation chooses from. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest residual force, relative to the largest force. It leaves 6e-5 of the RMS force, a
- * hundredth of the error of 16 modes. */
+/* Largest residual force, relative to the largest force. The RMS residual is then 6e-5
+ * of the RMS force, a hundredth of the error of 16 modes. */
 static const double left_out = 3e-4;
 static const double rounding = 1e-12; /* the same without softening, where the sum is exact */
 
@@ -44,14 +44,15 @@ static size_t largest_of(const double *force, size_t count) {
 static supine_status invert(double *matrix, size_t rank) {
   lapack_int pivots[SUPINE_SPAN_MAX];
   const lapack_int n = (lapack_int)rank;
-  /* By columns, the transpose's inverse: the same. */
+  /* Column-major order inverts the transpose in place, and so the matrix itself. */
   const lapack_int info = LAPACKE_dgetrf(LAPACK_COL_MAJOR, n, n, matrix, n, pivots);
   return supine_lapack_status(info != 0 ? info
                                         : LAPACKE_dgetri(LAPACK_COL_MAJOR, n, matrix, n, pivots));
 }
 
-/* Choose rows and columns of the force [count, DIRECTIONS], which is overwritten, until no residual
- * exceeds `share` of the largest force. Return false if that takes more than SUPINE_SPAN_MAX. */
+/* Choose rows `of` and columns `from` of the force [count, DIRECTIONS], which is overwritten, until
+ * no residual exceeds `share` of the largest force. Return false if that takes more than
+ * SUPINE_SPAN_MAX of each. */
 static bool choose(double *force, size_t count, double share, size_t *rank,
                    size_t of[SUPINE_SPAN_MAX], size_t from[SUPINE_SPAN_MAX]) {
   size_t at = largest_of(force, count * DIRECTIONS);
@@ -112,7 +113,8 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   if (status == SUPINE_ERROR_MEMORY) {
     (void)supine_error_set(error, status, "no memory for the force");
   } else if (status != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL, "the force is zero everywhere");
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the force is zero everywhere: change its constants");
   }
 cleanup:
   free(force);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The force of every direction of gravity as a sum of those of a few directions:
+/* Express the force for any direction of gravity by the forces for a few directions:
  *
  *     f_i(g) = sum over r of f_i(g_r) w_r(g),      f_j(g) = sum over r of f_j(g_r) w_r(g)
  *
@@ -11,23 +11,24 @@
 
 #include "precompute/physics/force.h"
 
-/* Most directions of a span: enough for a softening of about 12. */
+/* Largest number of directions: enough for a softening of about 12. */
 enum { SUPINE_SPAN_MAX = 128 };
 
 typedef struct supine_span {
   size_t rank;                                       /* R */
   double directions[3 * SUPINE_SPAN_MAX];            /* [R, 3] g_r */
   size_t vertices[SUPINE_SPAN_MAX];                  /* [R] j */
-  double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX]; /* [R, R] of f_j(g_r) */
+  double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX]; /* [R, R] of the matrix f_j(g_r) */
 } supine_span;
 
 /* Choose the directions and vertices.
- * @retval SUPINE_ERROR_ARGUMENT  the softening asks for more than SUPINE_SPAN_MAX
- * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL (there is no force) */
+ * @retval SUPINE_ERROR_ARGUMENT   the softening needs more than SUPINE_SPAN_MAX directions
+ * @retval SUPINE_ERROR_NUMERICAL  the force is zero everywhere
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_span_create(const supine_lungs *lungs, const supine_force_law *law,
                                             supine_span *span, supine_error *error);
 
-/* Compute w at some directions, [gravities->count, R].
+/* Compute w for the given directions into weights [gravities->count, R].
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_span_weights(const supine_lungs *lungs, const supine_force_law *law,
                                              const supine_span *span,

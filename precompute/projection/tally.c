@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Percentiles of many numbers from a histogram. */
+/* Find percentiles of many numbers from a histogram. */
 #include <math.h>
 #include <string.h>
 

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Sum of squares, largest value and percentiles of many non-negative numbers, without keeping them.
- */
+/* Find the sum of squares, the largest value and percentiles of many non-negative numbers without
+ * storing them. */
 #ifndef SUPINE_TALLY_H
 #define SUPINE_TALLY_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* A bin for each exponent and first 8 bits of the mantissa of a float: 0.4 % wide everywhere. */
+/* A bin for each exponent and first 8 bits of the mantissa of a float: 0.2 to 0.4 % wide. */
 enum { SUPINE_TALLY_BINS = 1 << 16 };
 
 typedef struct supine_tally {
@@ -19,10 +19,11 @@ typedef struct supine_tally {
 
 void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *values);
 
-/* Add one tally to another. */
+/* Add `other` to `tally`. */
 void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other);
 
-/* Return the value that a share, 0 to 1, of the numbers lies below: the upper edge of its bin. */
+/* Return the value below which a share, 0 to 1, of the numbers lies: the upper edge of its bin. 0
+ * if there are no numbers. */
 double supine_accuracy_tally_percentile(const supine_tally *tally, double share);
 
 #endif

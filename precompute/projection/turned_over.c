@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The share of triangles that a state turns over. */
+/* Find the share of triangles that a state turns over. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
