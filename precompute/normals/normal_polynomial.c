@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Area vectors of triangles whose corners are linear in the weights and gains. */
+/* Compute normals as polynomials: area vectors of triangles whose corners are linear in the weights
+ * times the gains. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +9,8 @@
 
 enum { COLUMNS = SUPINE_NORMALS_FIELD_MAX + 1 };
 
-/* Find the place of the product of columns k, along axis a, and l, along axis b. Column 0 is the
- * reference position. */
+/* Find the index of the monomial of column k along axis a times column l along axis b. Column 0 is
+ * the reference position, column k mode k - 1. */
 static size_t term_of(size_t modes, size_t k, size_t l) {
   const size_t low = (k < l ? k : l) - 1;
   const size_t high = (k < l ? l : k) - 1;
@@ -66,8 +67,8 @@ void supine_normals_fans_free(supine_normals_fans *fans) {
   *fans = (supine_normals_fans){0};
 }
 
-/* Read the reference position of a vertex and its displacement by each mode, [3, COLUMNS], less
- * those of its neighbour. */
+/* Compute the reference position of vertex `to` and its displacement by each mode, less those of
+ * vertex `from`, into side [3, COLUMNS]. */
 static void read_side(const supine_normals_surface *s, size_t from, size_t to,
                       double (*side)[COLUMNS]) {
   const size_t modes = s->mode_count;
@@ -84,7 +85,7 @@ static void read_side(const supine_normals_surface *s, size_t from, size_t to,
   }
 }
 
-/* Sum the polynomials of the area vectors around a vertex into row [3, terms]. */
+/* Add the polynomials of the area vectors around a vertex to row [3, terms]. */
 static void find_row(const supine_normals_surface *s, const supine_normals_fans *fans,
                      size_t vertex, size_t terms, double *row) {
   for (size_t at = fans->begin[vertex]; at < fans->begin[vertex + 1]; ++at) {

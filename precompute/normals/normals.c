@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The best few modes of the normals. */
+/* Find the best few modes of the normals. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -15,31 +15,33 @@
 #include "sh/base/lapack.h"
 #include "sh/base/parallel.h"
 
-/* Vertices of a lung, and states, that modes are found from and measured on: with twice as many the
- * errors change in the second digit. */
+/* ROWS: most vertices of a lung that modes are found from, or measured on. STATES and HELD_OUT:
+ * states that modes are found from, and measured on. With twice as many of each the errors change
+ * in the second digit. STEP: modes that are added at a time. */
 enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
 
-/* Modes are sums of the normals in at most SNAPSHOTS states, computed LANES states at a time, of
- * which the first is the file's surface. */
+/* Modes are weighted sums of the normals in at most SNAPSHOTS states. LANES states are computed at
+ * a time; the very first is the reference surface, which is no snapshot. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
-/* Degrees: a fifth below 0.1 and 1, as postures and vertices other than the held-out ones err a
- * little differently. */
+/* Largest mean and 99.9th percentile of the angle, degrees: a fifth below 0.1 and 1, as the error
+ * of other postures and vertices differs a little from that of the held-out ones. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
-static const double degrees = 57.29577951308232;
+static const double degrees = 57.29577951308232; /* per radian */
 
-/* Squared length, of 1, that the normals of another snapshot must add to those before. */
+/* Smallest squared residual, relative to a state's normals, at which it becomes another snapshot.
+ */
 static const double least_new = 1e-7;
 
 /* One lung's modes before they are rounded; A, n and V as in normals.h. */
 typedef struct fit {
-  size_t count;                     /* of the modes, at most MOST */
+  size_t count;                     /* number of modes, at most MOST */
   size_t snapshots;                 /* R */
-  size_t state[SNAPSHOTS];          /* [R] */
-  float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share_1+r,j N(state_r) */
+  size_t state[SNAPSHOTS];          /* [R] their indices */
+  float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share[1 + r][j] N(state_r) */
   double *weights;                  /* [MOST, 3, terms] V */
-  supine_normals_rows rows;         /* held-out vertices */
+  supine_normals_rows rows;         /* of held-out vertices */
   float *modes;                     /* [rows, 3, MOST] n of these */
   double *exact;                    /* [rows, 3, HELD_OUT] their normals in the held-out states */
 } fit;
@@ -64,8 +66,8 @@ static void apply_rows(const double *in, size_t count, size_t terms, const doubl
   }
 }
 
-/* Compute out [count, 3, terms] = in_c A_c^T A_c for each component of rows A. gram [terms, terms]
- * is overwritten. */
+/* Compute out [count, 3, terms] = in_c A_c^T A_c for each component c of rows A. gram [terms,
+ * terms] is work space. */
 static void apply_gram(const supine_normals_rows *rows, size_t terms, const double *in,
                        size_t count, double *gram, double *out) {
   const int width = (int)terms;
@@ -78,9 +80,9 @@ static void apply_gram(const supine_normals_rows *rows, size_t terms, const doub
   }
 }
 
-/* Choose the snapshots by pivoted Cholesky factorisation of the products [S, S] of unit states, P
- * ~ L L^T, and find the `count` best modes of their span: n_j = sum over r of coefficients_jr
- * state_r. The products are overwritten. */
+/* Choose the snapshots by pivoted Cholesky factorisation of the scalar products [S, S] of
+ * normalised states, P ~ L L^T, and find the `count` best modes of their span: n_j = sum over r of
+ * coefficients_jr state_r. The products are overwritten. */
 static supine_status choose_snapshots(size_t s, double *product, fit *made,
                                       double coefficients[MOST * SNAPSHOTS]) {
   lapack_int pivots[STATES];
@@ -89,7 +91,7 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   double values[SNAPSHOTS];
   const lapack_int info = LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product,
                                          (lapack_int)s, pivots, &rank, least_new);
-  if (info < 0) { /* above 0: of a lower rank */
+  if (info < 0) { /* above 0: the rank is lower than S */
     return supine_lapack_status(info);
   }
   const size_t r = rank < SNAPSHOTS ? (size_t)rank : SNAPSHOTS;
@@ -108,8 +110,8 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   return status;
 }
 
-/* Find the best modes of the normals in the states: orthonormal over the rows, and every state
- * counts alike. mix [MOST, 3, terms] takes T, by which n_jc = T_jc . A_c. */
+/* Find the best modes of the normals in the states: orthonormal over the rows, with equal weight
+ * for every state. Write T into mix [MOST, 3, terms], where n_jc = T_jc . A_c. */
 static supine_status find_fit(const normals_work *work, size_t lung,
                               const supine_normals_rows *rows, double *mix, fit *made) {
   const size_t terms = work->terms;
@@ -155,7 +157,7 @@ cleanup:
   return status;
 }
 
-/* Find one lung's modes, and what they are measured on. */
+/* Find one lung's modes, and its held-out vertices and their exact normals. */
 static supine_status find_lung(const normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
   const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
@@ -195,7 +197,7 @@ static supine_status find_lung(const normals_work *work, size_t lung, fit *made)
   return status;
 }
 
-/* A vertex's modes along one axis as an open basis has them: rounded to 13, 10 and 9 bits. */
+/* Round a vertex's modes along one axis to 13, 10 and 9 bits, as an open basis stores them. */
 static void pack(const int16_t *modes, size_t count, double *packed) {
   const size_t words = supine_tiles_normal_words(count);
   for (size_t j = 0; j < words; ++j) {
@@ -210,13 +212,16 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Divide modes [n, 3, stride] by the lengths of the normals at rest, NULL: 1, and round them to 16
- * bits, [n, 3, count], in the units [count]. A vertex without a normal at rest has no modes. */
-static void round_modes(float *values, const float *rest, size_t n, size_t stride, size_t count,
+/* Divide modes [n, 3, stride] by the lengths [n] of the reference surface's normals (NULL: 1), and
+ * round the first `count` to 16 bits, [n, 3, count], in units [count], which are written. A vertex
+ * whose reference normal is zero gets zero modes. */
+static void round_modes(float *values, const float *lengths, size_t n, size_t stride, size_t count,
                         int16_t *rounded, double *unit) {
   float top[MOST] = {0.0f};
   for (size_t i = 0; i < 3 * n; ++i) {
-    const float factor = rest == NULL ? 1.0f : rest[i / 3] > 0.0f ? 1.0f / rest[i / 3] : 0.0f;
+    const float factor = lengths == NULL         ? 1.0f
+                         : lengths[i / 3] > 0.0f ? 1.0f / lengths[i / 3]
+                                                 : 0.0f;
     for (size_t j = 0; j < count; ++j) {
       const float size = fabsf(values[i * stride + j] *= factor);
       top[j] = size > top[j] ? size : top[j];
@@ -233,7 +238,7 @@ static void round_modes(float *values, const float *rest, size_t n, size_t strid
   }
 }
 
-/* Compute the weights [count, 3, terms] of modes in the units. */
+/* Multiply the weights [count, 3, terms] by the units [count] of their modes. */
 static void scale_weights(const double *weights, const double *unit, size_t count, size_t terms,
                           double *scaled) {
   for (size_t i = 0; i < count * 3 * terms; ++i) {
@@ -241,7 +246,7 @@ static void scale_weights(const double *weights, const double *unit, size_t coun
   }
 }
 
-/* Find the angles, degrees, between vectors a and b [3, count]. */
+/* Find the angles [count], degrees, between `count` vectors a and b, [3, count]. */
 SUPINE_CLONES static void find_angles(size_t count, const double *a, const double *b,
                                       double *angles) {
   double cosine[HELD_OUT];
@@ -258,8 +263,8 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
   }
 }
 
-/* Add the angles off of a lung's held-out vertices in the held-out states. modes [rows, 3, count]
- * and weights [count, 3, terms] as the file has them. */
+/* Add the angular errors of a lung's held-out vertices in the held-out states to `tally` and `sum`.
+ * modes [rows, 3, count] and weights [count, 3, terms] are those of the file. */
 static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
                     const double *weights, supine_tally *tally, double *sum) {
   const fit *made = &work->fits[lung];
@@ -286,8 +291,8 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   }
 }
 
-/* State the error of `count` modes: those of the file, or where it has none yet, those of the
- * held-out vertices alone. */
+/* Measure the error of `count` modes: those of `made`, or if it has none yet, those of the fits,
+ * rounded. Set mean and p999. */
 static supine_status measure_all(const normals_work *work, size_t count,
                                  supine_normals_modes *made) {
   const size_t all = 3 * work->terms;
@@ -321,15 +326,15 @@ static supine_status measure_all(const normals_work *work, size_t count,
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
-/* Modes of every vertex from some snapshots. */
+/* Work of make_modes: every vertex's modes, summed over the snapshots. */
 typedef struct planes_work {
   const normals_work *work;
-  size_t count;                                       /* Q */
-  size_t first;                                       /* snapshot in the first lane, 1 + r */
+  size_t count; /* Q */
+  size_t first; /* state in the first lane: 0 the reference, 1 + r snapshot r */
   float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gains times weights */
-  float *at;                                          /* [N, 3, LANES] positions */
+  float *at;                                          /* [N, 3, LANES] positions, mm */
   float *modes;                                       /* [N, 3, Q] sums so far */
-  float *rest; /* [N] lengths of the normals in the first lane */
+  float *lengths;                                     /* [N] of the reference surface's normals */
 } planes_work;
 
 static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
@@ -347,7 +352,7 @@ SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, s
     const float(*steer)[LANES] = (const float(*)[LANES])planes->steer[lung_of(s, row / 3)][row % 3];
     float sum[LANES] = {0.0f};
     for (size_t k = 0; k < s->mode_count; ++k) {
-#pragma GCC unroll 1 /* else it is taken apart before it is made a vector */
+#pragma GCC unroll 1 /* full unrolling would prevent vectorisation */
       for (size_t l = 0; l < LANES; ++l) {
         sum[l] += c[k] * steer[k][l];
       }
@@ -383,8 +388,8 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
     const float(*share)[MOST] =
         (const float(*)[MOST])(planes->work->fits[lung_of(s, i)].share + planes->first);
     if (planes->first == 0) {
-      planes->rest[i] = sqrtf(normal[0][0] * normal[0][0] + normal[1][0] * normal[1][0] +
-                              normal[2][0] * normal[2][0]);
+      planes->lengths[i] = sqrtf(normal[0][0] * normal[0][0] + normal[1][0] * normal[1][0] +
+                                 normal[2][0] * normal[2][0]);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
       float sum[MOST] = {0.0f};
@@ -401,8 +406,8 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Set the lanes' gains times weights, which stand in the monomials: of axis a in component a + 2.
- */
+/* Set each lane's gains times weights. The monomials have them: those of axis a are in component
+ * a + 2, modulo 3. */
 static void find_steer(const planes_work *planes) {
   const normals_work *work = planes->work;
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
@@ -433,7 +438,7 @@ static supine_status make_modes(const normals_work *work, size_t count,
                         .steer = steer,
                         .at = malloc(3 * n * LANES * sizeof(float)),
                         .modes = calloc(3 * n * count, sizeof(float)),
-                        .rest = malloc(n * sizeof(float))};
+                        .lengths = malloc(n * sizeof(float))};
   made->modes = malloc(3 * n * count * sizeof *made->modes);
   made->weights = malloc(s->lung_count * count * all * sizeof *made->weights);
   made->count = count;
@@ -441,7 +446,7 @@ static supine_status make_modes(const normals_work *work, size_t count,
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
     snapshots = work->fits[lung].snapshots > snapshots ? work->fits[lung].snapshots : snapshots;
   }
-  const bool memory = planes.at != NULL && planes.modes != NULL && planes.rest != NULL &&
+  const bool memory = planes.at != NULL && planes.modes != NULL && planes.lengths != NULL &&
                       made->modes != NULL && made->weights != NULL;
   for (; memory && planes.first <= snapshots; planes.first += LANES) {
     find_steer(&planes);
@@ -451,7 +456,7 @@ static supine_status make_modes(const normals_work *work, size_t count,
   for (size_t lung = 0; memory && lung < s->lung_count; ++lung) {
     const size_t begin = s->lung_begin[lung];
     double unit[MOST];
-    round_modes(planes.modes + 3 * begin * count, planes.rest + begin,
+    round_modes(planes.modes + 3 * begin * count, planes.lengths + begin,
                 s->lung_begin[lung + 1] - begin, count, count, made->modes + 3 * begin * count,
                 unit);
     scale_weights(work->fits[lung].weights, unit, count, work->terms,
@@ -459,7 +464,7 @@ static supine_status make_modes(const normals_work *work, size_t count,
   }
   free(planes.at);
   free(planes.modes);
-  free(planes.rest);
+  free(planes.lengths);
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 

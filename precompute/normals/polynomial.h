@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A vertex's normal as a polynomial of the weights and the three gains. */
+/* Expand a vertex's normal as a polynomial of the weights and the three gains. */
 #ifndef SUPINE_NORMALS_POLYNOMIAL_H
 #define SUPINE_NORMALS_POLYNOMIAL_H
 
 #include "precompute/normals/normals.h"
 
-/* Number of monomials of K weights in one component of a normal, along axis c:
+/* Return the number of monomials of K weights in one component of a normal, along axis c:
  *
  *     1, a w_k, b w_k, a b w_k w_l (k <= l)     a, b: gains of the next two axes, cyclically */
 static inline size_t supine_normals_terms(size_t modes) {
@@ -16,19 +16,21 @@ static inline size_t supine_normals_terms(size_t modes) {
 void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],
                               double *phi);
 
-/* The triangles around each vertex: those of vertex i are at begin[i] <= s < begin[i + 1], each as
- * the index in `triangles` at which it names i. */
+/* The triangles around each vertex: corner[s] for begin[i] <= s < begin[i + 1] are the indices in
+ * `triangles` that hold vertex i. */
 typedef struct supine_normals_fans {
   uint32_t *begin;  /* [N + 2] */
   uint32_t *corner; /* [3 M] */
 } supine_normals_fans;
 
-/* SUPINE_ERROR_MEMORY */
+/* Find the triangles around each vertex. Release them with supine_normals_fans_free.
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_fans_create(const supine_normals_surface *surface,
                                          supine_normals_fans *fans);
 void supine_normals_fans_free(supine_normals_fans *fans);
 
-/* Read the other two corners of the triangle that names a vertex at `corner`, in its order. */
+/* Read the other two vertices of the triangle that index `corner` of `triangles` belongs to, in the
+ * triangle's order. */
 static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t corner,
                                              uint32_t others[2]) {
   const uint32_t v = corner % 3;
@@ -40,12 +42,12 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
 typedef struct supine_normals_rows {
   size_t count;     /* R */
   uint32_t *vertex; /* [R] */
-  double *terms;    /* [R, 3, terms] A_i / |N_i(0)| */
+  double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normals.h) */
 } supine_normals_rows;
 
-/* Find the polynomials of every `stride`-th vertex of a lung from `offset` on, without those that
- * have no normal at rest.
- * SUPINE_ERROR_MEMORY */
+/* Find the polynomials of every `stride`-th vertex of a lung from `offset` on, without those whose
+ * normal on the reference surface is zero.
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          const supine_normals_fans *fans, size_t lung,
                                          size_t offset, size_t stride, supine_normals_rows *rows);

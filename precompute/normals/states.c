@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* States for normals: postures on a golden-angle spiral, volumes at multiples of an irrational
- * number, so that both are covered evenly. */
+/* Choose states for normals: postures on a golden-angle spiral, volumes at multiples of an
+ * irrational number, so that both are covered evenly. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +12,7 @@
 #include "precompute/normals/polynomial.h"
 #include "precompute/normals/states.h"
 
-/* Range of the largest displacement where no rest is known, mm. */
+/* Range of the largest displacement if rest is unknown, mm; negative: deflated. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 
@@ -41,7 +41,9 @@ static double largest(const supine_normals_surface *s, const double *w) {
   return sqrt(top);
 }
 
-/* Find each lung's gains at a share, 0 to 1, of its way from rest to the file's surface. */
+/* Find each lung's gains at a share, 0 to 1, of its volume from rest to the reference surface, and
+ * the volume of all lungs, `amount`, in mL beyond that surface. y [9] are the harmonics of gravity.
+ * Return false if the surface folds before. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
   const size_t k = s->mode_count;
@@ -63,7 +65,8 @@ static bool gains_from_rest(const supine_normals_surface *s, const double *y, co
   return true;
 }
 
-/* Find the one gain of all lungs at a share, 0 to 1, of the range of displacements. */
+/* Find the common gain of all lungs at a share, 0 to 1, of the range of displacements, and the
+ * displacement, `amount`, mm. Return false if no vertex moves. */
 static bool common_gain(const supine_normals_surface *s, const double *w, double share,
                         double (*gains)[3], double *amount) {
   const double size = largest(s, w);
@@ -77,7 +80,8 @@ static bool common_gain(const supine_normals_surface *s, const double *w, double
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states) {
   static const double volume_share =
-      0.4142135623730950488; /* sqrt 2 - 1: unrelated to the spiral's angle */
+      0.4142135623730950488; /* step from state to state: sqrt 2 - 1, not commensurable with the
+                                spiral's angle */
   const size_t terms = 3 * supine_normals_terms(surface->mode_count);
   const size_t harmonics = supine_sh_count(surface->band);
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
