@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Fields that another simulator computed: displacements of one surface for some directions of
- * gravity, fitted by harmonics and compressed to a basis.
+ * Make a basis from another simulator's fields: displacements of one surface for some directions of
+ * gravity are fitted by harmonics and compressed.
  *
  *     minimise over C:  sum over directions j of |u(g_j) - C Y(g_j)|^2
  *
- * The band is the one of least leave-one-out error among those that the directions determine. */
+ * The default band is the one with the smallest leave-one-out error of those that the directions
+ * determine. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
 #include "precompute/lungs/lungs.h"
 #include "precompute/projection/accuracy.h"
 
-/** Displacements u of every vertex for M directions. */
+/** Displacements u of every vertex for M directions of gravity. */
 typedef struct supine_fields {
   size_t direction_count; /**< M */
   size_t vertex_count;    /**< N */
@@ -25,7 +26,8 @@ typedef struct supine_fields {
  * or F64, in the order of the reference surface's vertices.
  *
  * @param lungs    the reference surface; deformed surfaces are joined and grouped as it was
- * @param options  axes and units of the deformed surfaces, or of a safetensors' displacements
+ * @param options  axes and units of the deformed surfaces, or of the displacements in safetensors
+ * @param fields   release with supine_fields_free
  * @retval SUPINE_ERROR_READ    a file is missing
  * @retval SUPINE_ERROR_FORMAT  a malformed list or file, a direction that is zero or not finite, a
  *         displacement that is not finite, two equal directions (line or row named)
@@ -40,30 +42,31 @@ enum { SUPINE_FIT_BAND_MAX = 11 };
 
 /** Result of a fit. */
 typedef struct supine_fit_report {
-  size_t band_highest;                   /**< highest band that the directions determine */
-  size_t band;                           /**< chosen band */
-  double condition;                      /**< condition number of its harmonics at the directions */
-  size_t mode_count;                     /**< of the basis, by supine_precompute_fields */
+  size_t band_highest; /**< highest band that the directions determine */
+  size_t band;         /**< chosen band */
+  double condition;    /**< condition number of the band's harmonics at the directions */
+  size_t mode_count;   /**< of the basis; set by supine_precompute_fields */
   double error[SUPINE_FIT_BAND_MAX + 1]; /**< leave-one-out error of each band up to band_highest,
                                           * relative RMS */
-  supine_accuracy accuracy; /**< of the basis, leave-one-out; mm are those of the given fields,
-                             * volume 0 */
+  supine_accuracy accuracy; /**< leave-one-out error of the basis; errors in mm are those at the
+                             * given displacements, and volume is 0 */
 } supine_fit_report;
 
-/** How to fit. */
+/** Options of the fit. */
 typedef struct supine_fit_options {
-  int band;             /**< negative: chosen */
-  size_t modes;         /**< most modes; 0: the harmonics */
+  int band;             /**< negative: by leave-one-out error */
+  size_t modes;         /**< largest number of modes; 0: the harmonics */
   const char *findings; /**< notes on the surface for the basis, one a line; optional */
   const char *made_by;  /**< for the basis's metadata; optional */
 } supine_fit_options;
 
-/** Fit, compress, cross-validate.
+/** Fit the fields, compress and cross-validate.
  *
- * @param compression  rows are vertices x components, 3 N
+ * @param compression  written; its 3 N rows are the components of each vertex. Release with
+ *                     supine_projection_compression_free
  * @retval SUPINE_ERROR_ARGUMENT   a band that the directions do not determine, fewer than two
  *         directions
- * @retval SUPINE_ERROR_NUMERICAL  nothing moves
+ * @retval SUPINE_ERROR_NUMERICAL  the displacements are all zero, or a decomposition failed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,

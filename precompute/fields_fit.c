@@ -17,10 +17,10 @@
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
-/* A higher band is chosen only if its error is below this share of the lower band's, and while that
- * exceeds the rounding of float coefficients. */
+/* A higher band is chosen only if its error is below this share of the chosen lower band's, and
+ * only while the latter exceeds the rounding error of single-precision coefficients. */
 static const double worthwhile = 0.99;
-static const double exact = 1e-6;
+static const double exact = 1e-6; /* relative RMS */
 
 /* A least-squares fit of one band: Y = U S V', C' = A F with A = V S^-1 U'. */
 typedef struct fit {
@@ -33,19 +33,19 @@ typedef struct fit {
 /* Work space to predict one direction from the others. */
 typedef struct prediction {
   double *analysis; /* [P, M] A without the direction */
-  double *part;     /* [P, M] */
+  double *part;     /* [P, M] work space */
   double *gram;     /* [P, P] of the coefficients */
-  double *values;   /* [P] */
-  double *vectors;  /* [P, P] */
+  double *values;   /* [P] eigenvalues */
+  double *vectors;  /* [P, P] eigenvectors */
   double *seen;     /* [P] harmonics at the direction, projected on the modes */
   double *residual; /* [M] the residual as a combination of the fields */
-  double *product;  /* [M] */
+  double *product;  /* [M] work space */
 } prediction;
 
 typedef struct fitting {
   const supine_fields *fields;
   size_t rows;  /* 3 N */
-  double *gram; /* [M, M] of the fields */
+  double *gram; /* [M, M] scalar products of the fields, mm^2 */
   fit chosen;
   prediction work;
 } fitting;
@@ -167,7 +167,7 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   return status;
 }
 
-/* Sum of the squared displacements. */
+/* Sum the squared displacements of all fields, mm^2. */
 static double square_sum(const fitting *w) {
   double sum = 0.0;
   for (size_t i = 0; i < w->fields->direction_count; ++i) {
@@ -187,12 +187,13 @@ static double leave_one_out(const fitting *w, const fit *f) {
   return sqrt(sum / square_sum(w));
 }
 
-/* Try the bands that the directions determine; keep the wanted one, or that of least error. */
+/* Try the bands that the directions determine; keep the wanted one, or if that is negative, the one
+ * with the smallest error. */
 static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
                                  supine_error *error) {
   const size_t m = w->fields->direction_count;
   double least = INFINITY;
-  size_t determined = 0; /* bands 0 to determined - 1 */
+  size_t determined = 0; /* number of bands that the directions determine */
   for (size_t band = 0; band <= SUPINE_FIT_BAND_MAX && supine_sh_count(band) < m; ++band) {
     fit trial;
     const supine_status status = fit_create(band, m, w->fields->directions, &trial);
@@ -227,7 +228,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Write the field as the given fields [rows, m] times the analysis of its band [m, P]. */
+/* Make a projection whose columns [rows, m] are the given fields and whose functions [m, P] are the
+ * chosen band's analysis, transposed. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;
@@ -295,7 +297,7 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   supine_fit_report found = {0};
   if (m < 2) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%d direction: give fields of at least two", m);
+                            "too few directions of gravity (%d): give fields of at least two", m);
   }
   supine_status status = allocate(&w, error);
   if (status == SUPINE_OK) {
@@ -304,7 +306,7 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
     status = square_sum(&w) > 0.0
                  ? choose_band(&w, options->band, &found, error)
                  : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                    "nothing moves in these fields: give deformed surfaces");
+                                    "all displacements are zero: give deformed surfaces");
   }
   if (status == SUPINE_OK) {
     status = project(&w, found.band, &projection, error);

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the fields of another simulator: a list of deformed surfaces, or one tensor file. */
+/* Read the fields of another simulator from a list of deformed surfaces, or from one safetensors
+ * file.
+ */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +15,7 @@
 #include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
-/* Largest distance of unit vectors of the same direction. */
+/* Largest distance between unit vectors that count as the same direction. */
 static const double same_direction = 1e-6;
 
 void supine_fields_free(supine_fields *fields) {
@@ -35,7 +37,7 @@ static supine_status allocate(size_t count, supine_fields *fields, supine_error 
                                 fields->vertex_count);
 }
 
-/* One line of a list. */
+/* One line of the list. */
 typedef struct listed {
   double gravity[3];
   size_t line;
@@ -43,7 +45,7 @@ typedef struct listed {
 } listed;
 
 /* Normalise direction `at`, and check that no earlier one is the same. Messages name the line of
- * the list, or the row if that is NULL. */
+ * the list, or if `list` is NULL, the row of the tensor. */
 static supine_status check_direction(const supine_fields *fields, size_t at, const char *path,
                                      const listed *list, supine_error *error) {
   const char *unit = list != NULL ? "line" : "row";
@@ -131,7 +133,7 @@ static void take_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Load the surfaces of a list, on all cores. */
+/* Load the surfaces of a list. Uses all cores. */
 static supine_status load_surfaces(const char *path, const listed *list, size_t count,
                                    const supine_lungs *rest,
                                    const supine_mesh_load_options *options, supine_fields *fields,
@@ -235,9 +237,11 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
                             path);
   }
   if (displacement->shape[1] != n) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: displacement of %zu vertices, where the reference surface has %zu",
-                            path, displacement->shape[1], n);
+    return supine_error_set(
+        error, SUPINE_ERROR_MESH,
+        "%s: displacement of %zu vertices, where the reference surface has %zu: "
+        "give one for each vertex",
+        path, displacement->shape[1], n);
   }
   const size_t count = gravity->shape[0];
   const supine_axes axes = options != NULL ? options->axes : SUPINE_AXES_AUTO;

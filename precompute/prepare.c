@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Choose the law, tissue, directions and reference of a model. */
+/* Select the law, stiffness, lesions, directions and reference of a model. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +18,7 @@ supine_model_choice supine_precompute_choice_default(void) {
   return choice;
 }
 
-/* Select the law; explicit constants override its own. */
+/* Select the law; constants that the user gives override those of the law. */
 static supine_model choose_law(const supine_model_choice *choice) {
   const bool none = choice->has_scan && !choice->scan.known;
   const supine_model law = supine_physics_model(choice->law != SUPINE_LAW_COUNT
@@ -96,7 +96,7 @@ static supine_status set_directions(const supine_lungs *lungs, const supine_mode
                              : status;
 }
 
-/* Warn of a lesion that reaches no vertex, and so changes no stiffness. */
+/* Warn of a lesion that reaches no vertex and so changes no stiffness. */
 static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                            supine_findings *findings) {
   const double *c = lesion->centre;

@@ -15,14 +15,15 @@
 #include "precompute/lungs/gate.h"
 #include "precompute/source.h"
 
-/* Files being read; a map holds at most two lungs. */
+/* Files being read. The arrays have room for every file, and for at least the two lungs of a map.
+ */
 typedef struct reading {
   const supine_source_options *options;
   char **paths;
-  size_t count; /* surfaces */
+  size_t count; /* number of files; once maps are loaded, of lungs */
   supine_mesh *meshes;
   supine_mesh_report *reports;
-  supine_error *errors; /* status SUPINE_OK where loading went well */
+  supine_error *errors; /* status SUPINE_OK for files that were loaded */
   supine_axes axes;     /* of the files' coordinates, or of a map's header */
   bool has_midline;
   double midline;
@@ -83,10 +84,9 @@ static void find_in_map(const char *path, const supine_labels_report *report,
     }
     if (lung->tunnels > 0) {
       supine_findings_add(findings,
-                          "%s: note: %ld %s lead%s through the %s lung, or hollows in it to the "
-                          "outside; --close MM closes narrow ones",
-                          path, lung->tunnels, lung->tunnels == 1 ? "channel" : "channels",
-                          lung->tunnels == 1 ? "s" : "", side);
+                          "%s: note: %s lung: %ld open channel%s (a hole through the mask, or a "
+                          "hollow open to the outside): --close MM closes narrow ones",
+                          path, side, lung->tunnels, lung->tunnels == 1 ? "" : "s");
     }
   }
 }
@@ -103,7 +103,7 @@ typedef struct lobe_files {
   char path[LOBES][PATH_MAX];
   char *list[LOBES];
   size_t count;
-  char labels[64]; /* sides, as for --labels */
+  char labels[64]; /* labels of each side, in the form of --labels */
 } lobe_files;
 
 static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
@@ -134,7 +134,8 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
                                 folder);
 }
 
-/* Load label maps. The midline of a single lung is its inner face. */
+/* Load label maps. The default midline of a single lung is the face of its box towards the other
+ * lung. */
 static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
                                supine_error *error) {
   supine_labels_options wanted = r->options->labels;
@@ -172,7 +173,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   return SUPINE_OK;
 }
 
-/* Find the frame that all files share; zeros if there is none. */
+/* Find the axes and unit that all files share; zeros if their axes differ. */
 static supine_scan_frame frame_of(const reading *r) {
   for (size_t i = 1; i < r->count; ++i) {
     if (r->reports[i].axes != r->reports[0].axes) {
@@ -183,7 +184,7 @@ static supine_scan_frame frame_of(const reading *r) {
   return (supine_scan_frame){r->reports[0].axes, unit == 0.0 ? 1.0 : unit};
 }
 
-/* Say how the files were read, so that the user can check it. */
+/* Summarise how the files were read, so that the user can check it. */
 static void summarize(const reading *r, supine_source *source) {
   const supine_mesh_load_options *load = &r->options->load;
   const supine_mesh_report *report = &r->reports[0];
@@ -229,7 +230,7 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
                       options->surfaces_out != NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--labels, --edge, --close and --surfaces-out are for label maps "
-                            "(.nrrd, .nii, .nii.gz, .mha)");
+                            "(.nrrd, .nii, .nii.gz, .mha): leave them out");
   }
   return SUPINE_OK;
 }

@@ -10,21 +10,21 @@
 #include "precompute/lungs/lungs.h"
 #include "precompute/physics/reference.h"
 
-/** How to read the files. */
+/** Options of reading the files. */
 typedef struct supine_source_options {
   supine_mesh_load_options load;
-  supine_labels_options labels; /**< of label maps; its axes are those of `load` */
-  const char *surfaces_out;     /**< file for the surfaces made from a label map, or NULL */
-  bool has_midline;
-  double midline;
+  supine_labels_options labels; /**< of label maps; the axes of `load` replace its own */
+  const char *surfaces_out;     /**< path for the joined surfaces of a label map, or NULL */
+  bool has_midline;             /**< false: found */
+  double midline;               /**< mm */
 } supine_source_options;
 
 /** Result of loading. */
 typedef struct supine_source {
   supine_lungs lungs;
   supine_scan_frame frame;
-  bool is_map;    /**< label maps, described by `report` */
-  bool axes_hold; /**< the shape agrees with the axes (supine_lungs_gate) */
+  bool is_map;    /**< the files are label maps, described by `report` */
+  bool axes_hold; /**< the lungs' shape agrees with the axes (supine_lungs_gate) */
   supine_labels_report report;
   char summary[256]; /**< axes, unit and the lungs' boxes, in words */
 } supine_source;
@@ -32,8 +32,9 @@ typedef struct supine_source {
 /** Read surfaces (all at once) or label maps, check them and join them into lungs.
  * @param source    zeroed; release with supine_precompute_source_free
  * @param findings  notes and warnings are added, also after a failure
- * @retval SUPINE_ERROR_ARGUMENT  maps beside surfaces; options of the one kind for the other;
- * and those of supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
+ * @retval SUPINE_ERROR_ARGUMENT  maps beside surfaces; options of the one kind with files of the
+ * other
+ * Other statuses as supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
 supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
                                             size_t count, supine_source *source,
                                             supine_findings *findings, supine_error *error);

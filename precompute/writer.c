@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Safetensors files that appear whole or not at all. */
+/* Write safetensors files, whole or not at all. */
 #include "precompute/writer.h"
 #include "sh/base/output.h"
 
