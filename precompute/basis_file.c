@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The basis file: tensors and metadata of a compressed field. */
+/* Write the basis file: tensors and metadata of a compressed field. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -18,11 +18,11 @@
 
 enum { ENTRIES_MAX = 64 };
 
-/* Metadata under construction; values are allocated. */
+/* Metadata under construction; entries_free frees the values. */
 typedef struct entries {
   size_t count;
   supine_metadata metadata[ENTRIES_MAX];
-  bool failed; /* out of memory, or of entries */
+  bool failed; /* out of memory, or more than ENTRIES_MAX entries */
 } entries;
 
 SUPINE_PRINTF(3, 4)
@@ -60,7 +60,7 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   }
 }
 
-/* State how many vertices lesions change, and by which factors. */
+/* Add the number of vertices that lesions change, and the range of factors. */
 static void add_lesions(entries *list, size_t count, const double *factors) {
   size_t changed = 0;
   double low = 1.0;
@@ -108,7 +108,7 @@ static void add_by_lung(entries *list, const char *key, size_t count, const doub
   }
 }
 
-/* State the scan, full inflation and rest. */
+/* Add the scan's state, the volumes at full inflation and the shares at rest. */
 static void add_reference(entries *list, const supine_reference *reference, const double share[2]) {
   const double *g = reference->scan.state.gravity;
   const bool full = reference->scan.state.volume.kind == SUPINE_VOLUME_FULL;
@@ -132,7 +132,7 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* State the expected error of positions, and whether rest was given (supine/locate.h). */
+/* Add the expected error of positions, and whether volumes at rest were given (supine/locate.h). */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
@@ -172,7 +172,7 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
 }
 
-/* Convert to floats; NULL: out of memory. */
+/* Convert to floats; the caller frees them. Return NULL if out of memory. */
 static float *to_float(const double *values, size_t count) {
   float *out = malloc(count * sizeof *out);
   for (size_t i = 0; out != NULL && i < count; ++i) {
@@ -181,7 +181,7 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Find the normals of the surface as written to the file. */
+/* Find the normals' modes of the surface and field as they are written to the file. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {
@@ -237,7 +237,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   float *directions = NULL;
   double *rest = malloc(3 * n * sizeof *rest);
   unsigned char *lung = malloc(n);
-  if (rest != NULL) { /* the surface at rest, then its directions */
+  if (rest != NULL) { /* holds the surface with collapsed lungs, then its directions */
     supine_tissue_rest(lungs, share, rest);
     vertices = to_float(rest, 3 * n);
   }

@@ -10,15 +10,17 @@
 /** Content of a basis file. */
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
-  const supine_precompute_options *options; /**< without `fit`, of its model */
-  const supine_fit_report *fit;             /**< fields from elsewhere; NULL: of the model */
-  const double *directions;                 /**< [N, 3]; NULL: a vector field */
+  const supine_precompute_options *options; /**< with `fit`: modes, findings and made_by */
+  const supine_fit_report *fit; /**< of another simulator's fields; NULL: the field of a model */
+  const double *directions;     /**< [N, 3]; NULL: a vector field */
   const supine_compression *compression;
   const supine_volume_forms *forms; /**< of the coefficients; NULL: open surface */
   const supine_accuracy *accuracy;
-  const supine_reference *reference; /**< full inflation; NULL: the scan is the reference */
-  const double *resting;             /**< [G, 9] with it: volumes at rest, harmonics, mL */
-  const double *turned_over;         /**< optional, see supine_accuracy_turned_over */
+  const supine_reference *reference; /**< at full inflation; NULL: the scan is the reference */
+  const double *resting;             /**< [G, 9] harmonics of the volumes at rest, mL beyond the
+                                          reference surface; NULL without `reference` */
+  const double *turned_over;         /**< share of triangles, see supine_accuracy_turned_over;
+                                          optional */
   const supine_error_table *table;   /**< optional */
 } supine_basis_content;
 

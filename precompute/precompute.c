@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The offline pipeline: project, compress, measure, write. */
+/* Make a basis: project, compress, measure the error, write the file. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,24 +12,23 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/compression.h"
 
-/* Bounds of the default number of held-out directions, and vertices times directions within them. A
- * hundred directions give the error to about 5 %, a thousand to 1 or 2 %. */
+/* Bounds of the default number of held-out directions, and the number of vertices times directions
+ * that sets it between them. A hundred directions give the error to about 5 %, a thousand to 1 or 2
+ * %. */
 enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
-
-enum { FEW_COLUMNS = 8 }; /* columns up to which volume forms cost less than a pass per direction */
 
 /* Volume, mL, at which errors in mm are stated if rest is unknown. */
 static const double breath_volume = 500.0;
 
-/* Modes are dropped while the error stays below this factor of that with all modes. */
+/* Modes are dropped while the error stays below this multiple of the error with all modes. */
 static const double same_error = 1.01;
 
-/* State of the pipeline, from the lungs to the file. */
+/* Everything that the steps of supine_precompute pass on. */
 typedef struct pipeline {
   const supine_lungs *given;
-  const supine_lungs *lungs; /* the same, or anchored */
+  const supine_lungs *lungs; /* `given` or `anchored` */
   const supine_precompute_options *options;
-  supine_lungs anchored; /* the lungs with own vertices, moved so that the field meets the scan */
+  supine_lungs anchored; /* `given` with vertices moved by anchor(); empty if there is no scan */
   supine_reference reference;
   double *directions; /* [N, 3] */
   double *weight; /* [N] |d|^2, so that modes minimise the error of displacement: 0.34 % RMS with
@@ -42,7 +41,7 @@ typedef struct pipeline {
   supine_truth truth;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[2][9];    /* mL from the reference at rest by lung, harmonics; if it is known */
+  double resting[2][9];    /* harmonics of each lung's volume at rest, mL beyond the reference */
   double resting_total[9]; /* of the lungs together */
   supine_accuracy_state state; /* at which errors in mm are stated */
   supine_error_table table;
@@ -59,7 +58,7 @@ static void pipeline_free(pipeline *p) {
   supine_accuracy_error_table_free(&p->table);
 }
 
-/* Progress of one stage, as a part of the whole. */
+/* Part of the whole progress, 0 to 1, that one stage takes. */
 typedef struct stage {
   const supine_precompute_options *options;
   double begin, end;
@@ -107,8 +106,9 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 &p->compression, p->singular, &p->energy, error);
 }
 
-/* Move the surface at full inflation so that the compressed field leads to the scan exactly: this
- * corrects the field's error at the scan's gravity, and the fixed point's residual.
+/* Move the surface at full inflation so that the compressed field takes it exactly to the scan.
+ * This cancels the compressed field's error at the scan's gravity and the residual of the fixed
+ * point.
  *
  *     p'_j = scan_j - A_j F' d_j       with gains A that keep the volumes */
 static supine_status anchor(pipeline *p, supine_error *error) {
@@ -151,7 +151,8 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
                                                           &p->forms, error);
 }
 
-/* Check that the field takes each lung to its volume at unit gravity g. */
+/* Check that the field takes each lung to its volume at rest, volume [lungs] mL beyond the
+ * reference, with gravity along the unit vector g. */
 static supine_status check_rest(const supine_compression *compression,
                                 const supine_volume_forms *forms, const double g[3],
                                 const double *volume, supine_error *error) {
@@ -175,8 +176,8 @@ static supine_status check_rest(const supine_compression *compression,
 }
 
 /* Find the volume of each lung at rest, mL beyond the reference surface, as real harmonics of bands
- * 0 to 2: stated along the axes, and between them by harmonics.
- * @param share  of collapsed lungs
+ * 0 to 2 that interpolate the volumes along the axes.
+ * @param share  each lung's share of its healthy volume
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it holds so little in some posture */
 static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
                                     const supine_compression *compression,
@@ -201,7 +202,7 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
   return status;
 }
 
-/* Find the volumes at rest, where errors are stated, if it is known. */
+/* Find the volumes at rest, if it is known, and the state at which errors in mm are measured. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
   p->state = (supine_accuracy_state){.volume = breath_volume};
@@ -211,7 +212,7 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_status status = rest_harmonics(&p->reference, options->model.share, &p->compression,
                                               &p->forms, p->resting, error);
   for (size_t t = 0; t < 9; ++t) {
-    p->resting_total[t] = p->resting[0][t] + p->resting[1][t]; /* 0 where there is no second */
+    p->resting_total[t] = p->resting[0][t] + p->resting[1][t]; /* zero for a missing second lung */
   }
   p->state.resting = p->resting_total;
   return status;
@@ -234,7 +235,7 @@ static supine_status measure(pipeline *p, supine_error *error) {
                                  &p->accuracy, error);
 }
 
-/* Find the fewest modes of the same error, by the singular values of those dropped. */
+/* Find the smallest number of modes with nearly the same error, from the singular values. */
 static size_t modes_needed(const pipeline *p) {
   const size_t most = p->compression.mode_count;
   const double limit = pow(same_error, 2.0) - 1.0;
@@ -251,7 +252,7 @@ static size_t modes_needed(const pipeline *p) {
   return count;
 }
 
-/* Tabulate the error by band and modes, before modes are dropped. */
+/* Tabulate the error by band and by number of modes, before modes are dropped. */
 static supine_status tabulate(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_error_table_create(
       &p->truth, &p->projection, &p->compression, p->directions, &p->table);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Offline basis generation: lungs in, basis file out. */
+ * Make a basis file from lungs, or from another simulator's fields. */
 #ifndef SUPINE_PRECOMPUTE_H
 #define SUPINE_PRECOMPUTE_H
 
@@ -10,21 +10,21 @@
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/projection.h"
 
-/** How to make a basis. */
+/** Options of a basis. */
 typedef struct supine_precompute_options {
   supine_model model;
-  const supine_reference *reference; /**< of the lungs; NULL: volumes count from their surface */
+  const supine_reference *reference; /**< of the lungs; NULL: their surface is the reference */
   size_t band;                       /**< L */
-  size_t modes;                      /**< most modes; 0: the (band + 1)^2 harmonics themselves */
-  size_t held_out;       /**< directions on which the error is measured; 0: 100 to 1000 */
-  double expected_error; /**< mm of square error per mm of displacement; 0: the law's */
+  size_t modes;          /**< largest number of modes; 0: the (band + 1)^2 harmonics themselves */
+  size_t held_out;       /**< directions at which the error is measured; 0: 100 to 1000 */
+  double expected_error; /**< c of supine/locate.h, mm, if below its default; 0: the default */
   supine_scan_frame frame;
   supine_progress_function *progress; /**< optional */
   void *progress_context;
   /** @{ For the file's metadata, optional. */
   const char *made_by;         /**< the command */
-  const char *patient;         /**< a person's own law, JSON */
-  const char *patient_summary; /**< with it: the patient and the error on held-out data, in words */
+  const char *patient;         /**< a patient's own law, JSON */
+  const char *patient_summary; /**< with `patient`: name and held-out error, in words */
   const char *assumed;         /**< assumptions about the scan */
   const char *findings;        /**< notes and warnings on the input, one a line */
   /** @} */
@@ -33,7 +33,7 @@ typedef struct supine_precompute_options {
 /** Result of making a basis. */
 typedef struct supine_precompute_report {
   size_t mode_count;
-  size_t solve_count; /**< directions solved for */
+  size_t solve_count; /**< number of directions solved for */
   size_t iterations;
   double residual;
   supine_accuracy accuracy;
