@@ -73,10 +73,12 @@ static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned
     return json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", begin, "byteLength",
                      (json_int_t)bytes);
   }
-  g->status = kind == GLB_CORNERS
-                  ? supine_export_pack_corners((const uint32_t *)stored, count, count, &packed)
-                  : supine_export_pack_rows(stored, count, l->stride, &packed);
-  if (g->status != SUPINE_OK) {
+  const supine_status status =
+      kind == GLB_CORNERS
+          ? supine_export_pack_corners((const uint32_t *)stored, count, count, &packed)
+          : supine_export_pack_rows(stored, count, l->stride, &packed);
+  if (status != SUPINE_OK) {
+    g->status = status;
     return NULL;
   }
   (void)fwrite(packed.bytes, 1, packed.size, g->numbers);
