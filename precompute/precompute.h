@@ -34,8 +34,6 @@ typedef struct supine_precompute_options {
 typedef struct supine_precompute_report {
   size_t mode_count;
   size_t solve_count; /**< number of directions solved for */
-  size_t iterations;
-  double residual;
   supine_accuracy accuracy;
   double turned_over; /**< at the accuracy's state, see supine_accuracy_turned_over; 0 if the
                        * surface is open */

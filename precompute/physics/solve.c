@@ -3,6 +3,7 @@
  */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sh/base/vec3.h"
 
@@ -25,6 +26,8 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   double range[2];
   double *work = malloc(n * sizeof *work);
   *solution = (supine_solution){0};
+  memset(made.cubic, 0, sizeof made.cubic);
+  memset(made.form, 0, sizeof made.form);
   made.vertex_count = n;
   made.has_volume = lungs->topology.closed;
   made.catch_ = made.catch_ != NULL ? made.catch_ : malloc(n * sizeof *made.catch_);
