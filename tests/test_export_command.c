@@ -66,7 +66,7 @@ static void test_export_output_errors_are_4(void **state) {
 
 static void test_export_numerical_errors_are_5(void **state) {
   (void)state;
-  EXPECT(5, "nothing moves", still, "-o", glb);
+  EXPECT(5, "no displacement when supine", still, "-o", glb);
   EXPECT(5, "mL", basis, "-o", glb, "--breath", "1e12");
 }
 

@@ -97,7 +97,7 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
   EXPECT(0, "displacement 7.000 mm", "deform lungs.safetensors --posture HFS --scale 7 -o a.obj");
   EXPECT(0, "displacement 7.000 mm", "solve lungs.ply --posture HFS --scale 7 -o a.obj");
   EXPECT(0, "+120.00 mL", "solve lungs.ply --tilt 15 --volume scan+120 -o a.obj");
-  EXPECT(1, "has left and right",
+  EXPECT(1, "once: left and right",
          "deform lungs.safetensors --posture left --volume middle=rest,right=rest -o b.ply");
   EXPECT(1, "rest+500", "deform lungs.safetensors --posture left --volume 500 -o b.ply");
   EXPECT(1, "not both",
