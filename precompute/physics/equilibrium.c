@@ -103,7 +103,8 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
 static void split(supine_equilibrium *eq) {
   const size_t n = eq->vertex_count;
   const supine_topology *topology = eq->topology;
-  size_t last = 0; /* highest index that an edge links to a vertex before i */
+  size_t last = 0;  /* highest index that an edge links to a vertex before i */
+  size_t least = n; /* size of the larger part so far */
   part *first = &eq->parts[0];
   *first = (part){.vertex_count = n, .edge_count = topology->edge_count};
   for (size_t i = 1, e = 0; i < n; ++i) {
@@ -111,7 +112,8 @@ static void split(supine_equilibrium *eq) {
       last = topology->edges[2 * e + 1] > last ? topology->edges[2 * e + 1] : last;
     }
     const size_t larger = i < n - i ? n - i : i;
-    if (last < i && larger < first->vertex_count) {
+    if (last < i && larger < least) {
+      least = larger;
       *first = (part){.vertex_count = i, .edge_count = e};
     }
   }
