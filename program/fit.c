@@ -374,8 +374,8 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Find the fuller state, by the volumes of the surfaces or the spread of the landmarks, and swap
- * the evidence where it is the second one. */
+/* Find which of the two states is fuller, by the volumes of the surfaces or the spread of the
+ * landmarks. If it is the second, exchange the surfaces and landmarks of the two. */
 static supine_status order_states(const request *wanted, evidence *of, supine_error *error) {
   static const double doubt =
       0.02; /* relative difference of volumes that is not yet a contradiction */

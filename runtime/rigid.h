@@ -24,7 +24,7 @@ typedef struct supine_rigid_motion {
 
 /** Add `count` vertices with positions p and x [count, 3] to the sums. */
 void supine_rigid_add(supine_rigid_motion *motion, const float *p, const float *x, size_t count);
-/** Compute the motion from the sums. */
+/** Find the means and the rotation R from the sums over all vertices. */
 void supine_rigid_finish(supine_rigid_motion *motion);
 /** Compute coordinate `axis` of the position to which the motion takes p. */
 double supine_rigid_move(const supine_rigid_motion *motion, const float *p, size_t axis);

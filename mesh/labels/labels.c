@@ -14,7 +14,7 @@ static const double least_edge = 0.2; /* mm: a hundredth of it would give a bill
 static const double most_edge = 20.0; /* mm: a larger one leaves nothing of a lung */
 static const double most_closing = 20.0;
 static const double least_lung = 1.0;      /* mL: the least volume of a lung */
-static const double longest_lung = 1000.0; /* mm: the voxels' size must be wrong beyond it */
+static const double longest_lung = 1000.0; /* mm; beyond it the stated voxel size is wrong */
 
 typedef struct work {
   const char *path; /* first file, for messages */

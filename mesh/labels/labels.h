@@ -40,7 +40,7 @@ typedef struct supine_labels_lung {
   size_t cut;      /**< voxels at the image's border, where the lung is cut off */
 } supine_labels_lung;
 
-/** How a map was interpreted. */
+/** Geometry and labels read from a map, and what was repaired. */
 typedef struct supine_labels_report {
   size_t size[3];
   double spacing[3];  /**< mm */

@@ -292,7 +292,7 @@ static supine_status settle(const study *s, bool with, estimate *e, supine_patie
   return status;
 }
 
-/* Store the regions' values, and find the range of E of the seen ones. */
+/* Store the values of all regions, and find the range of stiffness E of the determined ones. */
 static void note_regions(study *s, const estimate *e, supine_patient_expand_report *report) {
   double stiffness[REGIONS];
   double logarithms = 0.0;

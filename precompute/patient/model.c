@@ -81,7 +81,7 @@ void supine_patient_path(const supine_patient_record *record, double gains[2][3]
 
 typedef struct work {
   const supine_patient_record *record;
-  supine_lungs lungs;  /* estimate of the lungs in the fuller state */
+  supine_lungs lungs;  /* present estimate of the lungs in the fuller state */
   const double *scan;  /* [N, 3] */
   const double *ratio; /* [N] spread force over (18) at the vertex */
   double *moved;       /* [N, 3] mm */

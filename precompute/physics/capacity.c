@@ -6,7 +6,7 @@
 #include "precompute/physics/capacity.h"
 #include "sh/base/text.h"
 
-static const double tissue = 860.0; /* of both lungs, mL */
+static const double tissue = 860.0; /* volume of the tissue of both lungs, mL */
 
 /* Smallest share of the expected full volume, and smallest and largest full volume of an adult, mL:
  * beyond these limits the stated scan state is doubtful. */

@@ -24,10 +24,11 @@ typedef struct breath_frames {
   double *volumes; /* [T, G] gas and tissue, mL */
   bool fixed;      /* gravity is constant */
   size_t stepped;  /* number of frames computed by a step */
-  double (*gains)[SUPINE_LUNGS_MAX][3]; /* [T]; in a run, the second frame has those one step on */
-  size_t *run;                          /* [T] first frame of each frame's run */
-  float *step;                          /* [N, 3] mm, of the present run */
-  size_t next;                          /* number of the next frame */
+  /* [T, G, axis]; of the second frame of a run: one constant step after the first frame's */
+  double (*gains)[SUPINE_LUNGS_MAX][3];
+  size_t *run; /* [T] first frame of each frame's run */
+  float *step; /* [N, 3] mm, of the present run */
+  size_t next; /* number of the next frame */
 } breath_frames;
 
 /* Return the state of a breath at `ml` above rest in the posture, or above the scan where rest is

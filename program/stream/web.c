@@ -61,8 +61,8 @@ static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
 
-/* Return whether a socket is opened by our own page, or by a program other than a browser, which
- * sends no origin. */
+/* Return whether a socket was opened by our own page, whose Origin header names this host, or by a
+ * program that is not a browser and sends no Origin. */
 static bool is_ours(struct lws *wsi) {
   char origin[256] = "";
   char host[256] = "";

@@ -184,8 +184,8 @@ static void add_triangle(cutter *c, const triangle *t, part *whole) {
   add_piece(t, full, &whole[last + 1]);
 }
 
-/* Compute the area of a cut times the mean of u.g over it, which is the value at its centroid of
- * the plane fitted along its outline. */
+/* Compute the flux of u.g through a cut: its area times the mean of u.g over it. The mean is
+ * approximated by a plane fitted to u.g along the outline, evaluated at the centroid of the cut. */
 static double cut_flux(const part *before, const outline *line) {
   const double area = -before->area;
   if (!(line->length > 0) || area == 0) {
