@@ -198,13 +198,9 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   memset(eq->link, 0, eq->topology->edge_count * sizeof *eq->link);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    double edge[2][3];
     double normal[3]; /* its length is twice the triangle's area */
-    for (size_t k = 0; k < 3; ++k) {
-      edge[0][k] = p[3 * (size_t)corner[1] + k] - p[3 * (size_t)corner[0] + k];
-      edge[1][k] = p[3 * (size_t)corner[2] + k] - p[3 * (size_t)corner[0] + k];
-    }
-    supine_cross(edge[0], edge[1], normal);
+    supine_normal(p + 3 * (size_t)corner[0], p + 3 * (size_t)corner[1], p + 3 * (size_t)corner[2],
+                  normal);
     for (size_t k = 0; k < 3; ++k) {
       eq->link[find_edge(eq, corner[k], corner[(k + 1) % 3])] += supine_length(normal) / 6.0;
     }
