@@ -21,7 +21,7 @@ def run(*words):
 
 
 def info(*options):
-    """What 'supine info --json' says of the lungs' basis under the paper's law."""
+    """Return the output of 'supine info --json' for a basis of the lungs under the paper's law."""
     run("precompute", "lungs.ply", "--law", "paper", "-o", "basis.safetensors", *options)
     return json.loads(run("info", "basis.safetensors", "--json"))
 
@@ -32,19 +32,21 @@ def rows(name):
 
 
 def visits(method):
-    """Visits of a link until the relative error is 1e-6."""
+    """Return the number of link visits until the relative error is 1e-6."""
     return next(round(float(row["link_visits"])) for row in rows("fig7_convergence")
                 if row["method"] == method and float(row["relative_rms_error"]) <= 1e-6)
 
 
 def apart(name, a, b):
-    """RMS difference of two columns as a share of the first's RMS."""
+    """Return the RMS difference of two columns, as a share of the first column's RMS."""
     of = [(float(row[a]), float(row[b])) for row in rows(name)]
     return math.sqrt(sum((x - y) ** 2 for x, y in of) / sum(x * x for x, _ in of))
 
 
 def off_line():
-    """How far displacement is from a straight line through 0 and 500 mL, % of the largest, worst of four postures."""
+    """Return the largest distance of displacement from the straight line through 0 and 500 mL, in four postures.
+
+    In percent of the displacement at 500 mL."""
     of = [row for row in rows("linearity") if float(row["volume_mL"]) <= 500]
     return max(100 * abs(float(row[p]) / float(of[-1][p]) - float(row["volume_mL"]) / 500) for row in of
                for p in ("supine", "prone", "left", "right"))
@@ -63,7 +65,7 @@ ring = rows("fig9_ring")
 
 
 def radius(column):
-    """Mean distance from the centre of the ring that begins at a column."""
+    """Return the mean distance from the centre of the ring whose x is in a column and whose y is in the next."""
     keys = list(ring[0])
     x, y = keys[keys.index(column)], keys[keys.index(column) + 1]
     return sum(math.hypot(float(row[x]), float(row[y])) for row in ring) / len(ring)
@@ -86,29 +88,29 @@ print(f"""# The paper, row by row
 
 Santhanam, Imielinska, Davenport, Kupelian and Rolland, "Modeling Real-Time 3-D Lung Deformations for Medical
 Visualization", IEEE Trans. Inf. Technol. Biomed. 12(2), 2008. Each row names the command or program that shows it,
-what it finds, and what differs here. Made by `python3 docs/paper.py build/release > docs/paper.md`, on synthetic
+its result, and what differs here. Made by `python3 docs/paper.py build/release > docs/paper.md`, on synthetic
 lungs of {best['vertices']:,} vertices.
 
-| in the paper | shown by | found | differs |
+| in the paper | shown by | result | difference |
 |---|---|---|---|
-| III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other people's curves are followed to under 1 % (`test_pv_fit`) | the paper leaves the control functions open; here they are Legendre polynomials (`<supine/breath.h>`) |
-| III-C, displacement at one orientation against volume | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | off a straight line by {off_line():.1f} % of the largest at most, 0 to 500 mL, four postures | `deep` bends on purpose below full inflation; with `paper` each vertex moves on a line |
+| III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other curves are fitted to under 1 % (`test_pv_fit`) | the paper leaves the control functions open; here they are Legendre polynomials (`<supine/breath.h>`) |
+| III-C, displacement at one orientation against volume | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | at most {off_line():.1f} % of the displacement at 500 mL off a straight line, 0 to 500 mL, four postures | with `deep` the path bends on purpose; with `paper` each vertex moves on a line |
 | III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | springs are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes |
 | (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row a vertex | |
-| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | visits of a link to 1e-6: {reached} | the product factorises the matrix (CHOLMOD); the paper's iteration is the reference that tests hold it against |
+| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits to an error of 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare it with the paper's iteration |
 | (9)-(14), all paths | `supine solve --law paper` | the same fixed point (`test_equilibrium`) | solved, not enumerated |
-| (15)-(17), directions | `--law`, `--direction`, `supine fit` | {best['direction_constants']} | **Table I is lost**: these are fits to ten patients' 4-D CT (DIR-Lab); `supine fit` finds a person's own |
-| (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | `deep` turns only a part of the gradient with gravity |
+| (15)-(17), directions | `--law`, `--direction`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits a person's own |
+| (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | in `deep` only a part of the gradient follows gravity |
 | Fig. 4, lungs in postures | `supine render BASIS --posture supine,prone,left,right -o postures.png` | | drawn by the processor |
 | IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as (5), (6) | |
 | IV, Fig. 8, a plane | the same, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, to the nine digits written | |
 | IV, Fig. 9, a ring, a third of it stiffer | the same, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} uniform, {radius('x2'):.1f} with a third twice as stiff, {radius('x4'):.1f} four times | |
-| IV-B, expandability from displacement | `supine fit --expandability` | a known law comes back (`test_inverse`, `test_patient_expand`) | regions instead of single vertices: surfaces cannot tell more |
-| IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | `tests/FIGURES.md`: larger breaths of other people | |
+| IV-B, expandability from displacement | `supine fit --expandability` | a known law is recovered (`test_inverse`, `test_patient_expand`) | regions instead of single vertices: surfaces do not determine more |
+| IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, for larger breaths of other people | |
 | V, spherical harmonics of the orientation, l <= 3 | `supine precompute --law paper --band 3 --modes harmonics` | error {percent(first)} RMS on held-out directions; {operations(first)} a vertex | |
-| V, the same work, spent better | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} a vertex | the best functions of orientation instead of the first |
+| V, the same number of operations or fewer | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} a vertex | the best functions of orientation instead of the first |
 | V, with stiffness that follows gravity | `--reach 10 --soften 1` | {percent(soft_first)} with the first 16 harmonics, {percent(soft_best)} with {soft_best['modes']} modes | |
-| V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement, and the transfer applied once to its best modes |
+| V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement; the transfer matrix is applied once, to the best modes |
 | V, a breath of 500 mL over 5 s in steps of 1.5 mL, 15 ms a frame | `supine breathe --course flow`, `supine_step` | three additions a vertex a step (`test_pv_breath`) | |
 | VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | |
 """.rstrip())
