@@ -3,7 +3,7 @@
 function(supine_stream_test name)
   add_executable(test_stream_${name} stream/test_stream_${name}.c)
   target_link_libraries(test_stream_${name} PRIVATE supine_build runtime_fixture supine_stream
-    ${ARGN} supine_gsl test_skips)
+    ${ARGN} supine_gsl test_main)
   add_test(NAME stream_${name} COMMAND test_stream_${name})
   set_tests_properties(stream_${name} PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77
     ENVIRONMENT "TSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/tsan.supp")

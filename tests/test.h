@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What every cmocka program includes: cmocka's own four headers first, then the usual ones. */
+/* Included by every test program: cmocka after the four headers that it wants, common headers, and
+ * the definition of tests. test_main.c has the main function. */
 #ifndef SUPINE_TEST_H
 #define SUPINE_TEST_H
 
@@ -16,6 +17,24 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+/* Define a test: TEST(test_name) { ... }. `state` is what the setup of the group made.
+ */
+#define TEST(name)                                                                                 \
+  static void name(void **state);                                                                  \
+  __attribute__((constructor)) static void name##_add(void) {                                      \
+    test_add(#name, name);                                                                         \
+  }                                                                                                \
+  static void name(__attribute__((unused)) void **state)
+
+/* Call `setup` before the first test of this program and `teardown` after the last. */
+#define TEST_GROUP(setup, teardown)                                                                \
+  __attribute__((constructor)) static void test_group_set(void) {                                  \
+    test_set_group(setup, teardown);                                                               \
+  }
+
+void test_add(const char *name, CMUnitTestFunction test);
+void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
 
 /* Write a text as a file. */
 static inline void test_write(const char *path, const char *text) {

@@ -14,8 +14,7 @@
 #include "test.h"
 #include <supine/status.h>
 
-static void test_status_string_every_code_distinct(void **state) {
-  (void)state;
+TEST(test_status_string_every_code_distinct) {
   for (int i = 0; i < (int)SUPINE_STATUS_COUNT; ++i) {
     for (int j = 0; j < i; ++j) {
       assert_string_not_equal(supine_status_string((supine_status)i),
@@ -24,15 +23,13 @@ static void test_status_string_every_code_distinct(void **state) {
   }
 }
 
-static void test_status_string_outside_enumeration_not_null(void **state) {
-  (void)state;
+TEST(test_status_string_outside_enumeration_not_null) {
   assert_string_equal(supine_status_string(SUPINE_STATUS_COUNT), "unknown status");
   assert_string_equal(supine_status_string((supine_status)-1), "unknown status");
   assert_string_equal(supine_status_string((supine_status)1000), "unknown status");
 }
 
-static void test_error_set_long_message_cut(void **state) {
-  (void)state;
+TEST(test_error_set_long_message_cut) {
   char text[2 * sizeof(((supine_error *)0)->message)];
   memset(text, 'x', sizeof text - 1);
   text[sizeof text - 1] = '\0';
@@ -43,8 +40,7 @@ static void test_error_set_long_message_cut(void **state) {
   assert_int_equal(supine_error_set(NULL, SUPINE_ERROR_READ, "none"), SUPINE_ERROR_READ);
 }
 
-static void test_text_ends_in_with_something_before(void **state) {
-  (void)state;
+TEST(test_text_ends_in_with_something_before) {
   assert_true(supine_text_ends_in("pairs.csv", ".csv"));
   assert_false(supine_text_ends_in("pairs.CSV", ".csv"));
   assert_false(supine_text_ends_in("pairs.csv.gz", ".csv"));
@@ -62,8 +58,7 @@ static void read_text(const char *path, char *text, size_t size) {
   (void)fclose(file);
 }
 
-static void test_output_commit_replaces_abandon_keeps(void **state) {
-  (void)state;
+TEST(test_output_commit_replaces_abandon_keeps) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   assert_non_null(mkdtemp(folder));
   char path[64];
@@ -86,8 +81,7 @@ static void test_output_commit_replaces_abandon_keeps(void **state) {
   assert_int_equal(rmdir(folder), 0); /* fails where a temporary file is left */
 }
 
-static void test_output_full_or_missing_target_reports_write(void **state) {
-  (void)state;
+TEST(test_output_full_or_missing_target_reports_write) {
   supine_output output;
   supine_error error;
   assert_int_equal(supine_output_open("/nonexistent-folder/x", &output, &error),
@@ -216,8 +210,7 @@ static void check_full_disk(void) {
   assert_int_equal(rmdir(folder), 0);
 }
 
-static void test_output_keeps_modes_links_and_old_files(void **state) {
-  (void)state;
+TEST(test_output_keeps_modes_links_and_old_files) {
   for (int i = 0; i < 2; ++i) {
     nameless_missing = i == 1;
     check_modes();
@@ -228,8 +221,7 @@ static void test_output_keeps_modes_links_and_old_files(void **state) {
   nameless_missing = false;
 }
 
-static void test_output_abandon_all_removes_temporary_names(void **state) {
-  (void)state;
+TEST(test_output_abandon_all_removes_temporary_names) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   char path[64];
   assert_non_null(mkdtemp(folder));
@@ -245,8 +237,7 @@ static void test_output_abandon_all_removes_temporary_names(void **state) {
   assert_int_equal(supine_output_try("/nonexistent-folder/x", NULL), SUPINE_ERROR_WRITE);
 }
 
-static void test_thread_count_bounded_and_nonsense_ignored(void **state) {
-  (void)state;
+TEST(test_thread_count_bounded_and_nonsense_ignored) {
   assert_int_equal(unsetenv("SUPINE_THREADS"), 0);
   const size_t own = supine_thread_count();
   static const struct {
@@ -276,8 +267,7 @@ static void tally_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-static void test_parallel_for_any_split_covers_each_item_once(void **state) {
-  (void)state;
+TEST(test_parallel_for_any_split_covers_each_item_once) {
   static const size_t sizes[] = {0, 1, 2, 7, 16, 17, 999, 1000};
   for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {
     for (size_t threads = 1; threads <= 8; ++threads) {
@@ -291,20 +281,4 @@ static void test_parallel_for_any_split_covers_each_item_once(void **state) {
     }
   }
   assert_true(supine_thread_count() >= 1);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_status_string_every_code_distinct),
-      cmocka_unit_test(test_status_string_outside_enumeration_not_null),
-      cmocka_unit_test(test_error_set_long_message_cut),
-      cmocka_unit_test(test_output_commit_replaces_abandon_keeps),
-      cmocka_unit_test(test_output_full_or_missing_target_reports_write),
-      cmocka_unit_test(test_output_keeps_modes_links_and_old_files),
-      cmocka_unit_test(test_output_abandon_all_removes_temporary_names),
-      cmocka_unit_test(test_text_ends_in_with_something_before),
-      cmocka_unit_test(test_thread_count_bounded_and_nonsense_ignored),
-      cmocka_unit_test(test_parallel_for_any_split_covers_each_item_once),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -175,8 +175,7 @@ static double *breath_of(const supine_pv_breath *course, double fps, size_t fram
   return volume;
 }
 
-static void test_breathe_real_lungs_turning_volumes_exact_in_every_frame(void **state) {
-  (void)state;
+TEST(test_breathe_real_lungs_turning_volumes_exact_in_every_frame) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   char real[80];
   supine_lungs lungs = {0};
@@ -200,8 +199,7 @@ static void test_breathe_real_lungs_turning_volumes_exact_in_every_frame(void **
 
 /* A program of one's own, of the installed library alone, breathes as the command does, bit for
  * bit. */
-static void test_breathe_library_calls_give_the_command_s_frames(void **state) {
-  (void)state;
+TEST(test_breathe_library_calls_give_the_command_s_frames) {
   enum { FRAMES = 21 };
   supine_safetensors *file = NULL;
   supine_basis *opened = NULL;
@@ -235,8 +233,7 @@ static void test_breathe_library_calls_give_the_command_s_frames(void **state) {
   supine_basis_close(opened);
 }
 
-static void test_breathe_one_posture_three_additions_keep_volumes(void **state) {
-  (void)state;
+TEST(test_breathe_one_posture_three_additions_keep_volumes) {
   supine_pv_breath course = supine_breath_default();
   assert_int_equal(RUN(basis, "--posture", "prone", "--step", "1.5", "-o", breath), SUPINE_EXIT_OK);
   course.course = SUPINE_PV_CONSTANT_FLOW; /* 1.5 mL a frame: 5 s of inhalation */
@@ -263,8 +260,7 @@ static void test_breathe_one_posture_three_additions_keep_volumes(void **state) 
   free(wanted);
 }
 
-static void test_breathe_options_shape_the_breath(void **state) {
-  (void)state;
+TEST(test_breathe_options_shape_the_breath) {
   const supine_pv_breath course = {.tidal = 300.0,
                                    .rate = 20.0,
                                    .inhale_fraction = 0.4,
@@ -279,8 +275,7 @@ static void test_breathe_options_shape_the_breath(void **state) {
   free(wanted);
 }
 
-static void test_breathe_series_lists_every_frame_and_its_time(void **state) {
-  (void)state;
+TEST(test_breathe_series_lists_every_frame_and_its_time) {
   assert_int_equal(RUN(basis, "--turn", "supine:left:2s", "--fps", "5", "-o", series),
                    SUPINE_EXIT_OK);
   FILE *file = fopen(series, "rb");
@@ -305,8 +300,7 @@ static void test_breathe_series_lists_every_frame_and_its_time(void **state) {
   assert_int_equal(rmdir(series_folder), 0);
 }
 
-static void test_breathe_folder_in_use_is_left_alone(void **state) {
-  (void)state;
+TEST(test_breathe_folder_in_use_is_left_alone) {
   char inside[128];
   struct stat found;
   (void)snprintf(inside, sizeof inside, "%s/precious", series_folder);
@@ -329,8 +323,7 @@ static void test_breathe_folder_in_use_is_left_alone(void **state) {
   assert_int_equal(count_names("a & b"), 1); /* the index */
 }
 
-static void test_breathe_bad_arguments_are_usage_errors(void **state) {
-  (void)state;
+TEST(test_breathe_bad_arguments_are_usage_errors) {
   static const char *const bad[][2] = {{"--rate", "0"},
                                        {"--rate", "-3"},
                                        {"--rate", "often"},
@@ -364,8 +357,7 @@ static void test_breathe_bad_arguments_are_usage_errors(void **state) {
                    SUPINE_EXIT_USAGE);
 }
 
-static void test_breathe_bad_input_names_the_remedy(void **state) {
-  (void)state;
+TEST(test_breathe_bad_input_names_the_remedy) {
   assert_int_equal(RUN("/nowhere", "--posture", "supine", "-o", breath), SUPINE_EXIT_INPUT);
   assert_int_equal(RUN(open_basis, "--posture", "supine", "-o", breath), SUPINE_EXIT_INPUT);
   assert_non_null(strstr(text, "close the mesh"));
@@ -376,8 +368,7 @@ static void test_breathe_bad_input_names_the_remedy(void **state) {
   assert_non_null(strstr(text, "90000"));
 }
 
-static void test_breathe_interrupted_leaves_nothing(void **state) {
-  (void)state;
+TEST(test_breathe_interrupted_leaves_nothing) {
   const size_t before = count_names("");
   const size_t old = count_names("a & b"); /* the index of the test before */
   const pid_t child = fork();
@@ -401,8 +392,7 @@ static void test_breathe_interrupted_leaves_nothing(void **state) {
   assert_int_equal(count_names(""), before);
 }
 
-static void test_turn_is_even_and_stays_on_the_sphere(void **state) {
-  (void)state;
+TEST(test_turn_is_even_and_stays_on_the_sphere) {
   static const double turns[][6] = {{0, 1, 0, 1, 0, 0},  {0, 1, 0, 0, -1, 0},
                                     {0, 0, -1, 0, 0, 1}, {1, 0, 0, -1, 0, 0},
                                     {0, 1, 0, 0, 1, 0},  {0.6, 0, -0.8, 0, 0.28, 0.96}};
@@ -440,18 +430,4 @@ static void test_turn_is_even_and_stays_on_the_sphere(void **state) {
   }
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_breathe_real_lungs_turning_volumes_exact_in_every_frame),
-      cmocka_unit_test(test_breathe_library_calls_give_the_command_s_frames),
-      cmocka_unit_test(test_breathe_one_posture_three_additions_keep_volumes),
-      cmocka_unit_test(test_breathe_options_shape_the_breath),
-      cmocka_unit_test(test_breathe_series_lists_every_frame_and_its_time),
-      cmocka_unit_test(test_breathe_folder_in_use_is_left_alone),
-      cmocka_unit_test(test_breathe_bad_arguments_are_usage_errors),
-      cmocka_unit_test(test_breathe_bad_input_names_the_remedy),
-      cmocka_unit_test(test_breathe_interrupted_leaves_nothing),
-      cmocka_unit_test(test_turn_is_even_and_stays_on_the_sphere),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -146,20 +146,17 @@ static void check_rms(bool vector, size_t modes, size_t lungs) {
   unmake(&m);
 }
 
-static void test_rms_scalar_basis_equals_every_vertex(void **state) {
-  (void)state;
+TEST(test_rms_scalar_basis_equals_every_vertex) {
   check_rms(false, 16, 2);
   check_rms(false, 5, 3);
   check_rms(false, 1, 1);
 }
 
-static void test_rms_vector_basis_equals_every_vertex(void **state) {
-  (void)state;
+TEST(test_rms_vector_basis_equals_every_vertex) {
   check_rms(true, 9, 2);
 }
 
-static void test_rms_to_rest_equals_scale_zero(void **state) {
-  (void)state;
+TEST(test_rms_to_rest_equals_scale_zero) {
   made m = make(501, 7, 3, 2, false, false);
   uint64_t random = 5;
   pair p = random_pair(&m, &random);
@@ -180,8 +177,7 @@ static int by_distance(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static void test_statistics_random_pairs_equal_sorting(void **state) {
-  (void)state;
+TEST(test_statistics_random_pairs_equal_sorting) {
   made m = make(3001, 11, 3, 2, false, false);
   double *share = area_shares(m.f);
   float *distance = malloc(m.f->vertices * sizeof *distance);
@@ -228,8 +224,7 @@ static void test_statistics_random_pairs_equal_sorting(void **state) {
   unmake(&m);
 }
 
-static void test_energy_sums_to_mean_square_over_sphere(void **state) {
-  (void)state;
+TEST(test_energy_sums_to_mean_square_over_sphere) {
   enum { LATITUDES = 12, LONGITUDES = 25, BAND = 4 };
   made m = make(301, 6, BAND, 2, true, false);
   double energy[BAND + 1];
@@ -263,8 +258,7 @@ static void test_energy_sums_to_mean_square_over_sphere(void **state) {
   unmake(&m);
 }
 
-static void test_compare_pose_rms_reaches_it(void **state) {
-  (void)state;
+TEST(test_compare_pose_rms_reaches_it) {
   made m = make(401, 6, 3, 2, false, true);
   const supine_state asked = {.gravity = {0.3, -0.5, 0.7}};
   supine_pose pose;
@@ -274,8 +268,7 @@ static void test_compare_pose_rms_reaches_it(void **state) {
 }
 
 /* Beyond the rest of that direction of gravity: constant and linear terms by hand. */
-static void test_compare_pose_volume_counts_from_the_posture_s_rest(void **state) {
-  (void)state;
+TEST(test_compare_pose_volume_counts_from_the_posture_s_rest) {
   static const double resting[9] = {-40, 7, -5, 3}; /* of Y_00, Y_1-1, Y_10, Y_11: y, z, x */
   made m = make_resting(401, 6, 3, 2, false, true, resting);
   supine_state asked = {.gravity = {0.6, -0.48, 0.64}, .volume = {SUPINE_VOLUME_REST, 11}};
@@ -295,8 +288,7 @@ static void test_compare_pose_volume_counts_from_the_posture_s_rest(void **state
   unmake(&m);
 }
 
-static void test_compare_pose_open_or_still_is_refused(void **state) {
-  (void)state;
+TEST(test_compare_pose_open_or_still_is_refused) {
   made m = make(401, 6, 3, 2, false, false);
   supine_state asked = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_ABSOLUTE, 100}};
   supine_pose pose;
@@ -315,8 +307,7 @@ static void test_compare_pose_open_or_still_is_refused(void **state) {
   unmake(&m);
 }
 
-static void test_create_surface_without_area_is_refused(void **state) {
-  (void)state;
+TEST(test_create_surface_without_area_is_refused) {
   fixture *f = fixture_create(50, 3, 2, 1, false, false, 3, 9);
   memset(f->vertex, 0, 3 * f->vertices * sizeof *f->vertex);
   size_t size = 0;
@@ -354,8 +345,7 @@ static made make_fields(size_t vertices, size_t modes, size_t band, size_t lungs
   return m;
 }
 
-static void test_search_finds_what_no_random_direction_beats(void **state) {
-  (void)state;
+TEST(test_search_finds_what_no_random_direction_beats) {
   const supine_state supine = {.gravity = {0, 1, 0}};
   made m = make_fields(601, 9, 3, 2);
   supine_extremes found;
@@ -376,8 +366,7 @@ static void test_search_finds_what_no_random_direction_beats(void **state) {
 }
 
 /* One mode, Y(1,0): the displacement follows g_z, so that up and down differ most. */
-static void test_search_one_axis_finds_its_poles(void **state) {
-  (void)state;
+TEST(test_search_one_axis_finds_its_poles) {
   fixture *f = fixture_create(203, 1, 1, 1, false, false, 5, 41);
   f->fields = true;
   memset(f->mode, 0, 4 * sizeof *f->mode);
@@ -396,8 +385,7 @@ static void test_search_one_axis_finds_its_poles(void **state) {
   unmake(&m);
 }
 
-static void test_search_bad_arguments_are_refused(void **state) {
-  (void)state;
+TEST(test_search_bad_arguments_are_refused) {
   made m = make(203, 4, 2, 1, false, false);
   supine_extremes found;
   supine_error error;
@@ -435,8 +423,7 @@ static float *moved(const fixture *f, const double matrix[3][3], const double sh
 
 enum { SLABS = 10 };
 
-static void test_slabs_at_rest_hold_the_volume_of_the_lung(void **state) {
-  (void)state;
+TEST(test_slabs_at_rest_hold_the_volume_of_the_lung) {
   made m = make(902, 4, 2, 2, false, true);
   double *rest = malloc(3 * m.f->vertices * sizeof *rest);
   assert_non_null(rest);
@@ -467,8 +454,7 @@ static void test_slabs_at_rest_hold_the_volume_of_the_lung(void **state) {
 
 /* A slab of the bipyramid seen along its axis z, of half height h: the part within z of a tip has
  * (z/h)^3 of half the volume. The corners of the ring are moved to one height for this. */
-static void test_slabs_of_bipyramid_follow_the_cube(void **state) {
-  (void)state;
+TEST(test_slabs_of_bipyramid_follow_the_cube) {
   fixture *f = fixture_create(602, 3, 2, 1, false, true, 2, 8);
   for (size_t i = 0; i < 600; ++i) {
     f->vertex[3 * i + 2] = 0;
@@ -516,15 +502,13 @@ static void check_linear(const double matrix[3][3], const double shift[3], doubl
   unmake(&m);
 }
 
-static void test_slabs_translation_gains_nothing(void **state) {
-  (void)state;
+TEST(test_slabs_translation_gains_nothing) {
   const double still[3][3] = {{0}};
   const double shift[3] = {1.7, -2.9, 3.3};
   check_linear(still, shift, 1e-3); /* mL, of slabs of about 100: float positions */
 }
 
-static void test_slabs_linear_displacement_gains_its_trace(void **state) {
-  (void)state;
+TEST(test_slabs_linear_displacement_gains_its_trace) {
   const double none[3] = {0, 0, 0};
   const double swelling[3][3] = {{1e-3, 0, 0}, {0, 1e-3, 0}, {0, 0, 1e-3}};
   const double turning[3][3] = {{0, -7e-4, 3e-4}, {7e-4, 0, -9e-4}, {-3e-4, 9e-4, 0}};
@@ -534,8 +518,7 @@ static void test_slabs_linear_displacement_gains_its_trace(void **state) {
   check_linear(any, none, 3e-3);
 }
 
-static void test_slabs_of_any_state_sum_to_the_exact_volume(void **state) {
-  (void)state;
+TEST(test_slabs_of_any_state_sum_to_the_exact_volume) {
   made m = make(1203, 7, 3, 2, false, true);
   float *xyz = malloc(3 * m.f->vertices * sizeof *xyz);
   assert_non_null(xyz);
@@ -562,8 +545,7 @@ static void test_slabs_of_any_state_sum_to_the_exact_volume(void **state) {
   unmake(&m);
 }
 
-static void test_slabs_bad_arguments_are_refused(void **state) {
-  (void)state;
+TEST(test_slabs_bad_arguments_are_refused) {
   made open = make(203, 4, 2, 1, false, false);
   made closed = make(203, 4, 2, 1, false, true);
   const double g[3] = {0, 1, 0};
@@ -586,28 +568,4 @@ static void test_slabs_bad_arguments_are_refused(void **state) {
                    SUPINE_ERROR_ARGUMENT);
   unmake(&open);
   unmake(&closed);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_rms_scalar_basis_equals_every_vertex),
-      cmocka_unit_test(test_rms_vector_basis_equals_every_vertex),
-      cmocka_unit_test(test_rms_to_rest_equals_scale_zero),
-      cmocka_unit_test(test_statistics_random_pairs_equal_sorting),
-      cmocka_unit_test(test_energy_sums_to_mean_square_over_sphere),
-      cmocka_unit_test(test_compare_pose_rms_reaches_it),
-      cmocka_unit_test(test_compare_pose_volume_counts_from_the_posture_s_rest),
-      cmocka_unit_test(test_compare_pose_open_or_still_is_refused),
-      cmocka_unit_test(test_create_surface_without_area_is_refused),
-      cmocka_unit_test(test_search_finds_what_no_random_direction_beats),
-      cmocka_unit_test(test_search_one_axis_finds_its_poles),
-      cmocka_unit_test(test_search_bad_arguments_are_refused),
-      cmocka_unit_test(test_slabs_at_rest_hold_the_volume_of_the_lung),
-      cmocka_unit_test(test_slabs_of_bipyramid_follow_the_cube),
-      cmocka_unit_test(test_slabs_translation_gains_nothing),
-      cmocka_unit_test(test_slabs_linear_displacement_gains_its_trace),
-      cmocka_unit_test(test_slabs_of_any_state_sum_to_the_exact_volume),
-      cmocka_unit_test(test_slabs_bad_arguments_are_refused),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -99,8 +99,7 @@ static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool ve
   drop(&o);
 }
 
-static void test_deform_every_path_within_stated_error(void **state) {
-  (void)state;
+TEST(test_deform_every_path_within_stated_error) {
   static const size_t sizes[] = {1, 2, 15, 16, 17, 31, 33, 48, 100, 257};
   static const size_t modes[] = {1, 2, 3, 4, 5, 7, 8, 15, 16, 17, 33, 64};
   for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
@@ -116,16 +115,14 @@ static void test_deform_every_path_within_stated_error(void **state) {
   check_all_paths(100, 256, 2, true, 2);
 }
 
-static void test_deform_every_mode_count_within_stated_error(void **state) {
-  (void)state;
+TEST(test_deform_every_mode_count_within_stated_error) {
   for (size_t modes = 1; modes <= 64; ++modes) {
     check_all_paths(21, modes, 1, modes % 3 == 0, modes);
   }
 }
 
 /* The bound must say something: over many frames it is reached to within a small factor. */
-static void test_basis_error_bound_near_what_happens(void **state) {
-  (void)state;
+TEST(test_basis_error_bound_near_what_happens) {
   opened o = made(fixture_create(3000, 16, 3, 2, false, false, 11, 5));
   double *exact = fixture_allocate(3 * 3000, sizeof *exact);
   float *xyz = fixture_allocate(3 * 3000, sizeof *xyz);
@@ -152,8 +149,7 @@ static void test_basis_error_bound_near_what_happens(void **state) {
   drop(&o);
 }
 
-static void test_storage_error_orders_storages(void **state) {
-  (void)state;
+TEST(test_storage_error_orders_storages) {
   opened o = made(fixture_create(500, 16, 3, 2, false, true, 11, 5));
   double error[SUPINE_STORAGE_COUNT] = {0};
   double bytes[SUPINE_STORAGE_COUNT] = {0};
@@ -176,8 +172,7 @@ static void test_storage_error_orders_storages(void **state) {
 }
 
 /* Where the last modes carry little, as they do in lungs. */
-static void test_storage_auto_mixed_where_it_suffices(void **state) {
-  (void)state;
+TEST(test_storage_auto_mixed_where_it_suffices) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < (size_t)500 * 16; ++i) {
     f->coefficient[i] *= i % 16 < 10 ? 1 : 0.02F;
@@ -192,8 +187,7 @@ static void test_storage_auto_mixed_where_it_suffices(void **state) {
 
 /* Just below 2^30 products stay finite, and so does every bound; from there on a file is refused.
  */
-static void test_storage_largest_numbers_have_finite_bounds(void **state) {
-  (void)state;
+TEST(test_storage_largest_numbers_have_finite_bounds) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < 3; ++i) {
     f->direction[i] = 0x1.fffffep29F;
@@ -221,8 +215,7 @@ static void check_stated_error(const opened *o, const supine_basis *chosen) {
   supine_basis_close(basis);
 }
 
-static void test_storage_auto_exact_where_int16_errs(void **state) {
-  (void)state;
+TEST(test_storage_auto_exact_where_int16_errs) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   opened o = made(f);
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
@@ -240,8 +233,7 @@ static void test_storage_auto_exact_where_int16_errs(void **state) {
   drop(&o);
 }
 
-static void test_open_bad_options_refused(void **state) {
-  (void)state;
+TEST(test_open_bad_options_refused) {
   opened o = made(fixture_create(5, 1, 0, 1, false, false, 1, 1));
   const supine_basis_options bad[] = {{sizeof *bad, .storage = SUPINE_STORAGE_COUNT},
                                       {sizeof *bad, .simd = SUPINE_SIMD_COUNT},
@@ -318,22 +310,19 @@ static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_sim
   drop(&o);
 }
 
-static void test_deform_range_any_part_same_bits(void **state) {
-  (void)state;
+TEST(test_deform_range_any_part_same_bits) {
   for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
     check_ranges(331, 5, 3, (supine_simd)simd, 300);
   }
 }
 
-static void test_deform_range_past_cache_same_bits(void **state) {
-  (void)state;
+TEST(test_deform_range_past_cache_same_bits) {
   for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
     check_ranges(300007, 16, 2, (supine_simd)simd, 18);
   }
 }
 
-static void test_displace_range_rest_added_is_deform(void **state) {
-  (void)state;
+TEST(test_displace_range_rest_added_is_deform) {
   for (int vector = 0; vector < 2; ++vector) {
     opened o = made(fixture_create(100, 7, 2, 2, vector != 0, false, 11, 8));
     for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
@@ -360,8 +349,7 @@ static void test_displace_range_rest_added_is_deform(void **state) {
   }
 }
 
-static void test_step_many_steps_reach_the_volume(void **state) {
-  (void)state;
+TEST(test_step_many_steps_reach_the_volume) {
   opened o = made(fixture_create(100, 7, 2, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   uint64_t random = 5;
@@ -427,8 +415,7 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
   drop(&o);
 }
 
-static void test_deform_batch_each_orientation_within_stated_error(void **state) {
-  (void)state;
+TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 64, 0, 700);
   check_batch(700, 16, false, 1, 3, 691);
   check_batch(24000, 16, false, 64, 0, 24000); /* past the cache, lines whole */
@@ -442,8 +429,7 @@ static void test_deform_batch_each_orientation_within_stated_error(void **state)
 }
 
 /* Five modes in two vec4s of each lung: what is there before does not stay. */
-static void test_gl_pack_slots_without_a_mode_are_zero(void **state) {
-  (void)state;
+TEST(test_gl_pack_slots_without_a_mode_are_zero) {
   enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO);
@@ -473,8 +459,7 @@ static void test_gl_pack_slots_without_a_mode_are_zero(void **state) {
   drop(&o);
 }
 
-static void test_normals_bipyramid_area_weighted(void **state) {
-  (void)state;
+TEST(test_normals_bipyramid_area_weighted) {
   opened o = made(fixture_create(40, 2, 1, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   float normals[120];
@@ -515,25 +500,4 @@ static void test_normals_bipyramid_area_weighted(void **state) {
   }
   supine_basis_close(basis);
   drop(&o);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_deform_every_path_within_stated_error),
-      cmocka_unit_test(test_deform_every_mode_count_within_stated_error),
-      cmocka_unit_test(test_basis_error_bound_near_what_happens),
-      cmocka_unit_test(test_storage_error_orders_storages),
-      cmocka_unit_test(test_storage_auto_mixed_where_it_suffices),
-      cmocka_unit_test(test_storage_largest_numbers_have_finite_bounds),
-      cmocka_unit_test(test_storage_auto_exact_where_int16_errs),
-      cmocka_unit_test(test_open_bad_options_refused),
-      cmocka_unit_test(test_deform_range_any_part_same_bits),
-      cmocka_unit_test(test_deform_range_past_cache_same_bits),
-      cmocka_unit_test(test_displace_range_rest_added_is_deform),
-      cmocka_unit_test(test_step_many_steps_reach_the_volume),
-      cmocka_unit_test(test_deform_batch_each_orientation_within_stated_error),
-      cmocka_unit_test(test_gl_pack_slots_without_a_mode_are_zero),
-      cmocka_unit_test(test_normals_bipyramid_area_weighted),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -131,8 +131,7 @@ static void check_formula(size_t normals, supine_simd simd) {
   drop(&o);
 }
 
-static void test_lit_every_code_agrees_with_formula(void **state) {
-  (void)state;
+TEST(test_lit_every_code_agrees_with_formula) {
   static const size_t numbers[] = {1, 2, 3, 6, 8, 9, 12, 20, 64};
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
@@ -141,8 +140,7 @@ static void test_lit_every_code_agrees_with_formula(void **state) {
   }
 }
 
-static void test_lit_ranges_are_parts_of_the_whole(void **state) {
-  (void)state;
+TEST(test_lit_ranges_are_parts_of_the_whole) {
   for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
     opened o = open_lit(8, (supine_simd)simd);
     float whole[3 * VERTICES];
@@ -163,8 +161,7 @@ static void test_lit_ranges_are_parts_of_the_whole(void **state) {
   }
 }
 
-static void test_lit_batch_is_one_after_the_other(void **state) {
-  (void)state;
+TEST(test_lit_batch_is_one_after_the_other) {
   opened o = open_lit(6, SUPINE_SIMD_AUTO);
   enum { BEGIN = 7, END = VERTICES - 5, COUNT = END - BEGIN };
   float *xyz = fixture_allocate(3 * BATCH * COUNT, sizeof *xyz);
@@ -191,8 +188,7 @@ static void test_lit_batch_is_one_after_the_other(void **state) {
   drop(&o);
 }
 
-static void test_lit_without_normals_refused(void **state) {
-  (void)state;
+TEST(test_lit_without_normals_refused) {
   float xyz[3 * VERTICES];
   opened o = open_lit(0, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_deform_lit(o.basis, POSED(o.basis, o.weights, o.scales), xyz, xyz),
@@ -231,8 +227,7 @@ static supine_status open_status(const fixture *f) {
   return status;
 }
 
-static void test_open_bad_normals_refused(void **state) {
-  (void)state;
+TEST(test_open_bad_normals_refused) {
   fixture *f = fixture_create(20, 2, 1, 1, false, false, 1, 3);
   fixture_add_normals(f, 4, 1);
   assert_int_equal(open_status(f), SUPINE_OK);
@@ -246,15 +241,4 @@ static void test_open_bad_normals_refused(void **state) {
   fixture_add_normals(f, SUPINE_NORMAL_MODES_MAX + 1, 1);
   assert_int_equal(open_status(f), SUPINE_ERROR_FORMAT);
   fixture_destroy(f);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_lit_every_code_agrees_with_formula),
-      cmocka_unit_test(test_lit_ranges_are_parts_of_the_whole),
-      cmocka_unit_test(test_lit_batch_is_one_after_the_other),
-      cmocka_unit_test(test_lit_without_normals_refused),
-      cmocka_unit_test(test_open_bad_normals_refused),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -128,8 +128,7 @@ static double scale_of_500(const fixture *f, const double *weights, double *exac
   return scales[1];
 }
 
-static void test_deform_real_lung_every_path_within_stated_error(void **state) {
-  (void)state;
+TEST(test_deform_real_lung_every_path_within_stated_error) {
   fixture *f = read_obj(SUPINE_TEST_DATA "/lungs/chaste_left_5k.obj");
   if (f == NULL) {
     print_message("no " SUPINE_TEST_DATA "/lungs: skipped\n");
@@ -198,11 +197,4 @@ static void test_deform_real_lung_every_path_within_stated_error(void **state) {
   free(xyz);
   free(bytes);
   fixture_destroy(f);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_deform_real_lung_every_path_within_stated_error),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,12 +16,6 @@ static const double supine[3] = {0.0, 1.0, 0.0};
 
 static supine_model model; /* of the test that runs */
 
-static int healthy(void **state) {
-  (void)state;
-  model = supine_physics_model(SUPINE_LAW_PAPER);
-  return 0;
-}
-
 /* Factors of 1 for lesions to be multiplied into: the model's from here on. */
 static double *no_lesions(const supine_lungs *lungs) {
   double *factors = malloc(lungs->mesh.vertex_count * sizeof *factors);
@@ -135,8 +129,8 @@ static void check_lesions(const supine_lungs *lungs) {
   model.reach = 0.0;
 }
 
-static void test_lesion_real_lungs_lowers_itself_and_leaves_the_rest(void **state) {
-  (void)state;
+TEST(test_lesion_real_lungs_lowers_itself_and_leaves_the_rest) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = {0};
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
     skip();
@@ -146,8 +140,8 @@ static void test_lesion_real_lungs_lowers_itself_and_leaves_the_rest(void **stat
 }
 
 /* Scaling to geometric mean 1 with the lesion in it would change E everywhere. */
-static void test_lesion_large_leaves_the_other_lung_to_rounding(void **state) {
-  (void)state;
+TEST(test_lesion_large_leaves_the_other_lung_to_rounding) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
   const double *side = side_of(&lungs);
@@ -166,8 +160,8 @@ static void test_lesion_large_leaves_the_other_lung_to_rounding(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_lesion_factor_one_changes_no_bit(void **state) {
-  (void)state;
+TEST(test_lesion_factor_one_changes_no_bit) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
   const double *side = side_of(&lungs);
@@ -183,8 +177,8 @@ static void test_lesion_factor_one_changes_no_bit(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_lesion_profile_is_as_documented(void **state) {
-  (void)state;
+TEST(test_lesion_profile_is_as_documented) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   const double *centre = side_of(&lungs);
   const supine_lesion lesion = {{centre[0], centre[1], centre[2]}, 50.0, 7.0};
@@ -213,8 +207,8 @@ static void test_lesion_profile_is_as_documented(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_lesion_outside_reaches_nothing(void **state) {
-  (void)state;
+TEST(test_lesion_outside_reaches_nothing) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
   const supine_lesion lesion = {{900.0, 0.0, 0.0}, 40.0, 9.0};
@@ -230,8 +224,8 @@ static void test_lesion_outside_reaches_nothing(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_lesion_bad_numbers_refused(void **state) {
-  (void)state;
+TEST(test_lesion_bad_numbers_refused) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   static const supine_lesion bad[] = {{{NAN, 0, 0}, 10, 2},     {{0, INFINITY, 0}, 10, 2},
                                       {{0, 0, 0}, 0, 2},        {{0, 0, 0}, -1, 2},
@@ -255,8 +249,8 @@ static double volume_of(const supine_lungs *lungs, size_t lung, double *vertices
   return 1e-3 * supine_mesh_volume(&part);
 }
 
-static void test_collapse_rest_and_breath_are_its_share_in_every_direction(void **state) {
-  (void)state;
+TEST(test_collapse_rest_and_breath_are_its_share_in_every_direction) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   static const double directions[][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.48, -0.6, 0.64}};
   const double share = 0.3;
   const double scale = 1.7;
@@ -296,8 +290,8 @@ static void test_collapse_rest_and_breath_are_its_share_in_every_direction(void 
 
 /* The fixed point of a collapse is the mean of the vertices in the quarter of the lung's width that
  * is nearest the midline, on either side. */
-static void test_collapse_fixed_point_is_the_hilum(void **state) {
-  (void)state;
+TEST(test_collapse_fixed_point_is_the_hilum) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   const size_t n = lungs.mesh.vertex_count;
   const double *p = lungs.mesh.vertices;
@@ -334,8 +328,8 @@ static void test_collapse_fixed_point_is_the_hilum(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_collapse_draws_towards_the_midline_within_the_healthy_box(void **state) {
-  (void)state;
+TEST(test_collapse_draws_towards_the_midline_within_the_healthy_box) {
+  model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = {0};
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
     skip();
@@ -357,21 +351,4 @@ static void test_collapse_draws_towards_the_midline_within_the_healthy_box(void 
   assert_true(outer[1] > outer[0] + 20.0); /* room between the lung's side and the chest, mm */
   free(rest);
   supine_lungs_free(&lungs);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test_setup(test_lesion_real_lungs_lowers_itself_and_leaves_the_rest, healthy),
-      cmocka_unit_test_setup(test_lesion_large_leaves_the_other_lung_to_rounding, healthy),
-      cmocka_unit_test_setup(test_lesion_factor_one_changes_no_bit, healthy),
-      cmocka_unit_test_setup(test_lesion_profile_is_as_documented, healthy),
-      cmocka_unit_test_setup(test_lesion_outside_reaches_nothing, healthy),
-      cmocka_unit_test_setup(test_lesion_bad_numbers_refused, healthy),
-      cmocka_unit_test_setup(test_collapse_rest_and_breath_are_its_share_in_every_direction,
-                             healthy),
-      cmocka_unit_test_setup(test_collapse_fixed_point_is_the_hilum, healthy),
-      cmocka_unit_test_setup(test_collapse_draws_towards_the_midline_within_the_healthy_box,
-                             healthy),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

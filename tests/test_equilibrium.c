@@ -97,7 +97,7 @@ static double *spring_catch(const fixture *f, const double *masses, size_t count
   return springs;
 }
 
-static void test_solve_all_nodes_equals_dense_definition(void **state) {
+TEST(test_solve_all_nodes_equals_dense_definition) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   double *e = normalised(n, f->stiffness);
@@ -141,7 +141,7 @@ static void test_solve_all_nodes_equals_dense_definition(void **state) {
   free(springs);
 }
 
-static void test_solve_catch_sums_to_applied_force(void **state) {
+TEST(test_solve_catch_sums_to_applied_force) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   supine_equilibrium *eq = equilibrium_of(&f->mesh, &f->topology, f->stiffness);
@@ -166,7 +166,7 @@ static void test_solve_catch_sums_to_applied_force(void **state) {
   free(springs);
 }
 
-static void test_solve_scaled_stiffness_changes_nothing(void **state) {
+TEST(test_solve_scaled_stiffness_changes_nothing) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   double *scaled = malloc(n * sizeof *scaled);
@@ -181,7 +181,7 @@ static void test_solve_scaled_stiffness_changes_nothing(void **state) {
   free(b);
 }
 
-static void test_solve_stiffer_vertex_moves_less(void **state) {
+TEST(test_solve_stiffer_vertex_moves_less) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   double *stiff = malloc(n * sizeof *stiff);
@@ -202,7 +202,7 @@ static void count_progress(void *context, size_t steps, double held) {
   last[1] = held;
 }
 
-static void test_pitcher_catcher_agrees_with_fast_solve(void **state) {
+TEST(test_pitcher_catcher_agrees_with_fast_solve) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   supine_equilibrium *eq = equilibrium_of(&f->mesh, &f->topology, f->stiffness);
@@ -232,7 +232,7 @@ static void test_pitcher_catcher_agrees_with_fast_solve(void **state) {
 }
 
 /* M is symmetric: T[i, j] S_j / S_i = T[j, i] S_i / S_j with S = 1/E. */
-static void test_transfer_column_reciprocity_and_positivity(void **state) {
+TEST(test_transfer_column_reciprocity_and_positivity) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   const size_t first = f->topology.edges[20];
@@ -256,7 +256,7 @@ static void test_transfer_column_reciprocity_and_positivity(void **state) {
   free(b);
 }
 
-static void test_transfer_columns_superpose_to_solution(void **state) {
+TEST(test_transfer_columns_superpose_to_solution) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   supine_equilibrium *eq = equilibrium_of(&f->mesh, &f->topology, f->stiffness);
@@ -279,8 +279,7 @@ static void test_transfer_columns_superpose_to_solution(void **state) {
 }
 
 /* A shuffled file has links that span it all, and is renumbered inside. */
-static void test_solve_shuffled_vertices_same_answer(void **state) {
-  (void)state;
+TEST(test_solve_shuffled_vertices_same_answer) {
   supine_mesh mesh = helper_lump(20, -70.0, 5);
   const size_t n = mesh.vertex_count;
   uint32_t *place = malloc(n * sizeof *place);
@@ -334,7 +333,7 @@ static void test_solve_shuffled_vertices_same_answer(void **state) {
   supine_mesh_free(&shuffled);
 }
 
-static void test_set_stiffness_bad_value_names_vertex(void **state) {
+TEST(test_set_stiffness_bad_value_names_vertex) {
   const fixture *f = *state;
   static const double bad[] = {0.0, -1.0, NAN, INFINITY};
   const double good = f->stiffness[42];
@@ -350,7 +349,7 @@ static void test_set_stiffness_bad_value_names_vertex(void **state) {
   supine_physics_equilibrium_destroy(eq);
 }
 
-static void test_solve_force_not_finite_reports_numerical(void **state) {
+TEST(test_solve_force_not_finite_reports_numerical) {
   const fixture *f = *state;
   supine_equilibrium *eq = equilibrium_of(&f->mesh, &f->topology, f->stiffness);
   double *out = malloc(f->mesh.vertex_count * sizeof *out);
@@ -410,32 +409,14 @@ static void check_real_lungs(const char *const *names, supine_axes axes) {
   free(x);
 }
 
-static void test_solve_real_adult_equals_direct_solution(void **state) {
-  (void)state;
+TEST(test_solve_real_adult_equals_direct_solution) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   check_real_lungs(names, SUPINE_AXES_AUTO);
 }
 
-static void test_solve_real_ras_lungs_equal_direct_solution(void **state) {
-  (void)state;
+TEST(test_solve_real_ras_lungs_equal_direct_solution) {
   static const char *const names[] = {"covid/covid001_left.ply", "covid/covid001_right.ply"};
   check_real_lungs(names, SUPINE_AXES_RAS);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_solve_all_nodes_equals_dense_definition),
-      cmocka_unit_test(test_solve_catch_sums_to_applied_force),
-      cmocka_unit_test(test_solve_scaled_stiffness_changes_nothing),
-      cmocka_unit_test(test_solve_stiffer_vertex_moves_less),
-      cmocka_unit_test(test_pitcher_catcher_agrees_with_fast_solve),
-      cmocka_unit_test(test_transfer_column_reciprocity_and_positivity),
-      cmocka_unit_test(test_transfer_columns_superpose_to_solution),
-      cmocka_unit_test(test_solve_shuffled_vertices_same_answer),
-      cmocka_unit_test(test_set_stiffness_bad_value_names_vertex),
-      cmocka_unit_test(test_solve_force_not_finite_reports_numerical),
-      cmocka_unit_test(test_solve_real_adult_equals_direct_solution),
-      cmocka_unit_test(test_solve_real_ras_lungs_equal_direct_solution),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

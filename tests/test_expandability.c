@@ -27,8 +27,7 @@ static int teardown(void **state) {
   return unlink(path);
 }
 
-static void test_regional_follows_box_coordinates(void **state) {
-  (void)state;
+TEST(test_regional_follows_box_coordinates) {
   const size_t n = lungs.mesh.vertex_count;
   double *a = malloc(n * sizeof *a);
   for (int axis = 0; axis < 3; ++axis) {
@@ -54,8 +53,7 @@ static void test_regional_follows_box_coordinates(void **state) {
   free(a);
 }
 
-static void test_regional_bad_law_refused(void **state) {
-  (void)state;
+TEST(test_regional_bad_law_refused) {
   double *a = malloc(lungs.mesh.vertex_count * sizeof *a);
   static const supine_expandability_law bad[] = {
       {SUPINE_EXPANDABILITY_LINEAR, 3, 1, 2},        {SUPINE_EXPANDABILITY_LINEAR, -1, 1, 2},
@@ -68,8 +66,7 @@ static void test_regional_bad_law_refused(void **state) {
   free(a);
 }
 
-static void test_load_both_forms_read_the_same(void **state) {
-  (void)state;
+TEST(test_load_both_forms_read_the_same) {
   static const double wanted[] = {1.5, 0.25, 3e-2};
   static const char *const texts[] = {
       "expandability\n1.5\n0.25\n3e-2\n",
@@ -87,8 +84,7 @@ static void test_load_both_forms_read_the_same(void **state) {
   }
 }
 
-static void test_load_bad_files_refused_naming_line_and_vertex(void **state) {
-  (void)state;
+TEST(test_load_bad_files_refused_naming_line_and_vertex) {
   static const struct {
     const char *text, *line, *detail;
   } bad[] = {
@@ -123,8 +119,7 @@ static void test_load_bad_files_refused_naming_line_and_vertex(void **state) {
   }
 }
 
-static void test_load_binary_or_missing_refused(void **state) {
-  (void)state;
+TEST(test_load_binary_or_missing_refused) {
   double a[3];
   FILE *file = fopen(path, "wb");
   assert_non_null(file);
@@ -139,8 +134,7 @@ static void test_load_binary_or_missing_refused(void **state) {
 }
 
 /* Twice as expandable everywhere changes nothing; more expandable in one place moves that more. */
-static void test_expandability_is_relative_and_its_sign_is_as_documented(void **state) {
-  (void)state;
+TEST(test_expandability_is_relative_and_its_sign_is_as_documented) {
   const size_t n = lungs.mesh.vertex_count;
   const double g[3] = {0.0, 1.0, 0.0};
   double *e = malloc(n * sizeof *e);
@@ -175,14 +169,4 @@ static void test_expandability_is_relative_and_its_sign_is_as_documented(void **
   free(e);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_regional_follows_box_coordinates),
-      cmocka_unit_test(test_regional_bad_law_refused),
-      cmocka_unit_test(test_load_both_forms_read_the_same),
-      cmocka_unit_test(test_load_bad_files_refused_naming_line_and_vertex),
-      cmocka_unit_test(test_load_binary_or_missing_refused),
-      cmocka_unit_test(test_expandability_is_relative_and_its_sign_is_as_documented),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

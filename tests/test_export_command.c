@@ -34,14 +34,12 @@ static int teardown(void **state) {
     }                                                                                              \
   } while (0)
 
-static void test_export_help_teaches(void **state) {
-  (void)state;
+TEST(test_export_help_teaches) {
   EXPECT(0, "--plain", "--help");
   assert_non_null(strstr(text, "Examples:"));
 }
 
-static void test_export_usage_errors_are_1(void **state) {
-  (void)state;
+TEST(test_export_usage_errors_are_1) {
   EXPECT(1, "name one basis file", "-o", glb);
   EXPECT(1, "-o FILE is missing", basis);
   EXPECT(1, "must end in .html or .glb", basis, "-o", "lungs.gltf");
@@ -53,30 +51,18 @@ static void test_export_usage_errors_are_1(void **state) {
   EXPECT(1, "did you mean '--plain'", basis, "--plan");
 }
 
-static void test_export_input_errors_are_2(void **state) {
-  (void)state;
+TEST(test_export_input_errors_are_2) {
   EXPECT(2, "/nonexistent/b", "/nonexistent/b", "-o", glb);
 }
 
-static void test_export_output_errors_are_4(void **state) {
-  (void)state;
+TEST(test_export_output_errors_are_4) {
   EXPECT(4, "/nonexistent/l.glb", basis, "-o", "/nonexistent/l.glb");
   EXPECT(4, "/nonexistent/l.html", basis, "-o", "/nonexistent/l.html");
 }
 
-static void test_export_numerical_errors_are_5(void **state) {
-  (void)state;
+TEST(test_export_numerical_errors_are_5) {
   EXPECT(5, "no displacement when supine", still, "-o", glb);
   EXPECT(5, "mL", basis, "-o", glb, "--breath", "1e12");
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_export_help_teaches),
-      cmocka_unit_test(test_export_usage_errors_are_1),
-      cmocka_unit_test(test_export_input_errors_are_2),
-      cmocka_unit_test(test_export_output_errors_are_4),
-      cmocka_unit_test(test_export_numerical_errors_are_5),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

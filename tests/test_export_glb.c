@@ -147,8 +147,7 @@ static void check_positions(const char *path, double scale) {
 }
 
 /* The bend has targets of its own, and each lung its own gains. */
-static void test_glb_bent_basis_targets_make_the_library_s_positions(void **state) {
-  (void)state;
+TEST(test_glb_bent_basis_targets_make_the_library_s_positions) {
   char lungs[280];
   char path[280];
   (void)snprintf(lungs, sizeof lungs, "%s/bent.ply", folder);
@@ -178,8 +177,7 @@ static void test_glb_bent_basis_targets_make_the_library_s_positions(void **stat
   supine_export_source_close(&source);
 }
 
-static void test_glb_plain_targets_make_the_library_s_positions(void **state) {
-  (void)state;
+TEST(test_glb_plain_targets_make_the_library_s_positions) {
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out, "--plain"), 0);
   check_positions(vector, 0.7);
   assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--plain"), 0);
@@ -188,8 +186,7 @@ static void test_glb_plain_targets_make_the_library_s_positions(void **state) {
 
 /* Between the directions that are tried a weight may go past their extremes: a fiftieth of the
  * range is kept free at either end. */
-static void test_glb_weights_keep_a_margin(void **state) {
-  (void)state;
+TEST(test_glb_weights_keep_a_margin) {
   enum { TRIED = 4096 };
   export_source source = {0};
   export_breath breath;
@@ -225,8 +222,7 @@ static void test_glb_weights_keep_a_margin(void **state) {
 }
 
 /* Compressed arrays fill the file without gaps, and name what they decode to. */
-static void test_glb_compressed_views_are_whole(void **state) {
-  (void)state;
+TEST(test_glb_compressed_views_are_whole) {
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 0);
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -251,8 +247,7 @@ static void test_glb_compressed_views_are_whole(void **state) {
   free(bytes);
 }
 
-static void test_glb_has_an_animation_for_each_posture(void **state) {
-  (void)state;
+TEST(test_glb_has_an_animation_for_each_posture) {
   assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--animate"), 0);
   assert_non_null(strstr(text, "and animations"));
   unsigned char *bytes = NULL;
@@ -272,8 +267,7 @@ static void test_glb_has_an_animation_for_each_posture(void **state) {
   free(bytes);
 }
 
-static void test_glb_without_triangles_is_refused(void **state) {
-  (void)state;
+TEST(test_glb_without_triangles_is_refused) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/points", folder);
   fixture *f = fixture_create(4, 2, 1, 1, false, false, 5, 5); /* too few vertices for triangles */
@@ -283,14 +277,4 @@ static void test_glb_without_triangles_is_refused(void **state) {
   assert_non_null(strstr(text, "no triangles"));
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_glb_plain_targets_make_the_library_s_positions),
-      cmocka_unit_test(test_glb_bent_basis_targets_make_the_library_s_positions),
-      cmocka_unit_test(test_glb_weights_keep_a_margin),
-      cmocka_unit_test(test_glb_compressed_views_are_whole),
-      cmocka_unit_test(test_glb_has_an_animation_for_each_posture),
-      cmocka_unit_test(test_glb_without_triangles_is_refused),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -30,8 +30,7 @@ static int teardown(void **state) {
 }
 
 /* RFC 4648, section 10. */
-static void test_base64_of_known_texts(void **state) {
-  (void)state;
+TEST(test_base64_of_known_texts) {
   static const char *const pairs[][2] = {{"", ""},
                                          {"f", "Zg=="},
                                          {"fo", "Zm8="},
@@ -168,8 +167,7 @@ static void check_corners(const char *page, const uint32_t *corners, size_t coun
   free(found);
 }
 
-static void test_page_carries_the_basis(void **state) {
-  (void)state;
+TEST(test_page_carries_the_basis) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   char *page = read_page();
   export_source s = {0};
@@ -188,8 +186,7 @@ static void test_page_carries_the_basis(void **state) {
   free(page);
 }
 
-static void test_page_of_an_open_surface_has_no_volumes(void **state) {
-  (void)state;
+TEST(test_page_of_an_open_surface_has_no_volumes) {
   assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--scale", "12"), 0);
   char *page = read_page();
   assert_non_null(strstr(page, "&quot;hasVolume&quot;:false"));
@@ -198,8 +195,7 @@ static void test_page_of_an_open_surface_has_no_volumes(void **state) {
   free(page);
 }
 
-static void test_page_title_stays_text(void **state) {
-  (void)state;
+TEST(test_page_title_stays_text) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--title", "</script><b>&"), 0);
   char *page = read_page();
   assert_non_null(strstr(page, "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>"));
@@ -207,21 +203,11 @@ static void test_page_title_stays_text(void **state) {
   free(page);
 }
 
-static void test_page_of_too_many_modes_or_vectors_is_refused(void **state) {
-  (void)state;
+TEST(test_page_of_too_many_modes_or_vectors_is_refused) {
   assert_int_equal(EXPORT_RUN(text, many, "-o", out), 3);
   assert_non_null(strstr(text, "--modes 16"));
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 3);
   assert_non_null(strstr(text, "a vector basis"));
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_base64_of_known_texts),
-      cmocka_unit_test(test_page_carries_the_basis),
-      cmocka_unit_test(test_page_of_an_open_surface_has_no_volumes),
-      cmocka_unit_test(test_page_title_stays_text),
-      cmocka_unit_test(test_page_of_too_many_modes_or_vectors_is_refused),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -91,8 +91,7 @@ static double size_of(const double v[3]) {
 }
 
 /* On its nodes the field is the basis's; far outside it is 0; between, trilinear. */
-static void test_field_nodes_cells_and_border(void **state) {
-  (void)state;
+TEST(test_field_nodes_cells_and_border) {
   supine_field field = made_field();
   const supine_basis_info *info = supine_basis_get_info(grid);
   float *moved = malloc(3 * info->vertex_count * sizeof *moved);
@@ -131,8 +130,7 @@ static void test_field_nodes_cells_and_border(void **state) {
 
 /* Of a scan below full inflation the field counts from the scan: at its own state nothing moves,
  * and at another a point goes where it goes as content. */
-static void test_field_of_a_scan_below_full_counts_from_it(void **state) {
-  (void)state;
+TEST(test_field_of_a_scan_below_full_counts_from_it) {
   supine_inside_shells below;
   supine_inside_report report;
   supine_inside_content points = {.count = 1, .part_count = 1};
@@ -192,8 +190,7 @@ static void test_field_of_a_scan_below_full_counts_from_it(void **state) {
   grid = grid_kept;
 }
 
-static void test_field_inverse_composes_to_less_than_a_tenth(void **state) {
-  (void)state;
+TEST(test_field_inverse_composes_to_less_than_a_tenth) {
   supine_field field = made_field();
   supine_field inverse;
   supine_field_residual residual;
@@ -345,8 +342,7 @@ static void check_landmarks(const supine_image *image, bool labels) {
   assert_true(largest < 2.0);
 }
 
-static void test_resample_landmarks_land_where_the_points_do(void **state) {
-  (void)state;
+TEST(test_resample_landmarks_land_where_the_points_do) {
   for (int labels = 0; labels < 2; ++labels) {
     supine_image image = ball_image(labels ? SUPINE_VOXEL_U8 : SUPINE_VOXEL_I16);
     supine_image moved = {0};
@@ -384,8 +380,7 @@ static double mass_of(const supine_image *image, const supine_image *mask, doubl
 /* Lungs of -850 to -550 HU in a vacuum and in a wall of 40 HU, and masks that move with them:
  * within 1 %, while without scaling it changes by more than 5 % where no wall
  * is mixed in. */
-static void test_resample_density_keeps_the_mass_of_the_lungs(void **state) {
-  (void)state;
+TEST(test_resample_density_keeps_the_mass_of_the_lungs) {
   supine_field field;
   supine_field inverse;
   supine_field_residual residual;
@@ -476,16 +471,14 @@ static void check_warped_by(const char *asked, const char *command) {
   supine_image_free(&image);
 }
 
-static void test_plastimatch_warps_by_the_inverse_field(void **state) {
-  (void)state;
+TEST(test_plastimatch_warps_by_the_inverse_field) {
   check_warped_by("plastimatch --version",
                   "plastimatch warp --input balls.nrrd --fixed balls.nrrd --xf v.nrrd "
                   "--output-img warped.nrrd --output-type short >plastimatch.log 2>&1");
 }
 
 /* elastix's own transformix, with the field as a transform of its kind. */
-static void test_elastix_warps_by_the_inverse_field(void **state) {
-  (void)state;
+TEST(test_elastix_warps_by_the_inverse_field) {
   FILE *file = fopen(in_folder("field.txt"), "wb");
   assert_non_null(file);
   (void)fputs("(Transform \"DeformationFieldTransform\")\n(NumberOfParameters 0)\n"
@@ -507,8 +500,7 @@ static void test_elastix_warps_by_the_inverse_field(void **state) {
                   "mv result.nrrd warped.nrrd");
 }
 
-static void test_field_of_no_grid_refused(void **state) {
-  (void)state;
+TEST(test_field_of_no_grid_refused) {
   supine_field field;
   supine_error error;
   assert_int_equal(
@@ -518,8 +510,7 @@ static void test_field_of_no_grid_refused(void **state) {
 }
 
 /* A grid's tensors, one after the other made to lie. */
-static void test_field_malformed_grids_refused(void **state) {
-  (void)state;
+TEST(test_field_malformed_grids_refused) {
   const supine_basis_info *info = supine_basis_get_info(grid);
   const size_t n = info->vertex_count;
   uint32_t *part = malloc(n * sizeof *part);
@@ -557,17 +548,4 @@ static void test_field_malformed_grids_refused(void **state) {
   free(part);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_field_nodes_cells_and_border),
-      cmocka_unit_test(test_field_of_a_scan_below_full_counts_from_it),
-      cmocka_unit_test(test_field_inverse_composes_to_less_than_a_tenth),
-      cmocka_unit_test(test_resample_landmarks_land_where_the_points_do),
-      cmocka_unit_test(test_resample_density_keeps_the_mass_of_the_lungs),
-      cmocka_unit_test(test_plastimatch_warps_by_the_inverse_field),
-      cmocka_unit_test(test_elastix_warps_by_the_inverse_field),
-      cmocka_unit_test(test_field_of_no_grid_refused),
-      cmocka_unit_test(test_field_malformed_grids_refused),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -114,8 +114,7 @@ static void check_band_limited(const supine_fields *fields, size_t band) {
   supine_projection_compression_free(&field);
 }
 
-static void test_fit_band_limited_fields_come_back(void **state) {
-  (void)state;
+TEST(test_fit_band_limited_fields_come_back) {
   enum { COUNT = 40 };
   double directions[3 * COUNT];
   uint64_t seed = 17;
@@ -128,8 +127,7 @@ static void test_fit_band_limited_fields_come_back(void **state) {
 }
 
 /* The closed form of the leave-one-out error against fitting without each direction in turn. */
-static void test_fit_leave_one_out_equals_fitting_without(void **state) {
-  (void)state;
+TEST(test_fit_leave_one_out_equals_fitting_without) {
   enum { COUNT = 24, BAND = 2 };
   supine_fields fields = physics_fields(&lungs, COUNT, 99, 1.0);
   const size_t n = fields.vertex_count;
@@ -221,13 +219,11 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields_free(&others);
 }
 
-static void test_fit_stated_error_is_found_on_other_directions(void **state) {
-  (void)state;
+TEST(test_fit_stated_error_is_found_on_other_directions) {
   check_stated_error(&lungs, "phantom");
 }
 
-static void test_fit_real_lung_stated_error_is_found_on_other_directions(void **state) {
-  (void)state;
+TEST(test_fit_real_lung_stated_error_is_found_on_other_directions) {
   static const char *const names[] = {"lungs/chaste_left_5k.obj"};
   supine_lungs real = {0};
   if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &real)) {
@@ -264,8 +260,7 @@ static double gain_of_band_2(double amount, size_t *band) {
 }
 
 /* A higher band has to leave a hundredth less than the lower one does. */
-static void test_fit_band_that_gains_less_than_a_hundredth_is_not_kept(void **state) {
-  (void)state;
+TEST(test_fit_band_that_gains_less_than_a_hundredth_is_not_kept) {
   static const double wanted[] = {0.995, 0.985};
   for (size_t i = 0; i < 2; ++i) {
     double range[2] = {0.0, 2.0};
@@ -279,8 +274,7 @@ static void test_fit_band_that_gains_less_than_a_hundredth_is_not_kept(void **st
   }
 }
 
-static void test_fit_vector_volumes_exact(void **state) {
-  (void)state;
+TEST(test_fit_vector_volumes_exact) {
   supine_fields fields = physics_fields(&lungs, 30, 21, 1.0);
   const supine_fit_options options = {.band = -1, .modes = 8};
   const char *path = in_folder("volume.safetensors");
@@ -320,8 +314,7 @@ static void test_fit_vector_volumes_exact(void **state) {
   supine_fields_free(&fields);
 }
 
-static void test_fit_few_directions_say_what_they_reach(void **state) {
-  (void)state;
+TEST(test_fit_few_directions_say_what_they_reach) {
   supine_fields fields = physics_fields(&lungs, 10, 4, 1.0);
   supine_fit_options options = {.band = -1, .modes = 16};
   supine_compression field;
@@ -363,8 +356,7 @@ static void save_deformed(const char *name, double shift) {
   free(moved);
 }
 
-static void test_load_list_of_surfaces_gives_displacements(void **state) {
-  (void)state;
+TEST(test_load_list_of_surfaces_gives_displacements) {
   save_deformed("a.ply", 0.5);
   save_deformed("b.ply", -0.25);
   test_write(in_folder("list.csv"), "# two fields\ngx,gy,gz,file\n0,2,0,a.ply\n0,0,-1,b.ply\n");
@@ -383,8 +375,7 @@ static void test_load_list_of_surfaces_gives_displacements(void **state) {
   supine_fields_free(&fields);
 }
 
-static void test_load_bad_lists_name_line_and_remedy(void **state) {
-  (void)state;
+TEST(test_load_bad_lists_name_line_and_remedy) {
   save_deformed("a.ply", 0.5);
   supine_mesh other = helper_lump(3, 50.0, 3);
   assert_int_equal(supine_mesh_save(in_folder("other.ply"), &other, NULL, NULL), SUPINE_OK);
@@ -415,8 +406,7 @@ static void test_load_bad_lists_name_line_and_remedy(void **state) {
   expect_failure("nothing.csv", SUPINE_ERROR_READ, "nothing.csv");
 }
 
-static void test_load_tensors_checked(void **state) {
-  (void)state;
+TEST(test_load_tensors_checked) {
   const size_t n = lungs.mesh.vertex_count;
   double gravity[6] = {0, 1, 0, 0, 0, -2};
   float *displacement = calloc(6 * n, sizeof *displacement);
@@ -450,18 +440,4 @@ static void test_load_tensors_checked(void **state) {
   free(displacement);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_fit_band_limited_fields_come_back),
-      cmocka_unit_test(test_fit_leave_one_out_equals_fitting_without),
-      cmocka_unit_test(test_fit_stated_error_is_found_on_other_directions),
-      cmocka_unit_test(test_fit_real_lung_stated_error_is_found_on_other_directions),
-      cmocka_unit_test(test_fit_band_that_gains_less_than_a_hundredth_is_not_kept),
-      cmocka_unit_test(test_fit_vector_volumes_exact),
-      cmocka_unit_test(test_fit_few_directions_say_what_they_reach),
-      cmocka_unit_test(test_load_list_of_surfaces_gives_displacements),
-      cmocka_unit_test(test_load_bad_lists_name_line_and_remedy),
-      cmocka_unit_test(test_load_tensors_checked),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

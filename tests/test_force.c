@@ -28,7 +28,7 @@ static double height(const supine_lungs *lungs, const double *g, size_t i) {
   return g[0] * p[0] + g[1] * p[1] + g[2] * p[2];
 }
 
-static void test_height_range_random_directions_equals_brute_force(void **state) {
+TEST(test_height_range_random_directions_equals_brute_force) {
   const supine_lungs *lungs = *state;
   enum { COUNT = 77 };
   double g[3 * COUNT];
@@ -59,7 +59,7 @@ static void force_along(const supine_lungs *lungs, const supine_force_law *law, 
   supine_physics_force(lungs, law, &gravity, lungs->mesh.vertex_count, NULL, force);
 }
 
-static void test_force_default_law_is_height_zero_to_one(void **state) {
+TEST(test_force_default_law_is_height_zero_to_one) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   const supine_force_law law = supine_physics_model(SUPINE_LAW_PAPER).force;
@@ -86,7 +86,7 @@ static void test_force_default_law_is_height_zero_to_one(void **state) {
   free(up);
 }
 
-static void test_force_box_part_uses_box_coordinates(void **state) {
+TEST(test_force_box_part_uses_box_coordinates) {
   const supine_lungs *lungs = *state;
   const supine_force_law law = {.base = 0.5, .gain = 0.0, .box = {1.0, 10.0, 100.0}};
   const double g[3] = {0.0, 1.0, 0.0};
@@ -101,7 +101,7 @@ static void test_force_box_part_uses_box_coordinates(void **state) {
 }
 
 /* Softening multiplies the force by an expandability of geometric mean 1 that grows with height. */
-static void test_force_softened_follows_height(void **state) {
+TEST(test_force_softened_follows_height) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   supine_force_law law = {.base = 2.0};
@@ -123,7 +123,7 @@ static void test_force_softened_follows_height(void **state) {
 }
 
 /* Some vertices for several directions are what each is alone. */
-static void test_force_of_some_vertices_is_that_of_all(void **state) {
+TEST(test_force_of_some_vertices_is_that_of_all) {
   const supine_lungs *lungs = *state;
   enum { COUNT = 5 };
   const size_t n = lungs->mesh.vertex_count;
@@ -151,7 +151,7 @@ static void test_force_of_some_vertices_is_that_of_all(void **state) {
 }
 
 /* Neighbouring directions share the search for the lowest and highest vertex. */
-static void test_height_range_neighbouring_directions_equals_each_alone(void **state) {
+TEST(test_height_range_neighbouring_directions_equals_each_alone) {
   const supine_lungs *lungs = *state;
   enum { COUNT = 300 };
   double g[3 * COUNT];
@@ -173,8 +173,7 @@ static void test_height_range_neighbouring_directions_equals_each_alone(void **s
   }
 }
 
-static void test_directions_box_model_literal_values(void **state) {
-  (void)state;
+TEST(test_directions_box_model_literal_values) {
   /* A left lung 100 mm wide, 200 deep, 300 high, midline at its inner face x = 10. */
   double vertices[] = {10, 0, 0, 110, 0, 0, 10, 200, 0, 10, 0, 300, 60, 100, 150};
   uint32_t triangles[] = {0, 1, 2, 0, 3, 1, 1, 3, 4, 1, 4, 2, 0, 2, 3, 2, 4, 3};
@@ -201,7 +200,7 @@ static void test_directions_box_model_literal_values(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_directions_two_lungs_move_outwards(void **state) {
+TEST(test_directions_two_lungs_move_outwards) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   const supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
@@ -214,7 +213,7 @@ static void test_directions_two_lungs_move_outwards(void **state) {
   free(d);
 }
 
-static void test_directions_bad_constants_refused(void **state) {
+TEST(test_directions_bad_constants_refused) {
   double d[3];
   supine_error error;
   supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
@@ -227,17 +226,4 @@ static void test_directions_bad_constants_refused(void **state) {
   assert_non_null(strstr(error.message, "c5"));
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_height_range_random_directions_equals_brute_force),
-      cmocka_unit_test(test_force_default_law_is_height_zero_to_one),
-      cmocka_unit_test(test_force_box_part_uses_box_coordinates),
-      cmocka_unit_test(test_force_softened_follows_height),
-      cmocka_unit_test(test_force_of_some_vertices_is_that_of_all),
-      cmocka_unit_test(test_height_range_neighbouring_directions_equals_each_alone),
-      cmocka_unit_test(test_directions_box_model_literal_values),
-      cmocka_unit_test(test_directions_two_lungs_move_outwards),
-      cmocka_unit_test(test_directions_bad_constants_refused),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -84,8 +84,7 @@ static void expect_said(const outcome *out, const char *words) {
   }
 }
 
-static void test_axes_letters_all_48_come_back(void **state) {
-  (void)state;
+TEST(test_axes_letters_all_48_come_back) {
   for (int code = 1; code < SUPINE_AXES_COUNT; ++code) {
     char letters[4];
     supine_axes axes = SUPINE_AXES_AUTO;
@@ -102,8 +101,7 @@ static void test_axes_letters_all_48_come_back(void **state) {
   assert_false(supine_mesh_axes_parse("LPSX", &axes));
 }
 
-static void test_axes_apply_letters_say_which_way_each_grows(void **state) {
-  (void)state;
+TEST(test_axes_apply_letters_say_which_way_each_grows) {
   supine_axes axes = SUPINE_AXES_AUTO;
   double p[3] = {1.5, -2.25, 4.0};
   assert_true(supine_mesh_axes_parse("SRA", &axes)); /* up, right, front */
@@ -111,8 +109,7 @@ static void test_axes_apply_letters_say_which_way_each_grows(void **state) {
   assert_true(p[0] == 4.5 && p[1] == -8.0 && p[2] == 3.0);
 }
 
-static void test_gate_clean_lungs_nothing_said(void **state) {
-  (void)state;
+TEST(test_gate_clean_lungs_nothing_said) {
   supine_mesh mesh = phantom();
   const supine_mesh before = phantom();
   outcome out = pass(&mesh, NULL);
@@ -128,8 +125,7 @@ static void test_gate_clean_lungs_nothing_said(void **state) {
 }
 
 /* Each of the 47 other ways of reading a pair of lungs is found, and what mends it. */
-static void test_gate_any_other_axes_named(void **state) {
-  (void)state;
+TEST(test_gate_any_other_axes_named) {
   for (int code = 2; code < SUPINE_AXES_COUNT; ++code) {
     supine_mesh mesh = phantom();
     char wanted[32] = "add --axes ";
@@ -146,8 +142,7 @@ static void test_gate_any_other_axes_named(void **state) {
 }
 
 /* The message proposes axes for the file, not for the coordinates after a wrong --axes. */
-static void test_gate_axes_given_wrongly_right_ones_named(void **state) {
-  (void)state;
+TEST(test_gate_axes_given_wrongly_right_ones_named) {
   supine_mesh mesh = phantom();
   const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS, .axes_given = true};
   misread(&mesh, SUPINE_AXES_RAS); /* an LPS file, read as RAS */
@@ -157,8 +152,7 @@ static void test_gate_axes_given_wrongly_right_ones_named(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_gate_single_lung_side_by_shape(void **state) {
-  (void)state;
+TEST(test_gate_single_lung_side_by_shape) {
   static const char *const said[] = {"taken for the left by its shape",
                                      "taken for the right by its shape"};
   for (int right = 0; right < 2; ++right) {
@@ -179,8 +173,7 @@ static void test_gate_single_lung_side_by_shape(void **state) {
   }
 }
 
-static void test_gate_specks_dropped_and_told(void **state) {
-  (void)state;
+TEST(test_gate_specks_dropped_and_told) {
   enum { SPECKS = 10 };
   static const double at[4][3] = {
       {300, -300, 300}, {301, -300, 300}, {300, -299, 300}, {300, -300, 301}};
@@ -206,8 +199,7 @@ static void test_gate_specks_dropped_and_told(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_gate_duplicate_loose_reversed_triangles_mended(void **state) {
-  (void)state;
+TEST(test_gate_duplicate_loose_reversed_triangles_mended) {
   supine_mesh mesh = phantom();
   const supine_mesh before = phantom();
   uint32_t again[5][3];
@@ -232,8 +224,7 @@ static void test_gate_duplicate_loose_reversed_triangles_mended(void **state) {
 }
 
 /* More pieces than lobes, each too large for a speck: reported, as lungs may be among them. */
-static void test_gate_many_pieces_warned_of(void **state) {
-  (void)state;
+TEST(test_gate_many_pieces_warned_of) {
   supine_mesh mesh = phantom();
   for (int side = 0; side < 6; ++side) {
     double at[4][3];
@@ -252,8 +243,7 @@ static void test_gate_many_pieces_warned_of(void **state) {
 }
 
 /* Two lungs that share one vertex are still two. */
-static void test_gate_lungs_that_touch_parted(void **state) {
-  (void)state;
+TEST(test_gate_lungs_that_touch_parted) {
   supine_mesh mesh = phantom();
   const size_t half = mesh.vertex_count / 2;
   size_t inner[2] = {0, half}; /* of the left lung, the lowest x, of the right the highest */
@@ -275,8 +265,7 @@ static void test_gate_lungs_that_touch_parted(void **state) {
 }
 
 /* An ellipsoid with a waist, as wide as two lungs. */
-static void test_gate_both_lungs_in_one_piece_refused(void **state) {
-  (void)state;
+TEST(test_gate_both_lungs_in_one_piece_refused) {
   supine_mesh mesh = left_lung();
   double low[3];
   double high[3];
@@ -304,8 +293,7 @@ static void test_gate_both_lungs_in_one_piece_refused(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_gate_impossible_size_refused_unless_units_given(void **state) {
-  (void)state;
+TEST(test_gate_impossible_size_refused_unless_units_given) {
   supine_mesh mesh = phantom();
   for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
     mesh.vertices[i] *= 1e-3;
@@ -323,8 +311,7 @@ static void test_gate_impossible_size_refused_unless_units_given(void **state) {
 }
 
 /* Defects of closed surfaces one at a time: what is sound stays as it is. */
-static void test_repair_open_surface_left_alone(void **state) {
-  (void)state;
+TEST(test_repair_open_surface_left_alone) {
   supine_mesh mesh = phantom();
   supine_mesh_repair_report report;
   mesh.triangle_count -= 3; /* a hole */
@@ -333,23 +320,4 @@ static void test_repair_open_surface_left_alone(void **state) {
   assert_int_equal(report.duplicates + report.loose + report.reversed + report.parted, 0);
   assert_int_equal(mesh.triangle_count, count);
   supine_mesh_free(&mesh);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_axes_letters_all_48_come_back),
-      cmocka_unit_test(test_axes_apply_letters_say_which_way_each_grows),
-      cmocka_unit_test(test_gate_clean_lungs_nothing_said),
-      cmocka_unit_test(test_gate_any_other_axes_named),
-      cmocka_unit_test(test_gate_axes_given_wrongly_right_ones_named),
-      cmocka_unit_test(test_gate_single_lung_side_by_shape),
-      cmocka_unit_test(test_gate_specks_dropped_and_told),
-      cmocka_unit_test(test_gate_many_pieces_warned_of),
-      cmocka_unit_test(test_gate_duplicate_loose_reversed_triangles_mended),
-      cmocka_unit_test(test_gate_lungs_that_touch_parted),
-      cmocka_unit_test(test_gate_both_lungs_in_one_piece_refused),
-      cmocka_unit_test(test_gate_impossible_size_refused_unless_units_given),
-      cmocka_unit_test(test_repair_open_surface_left_alone),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -318,20 +318,10 @@ static void check_glsl(EGLenum api, const char *version) {
   (void)eglTerminate(display);
 }
 
-static void test_glsl_es300_equals_evaluator(void **state) {
-  (void)state;
+TEST(test_glsl_es300_equals_evaluator) {
   check_glsl(EGL_OPENGL_ES_API, "#version 300 es\nprecision highp float;\n");
 }
 
-static void test_glsl_330_core_equals_evaluator(void **state) {
-  (void)state;
+TEST(test_glsl_330_core_equals_evaluator) {
   check_glsl(EGL_OPENGL_API, "#version 330 core\n");
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_glsl_es300_equals_evaluator),
-      cmocka_unit_test(test_glsl_330_core_equals_evaluator),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

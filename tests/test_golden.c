@@ -53,20 +53,10 @@ static void check_golden(const char *path, const char *version, const char *chec
   supine_basis_close(basis);
 }
 
-static void test_open_version_1_same_numbers(void **state) {
-  (void)state;
+TEST(test_open_version_1_same_numbers) {
   check_golden(SUPINE_GOLDEN "/basis_1.safetensors", "1", "09c82e877f967eaf");
 }
 
-static void test_open_version_2_same_numbers(void **state) {
-  (void)state;
+TEST(test_open_version_2_same_numbers) {
   check_golden(SUPINE_GOLDEN "/basis_2.safetensors", "2", "xxh64:3898f5ec94e2adbe");
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_open_version_1_same_numbers),
-      cmocka_unit_test(test_open_version_2_same_numbers),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -59,8 +59,7 @@ static void check_same(const supine_image *a, const supine_image *b, double tole
   }
 }
 
-static void test_image_there_and_back_same(void **state) {
-  (void)state;
+TEST(test_image_there_and_back_same) {
   static const char *const names[] = {"a.nrrd", "a.nii", "a.nii.gz", "A.NRRD"};
   for (int voxel = 0; voxel < SUPINE_VOXEL_COUNT; ++voxel) {
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -93,8 +92,7 @@ static size_t read_bytes(const char *path, unsigned char *bytes, size_t room) {
   return size;
 }
 
-static void test_nrrd_in_ras_is_turned(void **state) {
-  (void)state;
+TEST(test_nrrd_in_ras_is_turned) {
   static const char text[] = "NRRD0004\ntype: uchar\ndimension: 3\n"
                              "space: right-anterior-superior\nsizes: 2 1 2\n"
                              "space directions: (2,0.5,0) (0,3,0) (0,0,4)\n"
@@ -118,8 +116,7 @@ static void test_nrrd_in_ras_is_turned(void **state) {
 }
 
 /* Other bytes first, and a slope: 348 bytes as the standard lays them out. */
-static void test_nifti_other_endianness_and_slope(void **state) {
-  (void)state;
+TEST(test_nifti_other_endianness_and_slope) {
   unsigned char bytes[352 + 120];
   supine_image image = made(SUPINE_VOXEL_I16, 5);
   supine_image back = {0};
@@ -163,8 +160,7 @@ static void check_refused(const char *name, supine_status expected, const char *
   assert_null(image.values);
 }
 
-static void test_nrrd_bad_files_refused(void **state) {
-  (void)state;
+TEST(test_nrrd_bad_files_refused) {
   static const struct {
     const char *header, *said;
   } bad[] = {
@@ -198,8 +194,7 @@ static void test_nrrd_bad_files_refused(void **state) {
   }
 }
 
-static void test_nifti_bad_files_refused(void **state) {
-  (void)state;
+TEST(test_nifti_bad_files_refused) {
   unsigned char bytes[472];
   unsigned char changed[472];
   supine_image image = made(SUPINE_VOXEL_I16, 5);
@@ -229,8 +224,7 @@ static void test_nifti_bad_files_refused(void **state) {
 }
 
 /* A checksum that is wrong is found, although every voxel could be read. */
-static void test_image_gzip_checksum_wrong_refused(void **state) {
-  (void)state;
+TEST(test_image_gzip_checksum_wrong_refused) {
   static const char *const names[] = {"c.nrrd", "c.nii.gz", "c.mha"};
   for (size_t i = 0; i < 3; ++i) {
     unsigned char bytes[4096];
@@ -244,8 +238,7 @@ static void test_image_gzip_checksum_wrong_refused(void **state) {
   }
 }
 
-static void test_image_truncated_gzip_refused(void **state) {
-  (void)state;
+TEST(test_image_truncated_gzip_refused) {
   static const char *const names[] = {"d.nrrd", "d.nii.gz", "d.mha"};
   for (size_t i = 0; i < 3; ++i) {
     unsigned char bytes[4096];
@@ -258,8 +251,7 @@ static void test_image_truncated_gzip_refused(void **state) {
   }
 }
 
-static void test_image_names_and_places_refused(void **state) {
-  (void)state;
+TEST(test_image_names_and_places_refused) {
   supine_image image = made(SUPINE_VOXEL_U8, 5);
   supine_error error;
   assert_true(supine_image_supports("x.NII.GZ") && supine_image_supports("x.nrrd"));
@@ -280,8 +272,7 @@ static void test_image_names_and_places_refused(void **state) {
   supine_image_free(&image);
 }
 
-static void test_image_set_rounds_and_clips(void **state) {
-  (void)state;
+TEST(test_image_set_rounds_and_clips) {
   supine_image image = made(SUPINE_VOXEL_I16, 5);
   supine_image_put(&image, 3, 1, &(double){7.6});
   supine_image_put(&image, 4, 1, &(double){4e4});
@@ -292,17 +283,4 @@ static void test_image_set_rounds_and_clips(void **state) {
   supine_image_free(&image);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_image_there_and_back_same),
-      cmocka_unit_test(test_nrrd_in_ras_is_turned),
-      cmocka_unit_test(test_nifti_other_endianness_and_slope),
-      cmocka_unit_test(test_nrrd_bad_files_refused),
-      cmocka_unit_test(test_nifti_bad_files_refused),
-      cmocka_unit_test(test_image_gzip_checksum_wrong_refused),
-      cmocka_unit_test(test_image_truncated_gzip_refused),
-      cmocka_unit_test(test_image_names_and_places_refused),
-      cmocka_unit_test(test_image_set_rounds_and_clips),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -114,8 +114,7 @@ static double slow_distance(const supine_inside_shell *shell, const double x[3])
   return best;
 }
 
-static void test_surface_find_side_and_distance_of_random_points(void **state) {
-  (void)state;
+TEST(test_surface_find_side_and_distance_of_random_points) {
   uint64_t seed = 71;
   for (int i = 0; i < 400; ++i) {
     const double share = 1.7 * helper_random(&seed);
@@ -134,8 +133,7 @@ static void test_surface_find_side_and_distance_of_random_points(void **state) {
   }
 }
 
-static void test_surface_find_near_place_same_answer(void **state) {
-  (void)state;
+TEST(test_surface_find_near_place_same_answer) {
   uint64_t seed = 5;
   supine_inside_place near = {0};
   for (int i = 0; i < 500; ++i) {
@@ -155,8 +153,7 @@ static void test_surface_find_near_place_same_answer(void **state) {
   }
 }
 
-static void test_surface_find_torn_surface_inside_stays_inside(void **state) {
-  (void)state;
+TEST(test_surface_find_torn_surface_inside_stays_inside) {
   const supine_inside_shell *shell = &shells.shell[0];
   supine_inside_surface *torn = NULL;
   uint64_t seed = 15; /* the first 12 triangles are missing */
@@ -172,8 +169,7 @@ static void test_surface_find_torn_surface_inside_stays_inside(void **state) {
   supine_inside_surface_destroy(torn);
 }
 
-static void test_biharmonic_centres_and_affine_come_back(void **state) {
-  (void)state;
+TEST(test_biharmonic_centres_and_affine_come_back) {
   enum { COUNT = 300, COLUMNS = 4, CENTRES = 120 };
   double points[3 * COUNT];
   double values[COUNT * COLUMNS];
@@ -206,8 +202,7 @@ static void test_biharmonic_centres_and_affine_come_back(void **state) {
   supine_inside_biharmonic_free(&fit);
 }
 
-static void test_biharmonic_points_in_a_plane_refused(void **state) {
-  (void)state;
+TEST(test_biharmonic_points_in_a_plane_refused) {
   const double points[] = {0, 0, 1, 3, 0, 1, 0, 4, 1, 7, 8, 1, 2, 9, 1};
   const double values[5] = {0};
   supine_inside_biharmonic fit;
@@ -273,8 +268,7 @@ static double farthest_from(const supine_inside_content *content, int mode) {
 
 /* Affine: to the rounding of float32 at 200 mm. Quadratic, which a surface's values alone do not
  * determine inside: 6.2 % of the largest motion here, at most. */
-static void test_embed_affine_exact_quadratic_near(void **state) {
-  (void)state;
+TEST(test_embed_affine_exact_quadratic_near) {
   supine_inside_content content = made_points(800, 0.0, 0.97, 21);
   const supine_inside_report report = embed(&content, false, 0);
   assert_int_equal(report.outside, 0);
@@ -295,8 +289,7 @@ static void test_embed_affine_exact_quadratic_near(void **state) {
 }
 
 /* With few centres too: 0.01 mm on every vertex and in every triangle, for all modes at once. */
-static void test_embed_points_of_the_surface_move_with_it(void **state) {
-  (void)state;
+TEST(test_embed_points_of_the_surface_move_with_it) {
   enum { COUNT = 600 };
   supine_inside_content content = made_points(COUNT, 1.0, 1.0, 33);
   double target[3 * COUNT];
@@ -338,8 +331,7 @@ static void test_embed_points_of_the_surface_move_with_it(void **state) {
 
 /* Content of a scan that was not at full inflation: it is where the scan had it, at the scan's own
  * state it comes back there, and on the scan's surface it moves with it. */
-static void test_embed_of_a_scan_below_full_inflation(void **state) {
-  (void)state;
+TEST(test_embed_of_a_scan_below_full_inflation) {
   enum { COUNT = 400 };
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned", folder);
@@ -406,8 +398,7 @@ static void test_embed_of_a_scan_below_full_inflation(void **state) {
   free(surface_scanned);
 }
 
-static void test_shells_of_a_scan_out_of_reach_refused(void **state) {
-  (void)state;
+TEST(test_shells_of_a_scan_out_of_reach_refused) {
   char path[80];
   supine_inside_shells none;
   supine_error error;
@@ -418,8 +409,7 @@ static void test_shells_of_a_scan_out_of_reach_refused(void **state) {
   supine_basis_close(far);
 }
 
-static void test_embed_file_shares_weights_volume_and_metadata(void **state) {
-  (void)state;
+TEST(test_embed_file_shares_weights_volume_and_metadata) {
   supine_inside_content content = made_points(40, 0.2, 0.9, 2);
   (void)embed(&content, false, 0);
   supine_basis *inside = helper_open(inside_path);
@@ -453,8 +443,7 @@ static void test_embed_file_shares_weights_volume_and_metadata(void **state) {
   supine_inside_content_free(&content);
 }
 
-static void test_embed_points_of_one_lung_file_has_both(void **state) {
-  (void)state;
+TEST(test_embed_points_of_one_lung_file_has_both) {
   supine_inside_content content = made_points(30, 0.2, 0.9, 2);
   for (int other = 0; other < 2; ++other) {
     for (size_t i = 0; i < content.count; ++i) {
@@ -472,8 +461,7 @@ static void test_embed_points_of_one_lung_file_has_both(void **state) {
   supine_inside_content_free(&content);
 }
 
-static void test_embed_outside_counted_and_clamped(void **state) {
-  (void)state;
+TEST(test_embed_outside_counted_and_clamped) {
   supine_inside_content content = made_points(50, 0.3, 0.9, 4);
   const double far[3] = {71.3, 3.1, 900.0};
   memcpy(content.points + (size_t)3 * 17, far, sizeof far);
@@ -508,8 +496,7 @@ static void test_embed_outside_counted_and_clamped(void **state) {
 }
 
 /* Every point inside lies in a cell whose eight corners are stored. */
-static void test_grid_cells_of_all_points_inside_are_whole(void **state) {
-  (void)state;
+TEST(test_grid_cells_of_all_points_inside_are_whole) {
   const supine_image like = {.size = {300, 260, 280},
                              .origin = {180.0, 120.0, -200.0},
                              .step = {{-0.96, 0.28, 0.0}, {-0.28, -0.96, 0.0}, {0.0, 0.0, 1.5}}};
@@ -556,8 +543,7 @@ static void test_grid_cells_of_all_points_inside_are_whole(void **state) {
   }
 }
 
-static void test_grid_bad_requests_refused(void **state) {
-  (void)state;
+TEST(test_grid_bad_requests_refused) {
   supine_inside_content content = {0};
   supine_error error;
   const supine_image elsewhere = {.size = {20, 20, 20},
@@ -577,8 +563,7 @@ static void test_grid_bad_requests_refused(void **state) {
                    SUPINE_ERROR_MESH);
 }
 
-static void test_content_points_names_axes_and_units(void **state) {
-  (void)state;
+TEST(test_content_points_names_axes_and_units) {
   char path[80];
   (void)snprintf(path, sizeof path, "%s/points.csv", folder);
   test_write(path, "name,x,y,z\ncarina,1,2,3\n# a remark\n,-4.5,5,6\n");
@@ -596,8 +581,7 @@ static void test_content_points_names_axes_and_units(void **state) {
   supine_inside_content_free(&content);
 }
 
-static void test_content_points_bad_files_refused(void **state) {
-  (void)state;
+TEST(test_content_points_bad_files_refused) {
   static const char *const bad[] = {"",
                                     "x,y\n1,2\n",
                                     "x,y,z\n",
@@ -621,8 +605,7 @@ static void test_content_points_bad_files_refused(void **state) {
                    SUPINE_ERROR_READ);
 }
 
-static void test_content_meshes_parts_and_triangles(void **state) {
-  (void)state;
+TEST(test_content_meshes_parts_and_triangles) {
   char path[80];
   (void)snprintf(path, sizeof path, "%s/nodule.obj", folder);
   test_write(path, "v 70 0 -40\nv 75 0 -40\nv 70 5 -40\nv 70 0 -35\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf "
@@ -693,8 +676,7 @@ static double misfit_turned(size_t count, const float *from, const float *to, si
 /* A tumour that keeps its size beside one that does not: given where a scan had it, there again in
  * the scan's state, of one volume in every pose, the best rigid motion of the field, and the same
  * through every call that places vertices. */
-static void test_embed_rigid_part_keeps_volume_and_follows_the_field(void **state) {
-  (void)state;
+TEST(test_embed_rigid_part_keeps_volume_and_follows_the_field) {
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned-rigid", folder);
   helper_write_scanned_basis(path, 10, 2, "0.6,0.8,0", "-900");
@@ -783,26 +765,4 @@ static void test_embed_rigid_part_keeps_volume_and_follows_the_field(void **stat
   supine_basis_close(scanned);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_surface_find_side_and_distance_of_random_points),
-      cmocka_unit_test(test_surface_find_near_place_same_answer),
-      cmocka_unit_test(test_surface_find_torn_surface_inside_stays_inside),
-      cmocka_unit_test(test_biharmonic_centres_and_affine_come_back),
-      cmocka_unit_test(test_biharmonic_points_in_a_plane_refused),
-      cmocka_unit_test(test_embed_affine_exact_quadratic_near),
-      cmocka_unit_test(test_embed_points_of_the_surface_move_with_it),
-      cmocka_unit_test(test_embed_of_a_scan_below_full_inflation),
-      cmocka_unit_test(test_shells_of_a_scan_out_of_reach_refused),
-      cmocka_unit_test(test_embed_file_shares_weights_volume_and_metadata),
-      cmocka_unit_test(test_embed_points_of_one_lung_file_has_both),
-      cmocka_unit_test(test_embed_outside_counted_and_clamped),
-      cmocka_unit_test(test_grid_cells_of_all_points_inside_are_whole),
-      cmocka_unit_test(test_grid_bad_requests_refused),
-      cmocka_unit_test(test_content_points_names_axes_and_units),
-      cmocka_unit_test(test_content_points_bad_files_refused),
-      cmocka_unit_test(test_content_meshes_parts_and_triangles),
-      cmocka_unit_test(test_embed_rigid_part_keeps_volume_and_follows_the_field),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -59,7 +59,7 @@ static void solve(const fixture *f, int k, const double *stiffness, double *caug
       SUPINE_OK);
 }
 
-static void test_force_comes_back_from_its_catch(void **state) {
+TEST(test_force_comes_back_from_its_catch) {
   const fixture *f = *state;
   const size_t n = f->lungs.mesh.vertex_count;
   double *caught = malloc(n * sizeof *caught);
@@ -78,8 +78,4 @@ static void test_force_comes_back_from_its_catch(void **state) {
   free(force);
 }
 
-int main(void) {
-  static const struct CMUnitTest tests[] = {
-      cmocka_unit_test_setup_teardown(test_force_comes_back_from_its_catch, setup, teardown)};
-  return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_GROUP(setup, teardown)

@@ -74,8 +74,7 @@ static void predict(const supine_kriging *fit, const supine_kriging_point *p, fl
   supine_kriging_predict(fit, &target, shift, variance);
 }
 
-static void test_kriging_leave_out_equals_fit_without_the_point(void **unused) {
-  (void)unused;
+TEST(test_kriging_leave_out_equals_fit_without_the_point) {
   uint64_t seed = 71;
   supine_kriging_point points[SEEN];
   const double terms[7] = {12, -7, 20, 0.8, 0.02, -0.01, 0.03};
@@ -114,8 +113,7 @@ static int by_value(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static void test_kriging_truth_from_the_model_has_the_stated_error(void **unused) {
-  (void)unused;
+TEST(test_kriging_truth_from_the_model_has_the_stated_error) {
   enum { SEEDS = 30 };
   double ratio[SEEDS];
   double held = 0;
@@ -161,8 +159,7 @@ static void test_kriging_truth_from_the_model_has_the_stated_error(void **unused
   free(space);
 }
 
-static void test_kriging_one_point_and_repeated_points_stay_positive_definite(void **unused) {
-  (void)unused;
+TEST(test_kriging_one_point_and_repeated_points_stay_positive_definite) {
   uint64_t seed = 5;
   supine_kriging_point points[12];
   double *space = fixture_allocate(supine_kriging_space(12), sizeof *space);
@@ -195,8 +192,7 @@ static void test_kriging_one_point_and_repeated_points_stay_positive_definite(vo
   free(space);
 }
 
-static void test_kriging_rotation_of_points_on_a_line_is_refused(void **unused) {
-  (void)unused;
+TEST(test_kriging_rotation_of_points_on_a_line_is_refused) {
   uint64_t seed = 9;
   supine_kriging_point points[4];
   double space[4 * 17];
@@ -213,14 +209,4 @@ static void test_kriging_rotation_of_points_on_a_line_is_refused(void **unused) 
   }
   assert_int_equal(supine_kriging_fit(&turned, 4, points, space, &fit, &error),
                    SUPINE_ERROR_ARGUMENT);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_kriging_leave_out_equals_fit_without_the_point),
-      cmocka_unit_test(test_kriging_truth_from_the_model_has_the_stated_error),
-      cmocka_unit_test(test_kriging_one_point_and_repeated_points_stay_positive_definite),
-      cmocka_unit_test(test_kriging_rotation_of_points_on_a_line_is_refused),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

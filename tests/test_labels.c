@@ -118,8 +118,7 @@ static double rms_from(const supine_inside_surface *truth, const made *out) {
 
 /* The acceptance of the whole: voxels of 1, 2, 3 mm bring the lungs back within 0.5, 1 and 2 % of
  * volume and half a voxel RMS. */
-static void test_labels_phantom_comes_back(void **state) {
-  (void)state;
+TEST(test_labels_phantom_comes_back) {
   supine_mesh phantom = {0};
   supine_inside_surface *truth = NULL;
   assert_int_equal(supine_phantom_create(20000, 6000.0, &phantom, NULL), SUPINE_OK);
@@ -181,8 +180,7 @@ static supine_image relabelled(const supine_image *from, const uint8_t left[2],
   return image;
 }
 
-static void test_labels_conventions_same_lungs(void **state) {
-  (void)state;
+TEST(test_labels_conventions_same_lungs) {
   static const struct {
     uint8_t left[2], right[3];
     const char *options[3]; /* that are the same, ended by NULL after the first */
@@ -219,8 +217,7 @@ static void test_labels_conventions_same_lungs(void **state) {
 }
 
 /* All of a TotalSegmentator map, other organs among it; and a file a lobe. */
-static void test_labels_other_organs_and_files_of_lobes(void **state) {
-  (void)state;
+TEST(test_labels_other_organs_and_files_of_lobes) {
   static const uint8_t left[2] = {11, 10};
   static const uint8_t right[3] = {14, 13, 12};
   supine_image image = helper_two_lungs(4.0);
@@ -263,8 +260,7 @@ static void test_labels_other_organs_and_files_of_lobes(void **state) {
 }
 
 /* A lung alone has to be named. */
-static void test_labels_one_lung_named(void **state) {
-  (void)state;
+TEST(test_labels_one_lung_named) {
   supine_image image = helper_two_lungs(4.0);
   const supine_labels_options left = {.labels = "left=2", .edge = 5.0};
   const supine_labels_options both = {.edge = 5.0};
@@ -290,8 +286,7 @@ static void box_set(supine_image *image, const size_t low[3], const size_t high[
   }
 }
 
-static void test_labels_touching_lungs_parted(void **state) {
-  (void)state;
+TEST(test_labels_touching_lungs_parted) {
   supine_image image = helper_two_lungs(4.0);
   const size_t left = count_label(&image, 2);
   const size_t right = count_label(&image, 1);
@@ -317,8 +312,7 @@ static void test_labels_touching_lungs_parted(void **state) {
   supine_image_free(&image);
 }
 
-static void test_labels_islands_cavities_gaps_counted(void **state) {
-  (void)state;
+TEST(test_labels_islands_cavities_gaps_counted) {
   supine_image image = helper_two_lungs(4.0);
   const double voxel = 0.064;
   const double left = voxel * (double)count_label(&image, 2);
@@ -368,8 +362,7 @@ static void test_labels_islands_cavities_gaps_counted(void **state) {
 }
 
 /* Every flip of the axes says what it is, and a map that lies about them is found out. */
-static void test_labels_anatomy_against_the_header(void **state) {
-  (void)state;
+TEST(test_labels_anatomy_against_the_header) {
   static const double spacing[3] = {4.0, 4.0, 4.0};
   const supine_labels_options options = {.labels = "one", .edge = 5.0};
   supine_mesh phantom = {0};
@@ -417,8 +410,7 @@ static void test_labels_anatomy_against_the_header(void **state) {
   supine_image_free(&image);
 }
 
-static void test_labels_cut_at_the_border_counted(void **state) {
-  (void)state;
+TEST(test_labels_cut_at_the_border_counted) {
   supine_image image = helper_two_lungs(4.0);
   const size_t layer = image.size[0] * image.size[1];
   size_t cut[2] = {0, 0};
@@ -464,8 +456,7 @@ static double farthest_of(const supine_image *image, uint8_t label, const supine
   return sqrt(farthest);
 }
 
-static void test_labels_farthest_is_true(void **state) {
-  (void)state;
+TEST(test_labels_farthest_is_true) {
   supine_image image = helper_two_lungs(13.0);
   image.step[2][2] = 17.0;
   const double edges[] = {9.0, 13.0, 19.0};
@@ -486,8 +477,7 @@ static void test_labels_farthest_is_true(void **state) {
 }
 
 /* Whatever the mask, the surface is one closed manifold. */
-static void test_labels_noise_closed_manifold(void **state) {
-  (void)state;
+TEST(test_labels_noise_closed_manifold) {
   uint64_t seed = 7;
   for (int trial = 0; trial < 6; ++trial) {
     const double density = 0.35 + 0.11 * trial;
@@ -525,8 +515,7 @@ static void test_labels_noise_closed_manifold(void **state) {
 }
 
 /* Distances against all pairs, in boxes that are no cubes. */
-static void test_distance_against_all_pairs(void **state) {
-  (void)state;
+TEST(test_distance_against_all_pairs) {
   uint64_t seed = 11;
   labels_mask mask = {.size = {9, 13, 7}, .spacing = {0.7, 1.3, 2.9}};
   const size_t count = supine_labels_mask_count(&mask);
@@ -571,8 +560,7 @@ static void refused(const char *name, const supine_labels_options *options, supi
 }
 
 /* A ball in two pieces and a tube, in voxels that are no cubes, each with its surface. */
-static void test_labels_shapes_of_any_label(void **state) {
-  (void)state;
+TEST(test_labels_shapes_of_any_label) {
   supine_image image = {.voxel = SUPINE_VOXEL_U16, .channels = 1, .size = {60, 50, 40}};
   static const double spacing[3] = {0.8, 0.9, 1.3};
   image.values = calloc(voxels(&image), sizeof(uint16_t));
@@ -648,8 +636,7 @@ static void test_labels_shapes_of_any_label(void **state) {
   supine_image_free(&image);
 }
 
-static void test_labels_bad_maps_refused(void **state) {
-  (void)state;
+TEST(test_labels_bad_maps_refused) {
   const supine_labels_options plain = {.edge = 5.0};
   supine_image image = helper_two_lungs(4.0);
   uint8_t *at = image.values;
@@ -718,8 +705,7 @@ static void test_labels_bad_maps_refused(void **state) {
   supine_image_free(&image);
 }
 
-static void test_labels_voxels_that_are_none_refused(void **state) {
-  (void)state;
+TEST(test_labels_voxels_that_are_none_refused) {
   static const struct {
     supine_image_voxel voxel;
     double value;
@@ -752,8 +738,7 @@ static void test_labels_voxels_that_are_none_refused(void **state) {
 }
 
 /* Damaged files, of which the image reader's own test has more. */
-static void test_labels_damaged_files_refused(void **state) {
-  (void)state;
+TEST(test_labels_damaged_files_refused) {
   const supine_labels_options plain = {.edge = 5.0};
   supine_image image = helper_two_lungs(8.0);
   assert_int_equal(supine_image_write(in_folder("whole.nii.gz"), &image, NULL, NULL), SUPINE_OK);
@@ -782,8 +767,7 @@ static bool stop_at(void *context, double fraction) {
   return (*left)-- > 0;
 }
 
-static void test_labels_interrupted_anywhere_leaves_nothing(void **state) {
-  (void)state;
+TEST(test_labels_interrupted_anywhere_leaves_nothing) {
   supine_image image = helper_two_lungs(8.0);
   assert_int_equal(supine_image_write(in_folder("stop.nrrd"), &image, NULL, NULL), SUPINE_OK);
   long calls = 0;
@@ -806,24 +790,4 @@ static void test_labels_interrupted_anywhere_leaves_nothing(void **state) {
   supine_image_free(&image);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_distance_against_all_pairs),
-      cmocka_unit_test(test_labels_phantom_comes_back),
-      cmocka_unit_test(test_labels_conventions_same_lungs),
-      cmocka_unit_test(test_labels_other_organs_and_files_of_lobes),
-      cmocka_unit_test(test_labels_one_lung_named),
-      cmocka_unit_test(test_labels_touching_lungs_parted),
-      cmocka_unit_test(test_labels_islands_cavities_gaps_counted),
-      cmocka_unit_test(test_labels_anatomy_against_the_header),
-      cmocka_unit_test(test_labels_cut_at_the_border_counted),
-      cmocka_unit_test(test_labels_farthest_is_true),
-      cmocka_unit_test(test_labels_noise_closed_manifold),
-      cmocka_unit_test(test_labels_shapes_of_any_label),
-      cmocka_unit_test(test_labels_bad_maps_refused),
-      cmocka_unit_test(test_labels_voxels_that_are_none_refused),
-      cmocka_unit_test(test_labels_damaged_files_refused),
-      cmocka_unit_test(test_labels_interrupted_anywhere_leaves_nothing),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

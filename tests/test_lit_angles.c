@@ -138,8 +138,7 @@ static void check_real(const char *left, const char *right, supine_axes axes, do
   supine_lungs_free(&lungs);
 }
 
-static void test_made_lungs_as_said(void **state) {
-  (void)state;
+TEST(test_made_lungs_as_said) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
   assert_int_equal(supine_phantom_create(8000, 6000.0, &mesh, NULL), SUPINE_OK);
@@ -149,33 +148,18 @@ static void test_made_lungs_as_said(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_adult_as_said(void **state) {
-  (void)state;
+TEST(test_adult_as_said) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 0.0, 16);
 }
 
-static void test_adult_softened_sixteen_modes_as_said(void **state) {
-  (void)state;
+TEST(test_adult_softened_sixteen_modes_as_said) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 1.0, 16);
 }
 
-static void test_001_as_said(void **state) {
-  (void)state;
+TEST(test_001_as_said) {
   check_real("covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS, 0.0, 16);
 }
 
-static void test_005_as_said(void **state) {
-  (void)state;
+TEST(test_005_as_said) {
   check_real("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS, 0.0, 16);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_made_lungs_as_said),
-      cmocka_unit_test(test_adult_as_said),
-      cmocka_unit_test(test_adult_softened_sixteen_modes_as_said),
-      cmocka_unit_test(test_001_as_said),
-      cmocka_unit_test(test_005_as_said),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

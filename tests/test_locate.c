@@ -116,8 +116,8 @@ static supine_location locate(world *w, const supine_state *state, bool rigid) {
   return found;
 }
 
-static void test_locate_law_as_truth_is_found(void **of) {
-  world *w = *of;
+TEST(test_locate_law_as_truth_is_found) {
+  world *w = *state;
   const supine_state truth = state_of("prone:rest+300");
   const supine_state posture = state_of("prone");
   double held[2];
@@ -138,8 +138,8 @@ static void test_locate_law_as_truth_is_found(void **of) {
   }
 }
 
-static void test_locate_given_volume_stays(void **of) {
-  world *w = *of;
+TEST(test_locate_given_volume_stays) {
+  world *w = *state;
   const supine_state truth = state_of("prone:rest+300");
   observe(w, &truth, false);
   const supine_location found = locate(w, &truth, false);
@@ -148,8 +148,8 @@ static void test_locate_given_volume_stays(void **of) {
   assert_true(miss(w, &found, &truth, false) < 0.05);
 }
 
-static void test_locate_wrong_point_is_named_and_moves_nothing(void **of) {
-  world *w = *of;
+TEST(test_locate_wrong_point_is_named_and_moves_nothing) {
+  world *w = *state;
   const supine_state truth = state_of("left:full-700"); /* where points are known to 10 mm */
   const supine_state posture = state_of("left");
   observe(w, &truth, false);
@@ -175,8 +175,8 @@ static void test_locate_wrong_point_is_named_and_moves_nothing(void **of) {
   }
 }
 
-static void test_locate_error_is_never_above_that_without_points(void **of) {
-  world *w = *of;
+TEST(test_locate_error_is_never_above_that_without_points) {
+  world *w = *state;
   const supine_state truth = state_of("supine:scan-900");
   float expected[VERTICES];
   float xyz[3 * VERTICES];
@@ -195,8 +195,8 @@ static void test_locate_error_is_never_above_that_without_points(void **of) {
   }
 }
 
-static void test_locate_one_point_leaves_no_residual(void **of) {
-  world *w = *of;
+TEST(test_locate_one_point_leaves_no_residual) {
+  world *w = *state;
   const supine_state truth = state_of("supine:scan-900");
   observe(w, &truth, false);
   for (size_t count = 1; count < 3; ++count) {
@@ -209,8 +209,8 @@ static void test_locate_one_point_leaves_no_residual(void **of) {
   }
 }
 
-static void test_locate_bad_task_is_refused(void **of) {
-  world *w = *of;
+TEST(test_locate_bad_task_is_refused) {
+  world *w = *state;
   const supine_state truth = state_of("supine:rest");
   observe(w, &truth, false);
   const supine_observation good = w->seen[0];
@@ -246,33 +246,33 @@ static void test_locate_bad_task_is_refused(void **of) {
 }
 
 /* sigma^2 = |u| min(4.5, RMS of u), and where rest is assumed what 5 % of full inflation moves. */
-static void test_expected_error_follows_its_formula(void **of) {
-  world *w = *of;
+TEST(test_expected_error_follows_its_formula) {
+  world *w = *state;
   const supine_basis_info *info = supine_basis_get_info(w->basis);
   const double full = info->reference_volume[0] + info->reference_volume[1];
   const char *const states[] = {"prone:scan-900", "supine:scan-20", "left:rest+100"};
   for (size_t s = 0; s < 3; ++s) {
-    const supine_state state = state_of(states[s]);
+    const supine_state asked = state_of(states[s]);
     const supine_state scan = supine_basis_scan(w->basis);
-    supine_state fuller = state;
+    supine_state fuller = asked;
     fuller.volume.ml += 0.05 * full;
     float x[3][3 * VERTICES];
     float sigma[VERTICES];
     double squares = 0;
-    deform(w->basis, &state, x[0]);
+    deform(w->basis, &asked, x[0]);
     deform(w->basis, &scan, x[1]);
     deform(w->basis, &fuller, x[2]);
     for (size_t i = 0; i < (size_t)3 * VERTICES; ++i) {
       squares += pow((double)(x[0][i] - x[1][i]), 2) / VERTICES;
     }
     const double c = fmin(4.5, sqrt(squares));
-    assert_int_equal(supine_expected_error(w->basis, &state, NULL, sigma, NULL), SUPINE_OK);
+    assert_int_equal(supine_expected_error(w->basis, &asked, NULL, sigma, NULL), SUPINE_OK);
     for (size_t i = 0; i < VERTICES; ++i) {
       double u = 0;
       double slope = 0;
       for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
         u += pow((double)(x[0][j] - x[1][j]), 2);
-        slope += state.volume.kind == SUPINE_VOLUME_REST ? pow((double)(x[2][j] - x[0][j]), 2) : 0;
+        slope += asked.volume.kind == SUPINE_VOLUME_REST ? pow((double)(x[2][j] - x[0][j]), 2) : 0;
       }
       const double expected = sqrt(c * sqrt(u) + slope);
       assert_true(fabs((double)sigma[i] - expected) < 1e-3 + 0.03 * expected);
@@ -286,15 +286,4 @@ static void test_expected_error_follows_its_formula(void **of) {
   }
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_locate_law_as_truth_is_found),
-      cmocka_unit_test(test_locate_given_volume_stays),
-      cmocka_unit_test(test_locate_wrong_point_is_named_and_moves_nothing),
-      cmocka_unit_test(test_locate_error_is_never_above_that_without_points),
-      cmocka_unit_test(test_locate_one_point_leaves_no_residual),
-      cmocka_unit_test(test_locate_bad_task_is_refused),
-      cmocka_unit_test(test_expected_error_follows_its_formula),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -9,8 +9,7 @@
 
 #include "lungs_helpers.h"
 
-static void test_lungs_two_files_any_order_left_first(void **state) {
-  (void)state;
+TEST(test_lungs_two_files_any_order_left_first) {
   for (int swap = 0; swap < 2; ++swap) {
     supine_mesh lumps[2] = {helper_lump(5, swap ? -80.0 : 90.0, 3),
                             helper_lump(6, swap ? 90.0 : -80.0, 4)};
@@ -34,8 +33,7 @@ static void test_lungs_two_files_any_order_left_first(void **state) {
 }
 
 /* One file whose vertices alternate between the lungs. */
-static void test_lungs_interleaved_file_is_grouped(void **state) {
-  (void)state;
+TEST(test_lungs_interleaved_file_is_grouped) {
   supine_mesh lumps[2] = {helper_lump(4, -80.0, 3), helper_lump(4, 90.0, 4)};
   const size_t n = lumps[0].vertex_count;
   supine_mesh both = {2 * n, malloc(6 * n * sizeof(double)), 2 * lumps[0].triangle_count,
@@ -65,8 +63,7 @@ static void test_lungs_interleaved_file_is_grouped(void **state) {
   supine_mesh_free(&lumps[1]);
 }
 
-static void test_lungs_one_file_midline_is_inner_face(void **state) {
-  (void)state;
+TEST(test_lungs_one_file_midline_is_inner_face) {
   static const double places[] = {90.0, -90.0};
   for (size_t m = 0; m < 2; ++m) {
     supine_mesh lump = helper_lump(5, places[m], 3);
@@ -90,8 +87,7 @@ static void test_lungs_one_file_midline_is_inner_face(void **state) {
 
 /* X runs from the midline outwards on either side: from the first vertex of each lung to its last.
  */
-static void test_lungs_box_of_either_lung_counts_outwards(void **state) {
-  (void)state;
+TEST(test_lungs_box_of_either_lung_counts_outwards) {
   supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(5, -80.0, 4)};
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
@@ -108,8 +104,7 @@ static void test_lungs_box_of_either_lung_counts_outwards(void **state) {
   supine_mesh_free(&lumps[1]);
 }
 
-static void test_lungs_given_midline_decides(void **state) {
-  (void)state;
+TEST(test_lungs_given_midline_decides) {
   supine_mesh lump = helper_lump(5, 90.0, 3);
   supine_lungs lungs = {0};
   double midline = 300.0;
@@ -130,8 +125,7 @@ static void turn_inwards(supine_mesh *mesh, size_t first) {
   }
 }
 
-static void test_lungs_inward_are_turned_round_and_told(void **state) {
-  (void)state;
+TEST(test_lungs_inward_are_turned_round_and_told) {
   for (int which = 0; which < 4; ++which) { /* bit 0: the left, bit 1: the right */
     supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
     const double volume = supine_mesh_volume(&lumps[0]) + supine_mesh_volume(&lumps[1]);
@@ -153,8 +147,7 @@ static void test_lungs_inward_are_turned_round_and_told(void **state) {
 }
 
 /* Triangles of one piece that disagree have no inside: the surface counts as open. */
-static void test_lungs_half_inward_is_not_closed(void **state) {
-  (void)state;
+TEST(test_lungs_half_inward_is_not_closed) {
   supine_mesh lump = helper_lump(5, 90.0, 3);
   turn_inwards(&lump, lump.triangle_count / 2);
   supine_lungs lungs = {0};
@@ -177,8 +170,7 @@ static void expect_refused(const supine_mesh *meshes, size_t count, const double
   assert_null(lungs.mesh.vertices);
 }
 
-static void test_lungs_given_twice_refused_at_any_resolution(void **state) {
-  (void)state;
+TEST(test_lungs_given_twice_refused_at_any_resolution) {
   supine_mesh lumps[3] = {helper_lump(20, 90.0, 3), helper_lump(6, -80.0, 4),
                           helper_lump(20, 90.0, 3)};
   expect_refused(lumps, 3, NULL, "surfaces 1 and 3 fill the same box: give each lung once");
@@ -190,8 +182,7 @@ static void test_lungs_given_twice_refused_at_any_resolution(void **state) {
   }
 }
 
-static void test_lungs_crumb_beside_a_lung_refused(void **state) {
-  (void)state;
+TEST(test_lungs_crumb_beside_a_lung_refused) {
   supine_mesh lump = helper_lump(6, 90.0, 3);
   double vertices[] = {-81.3, 12.0, 33.1, -80.1, 12.6, 34.0, -79.9, 13.5, 33.3};
   uint32_t triangles[] = {0, 1, 2};
@@ -203,8 +194,7 @@ static void test_lungs_crumb_beside_a_lung_refused(void **state) {
   supine_mesh_free(&lump);
 }
 
-static void test_lungs_midline_out_of_place_refused(void **state) {
-  (void)state;
+TEST(test_lungs_midline_out_of_place_refused) {
   supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
   double midline = 400.0;
   expect_refused(lumps, 2, &midline, "x = 400 mm leaves both lungs on its right side");
@@ -223,8 +213,7 @@ static void test_lungs_midline_out_of_place_refused(void **state) {
   supine_mesh_free(&lumps[1]);
 }
 
-static void test_lungs_debris_does_not_make_a_lung(void **state) {
-  (void)state;
+TEST(test_lungs_debris_does_not_make_a_lung) {
   supine_mesh meshes[2] = {helper_lump(12, 90.0, 3), helper_lump(2, 20.0, 4)};
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(meshes, 2, NULL, &lungs, NULL), SUPINE_OK);
@@ -234,8 +223,7 @@ static void test_lungs_debris_does_not_make_a_lung(void **state) {
   supine_mesh_free(&meshes[1]);
 }
 
-static void test_lungs_flat_or_empty_surface_refused(void **state) {
-  (void)state;
+TEST(test_lungs_flat_or_empty_surface_refused) {
   double vertices[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   uint32_t triangles[] = {0, 1, 2};
   const supine_mesh flat = {3, vertices, 1, triangles};
@@ -247,8 +235,7 @@ static void test_lungs_flat_or_empty_surface_refused(void **state) {
   assert_int_equal(supine_lungs_create(&empty, 1, NULL, &lungs, &error), SUPINE_ERROR_MESH);
 }
 
-static void test_phantom_pair_is_closed_and_has_its_volume(void **state) {
-  (void)state;
+TEST(test_phantom_pair_is_closed_and_has_its_volume) {
   static const size_t sizes[] = {84, 1000, 5000, 30000};
   for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {
     supine_mesh mesh = {0};
@@ -273,8 +260,7 @@ static void test_phantom_pair_is_closed_and_has_its_volume(void **state) {
 
 /* Every harmonic of either lung, and the place of both: a sum over the vertices in which none of
  * them cancels. The sums are what the shape gave when it was made. */
-static void test_phantom_keeps_its_shape(void **state) {
-  (void)state;
+TEST(test_phantom_keeps_its_shape) {
   static const double made[2] = {-542.627977, 212.207209};
   supine_mesh mesh = {0};
   assert_int_equal(supine_phantom_create(1000, 6000.0, &mesh, NULL), SUPINE_OK);
@@ -316,8 +302,7 @@ static double gained(const supine_lungs *lungs, size_t lung, const double *d, co
   return volume;
 }
 
-static void test_volume_forms_equal_measured_volume(void **state) {
-  (void)state;
+TEST(test_volume_forms_equal_measured_volume) {
   enum { COLUMNS = 5 };
   supine_mesh lumps[2] = {helper_lump(7, 90.0, 3), helper_lump(8, -85.0, 4)};
   supine_lungs lungs = {0};
@@ -374,25 +359,4 @@ static void test_volume_forms_equal_measured_volume(void **state) {
   free(columns);
   free(vectors);
   free(d);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_lungs_two_files_any_order_left_first),
-      cmocka_unit_test(test_lungs_interleaved_file_is_grouped),
-      cmocka_unit_test(test_lungs_one_file_midline_is_inner_face),
-      cmocka_unit_test(test_lungs_box_of_either_lung_counts_outwards),
-      cmocka_unit_test(test_lungs_given_midline_decides),
-      cmocka_unit_test(test_lungs_inward_are_turned_round_and_told),
-      cmocka_unit_test(test_lungs_half_inward_is_not_closed),
-      cmocka_unit_test(test_lungs_given_twice_refused_at_any_resolution),
-      cmocka_unit_test(test_lungs_crumb_beside_a_lung_refused),
-      cmocka_unit_test(test_lungs_midline_out_of_place_refused),
-      cmocka_unit_test(test_lungs_debris_does_not_make_a_lung),
-      cmocka_unit_test(test_lungs_flat_or_empty_surface_refused),
-      cmocka_unit_test(test_phantom_pair_is_closed_and_has_its_volume),
-      cmocka_unit_test(test_phantom_keeps_its_shape),
-      cmocka_unit_test(test_volume_forms_equal_measured_volume),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -61,7 +61,7 @@ static unsigned char *saved_box(void **state, const char *name, size_t *size) {
   return bytes;
 }
 
-static void test_truncated_binary_every_length_format(void **state) {
+TEST(test_truncated_binary_every_length_format) {
   static const char *const names[] = {"a.ply", "a.stl"};
   for (size_t k = 0; k < 2; ++k) {
     size_t size = 0;
@@ -79,7 +79,7 @@ static void test_truncated_binary_every_length_format(void **state) {
   "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 #define PLY_BODY "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
 
-static void test_truncated_text_every_length_format(void **state) {
+TEST(test_truncated_text_every_length_format) {
   static const struct {
     const char *name;
     const char *text;
@@ -98,7 +98,7 @@ static void test_truncated_text_every_length_format(void **state) {
   }
 }
 
-static void test_truncated_obj_every_length_read_or_refused(void **state) {
+TEST(test_truncated_obj_every_length_read_or_refused) {
   static const char text[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf -1 -2 -3\n";
   char path[256];
   for (size_t length = 0; length < sizeof text; ++length) {
@@ -109,7 +109,7 @@ static void test_truncated_obj_every_length_read_or_refused(void **state) {
 
 #define PLY_ASCII "ply\nformat ascii 1.0\n"
 
-static void test_ply_header_illegal_format(void **state) {
+TEST(test_ply_header_illegal_format) {
   static const char *const texts[] = {
       "plx\nformat ascii 1.0\n" PLY_HEAD PLY_BODY,
       "ply\n" PLY_HEAD PLY_BODY,
@@ -137,7 +137,7 @@ static void test_ply_header_illegal_format(void **state) {
   }
 }
 
-static void test_ply_header_too_many_parts_format(void **state) {
+TEST(test_ply_header_too_many_parts_format) {
   char text[16384];
   for (int kind = 0; kind < 2; ++kind) {
     int length = snprintf(text, sizeof text, PLY_ASCII "element first 0\n");
@@ -150,7 +150,7 @@ static void test_ply_header_too_many_parts_format(void **state) {
   }
 }
 
-static void test_ply_body_illegal_format(void **state) {
+TEST(test_ply_body_illegal_format) {
   static const char *const bodies[] = {
       "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n",   /* no vertex 3 */
       "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",  /* a negative one */
@@ -172,7 +172,7 @@ static void test_ply_body_illegal_format(void **state) {
 }
 
 /* Words that assimp 5.2 takes for counts, elements or coordinates. */
-static void test_ply_odd_but_legal_read(void **state) {
+TEST(test_ply_odd_but_legal_read) {
   static const char *const texts[] = {
       PLY_ASCII "comment 3 lungs\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "comment 4000000000 lungs\n" PLY_HEAD PLY_BODY,
@@ -202,7 +202,7 @@ static size_t append(unsigned char *bytes, size_t at, uint32_t bits, bool big) {
 }
 
 /* A binary PLY whose first byte is LF, in both byte orders, with an element before and after. */
-static void test_ply_binary_first_byte_line_feed_read(void **state) {
+TEST(test_ply_binary_first_byte_line_feed_read) {
   for (int big = 0; big < 2; ++big) {
     unsigned char bytes[512] = {0};
     size_t at = (size_t)snprintf(
@@ -258,7 +258,7 @@ static void refuse_bytes(void **state, const void *bytes, size_t size, const cha
   assert_int_equal(unlink(path), 0);
 }
 
-static void test_ply_list_of_negative_length_refused(void **state) {
+TEST(test_ply_list_of_negative_length_refused) {
   static const char ascii[] = PLY_ASCII
       "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
       "property list int int vertex_indices\nend_header\n1 2 3\n-3 0 0 0\n";
@@ -278,7 +278,7 @@ static void test_ply_list_of_negative_length_refused(void **state) {
   }
 }
 
-static void test_ply_no_surface_mesh(void **state) {
+TEST(test_ply_no_surface_mesh) {
   static const char *const texts[] = {
       PLY_ASCII "element vertex 1\nproperty float x\nproperty float y\nproperty float "
                 "z\nend_header\n1 2 3\n",
@@ -292,7 +292,7 @@ static void test_ply_no_surface_mesh(void **state) {
   }
 }
 
-static void test_stl_and_obj_garbage_format(void **state) {
+TEST(test_stl_and_obj_garbage_format) {
   expect_text(state, "a.stl",
               "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 "
               "0\nendloop\nendfacet\nendsolid\n",
@@ -336,8 +336,7 @@ static size_t sweep(const char *name) {
   return count;
 }
 
-static void test_defects_read_or_refused(void **state) {
-  (void)state;
+TEST(test_defects_read_or_refused) {
   static const char *const folders[] = {"OBJ", "OFF", "PLY", "STL", "invalid"};
   for (size_t i = 0; i < sizeof folders / sizeof *folders; ++i) {
     if (sweep(folders[i]) == 0) {
@@ -347,8 +346,7 @@ static void test_defects_read_or_refused(void **state) {
   }
 }
 
-static void test_defects_known_read_right(void **state) {
-  (void)state;
+TEST(test_defects_known_read_right) {
   static const struct {
     const char *name;
     supine_status status;
@@ -396,21 +394,4 @@ static void test_defects_known_read_right(void **state) {
   }
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_truncated_binary_every_length_format),
-      cmocka_unit_test(test_truncated_text_every_length_format),
-      cmocka_unit_test(test_truncated_obj_every_length_read_or_refused),
-      cmocka_unit_test(test_ply_header_illegal_format),
-      cmocka_unit_test(test_ply_header_too_many_parts_format),
-      cmocka_unit_test(test_ply_body_illegal_format),
-      cmocka_unit_test(test_ply_odd_but_legal_read),
-      cmocka_unit_test(test_ply_binary_first_byte_line_feed_read),
-      cmocka_unit_test(test_ply_list_of_negative_length_refused),
-      cmocka_unit_test(test_ply_no_surface_mesh),
-      cmocka_unit_test(test_stl_and_obj_garbage_format),
-      cmocka_unit_test(test_defects_read_or_refused),
-      cmocka_unit_test(test_defects_known_read_right),
-  };
-  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
-}
+TEST_GROUP(sample_folder_create, sample_folder_remove)

@@ -64,7 +64,7 @@ static void expect_tetrahedron(const supine_mesh *mesh) {
   assert_true(fabs(supine_mesh_volume(mesh) - 288000.0) < 1.0e-6);
 }
 
-static void test_load_stl_soup_equals_indexed(void **state) {
+TEST(test_load_stl_soup_equals_indexed) {
   char path[256];
   supine_mesh_report report = {0};
   supine_mesh soup = load(sample_text(state, "a.stl", tetrahedron_stl, path), NULL, &report);
@@ -84,7 +84,7 @@ static void test_load_stl_soup_equals_indexed(void **state) {
 
 /* No coordinate is -0, whichever way it came, so that positions are the same where their bits are.
  */
-static void test_load_negative_zero_becomes_zero(void **state) {
+TEST(test_load_negative_zero_becomes_zero) {
   static const char text[] = SAMPLE_PLY(5, 2) "-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
                                               "3 0 2 1\n3 3 1 4\n";
   for (int ras = 0; ras < 2; ++ras) {
@@ -101,7 +101,7 @@ static void test_load_negative_zero_becomes_zero(void **state) {
   }
 }
 
-static void test_load_polygons_cut_points_and_lines_dropped(void **state) {
+TEST(test_load_polygons_cut_points_and_lines_dropped) {
   static const char text[] =
       "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nv 50 50 90\nv 7 7 7\nv 8 8 8\n"
       "f 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nl 6 7\np 6\n";
@@ -117,7 +117,7 @@ static void test_load_polygons_cut_points_and_lines_dropped(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_load_degenerate_and_unreferenced_dropped_counted(void **state) {
+TEST(test_load_degenerate_and_unreferenced_dropped_counted) {
   static const char text[] =
       "ply\nformat ascii 1.0\nelement vertex 7\nproperty float x\nproperty float y\nproperty float "
       "z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n"
@@ -136,7 +136,7 @@ static void test_load_degenerate_and_unreferenced_dropped_counted(void **state) 
 }
 
 /* Elements may stand in any order. */
-static void test_load_ply_faces_before_vertices_same_surface(void **state) {
+TEST(test_load_ply_faces_before_vertices_same_surface) {
   char path[256];
   const char *text = sample_text(
       state, "order.ply",
@@ -151,7 +151,7 @@ static void test_load_ply_faces_before_vertices_same_surface(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_load_ply_strips_refused(void **state) {
+TEST(test_load_ply_strips_refused) {
   refuse_text(state, "strip.ply",
               "ply\nformat ascii 1.0\nelement tristrips 1\nproperty list int int vertex_indices\n"
               "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -161,7 +161,7 @@ static void test_load_ply_strips_refused(void **state) {
 
 /* A flat face that turns both ways is cut along lines that run inside it, however small it is: all
  * its triangles face the same way and add up to its area. */
-static void test_load_concave_face_cut_inside(void **state) {
+TEST(test_load_concave_face_cut_inside) {
   static const double corners[9][3] = {{0, 0, 0},   {90, 0, 0},  {90, 60, 0},
                                        {60, 60, 0}, {60, 30, 0}, {30, 30, 0},
                                        {30, 60, 0}, {0, 60, 0},  {0, 0, 50}};
@@ -192,7 +192,7 @@ static void test_load_concave_face_cut_inside(void **state) {
 }
 
 /* Corners on one line, and a face that crosses itself, still give every triangle. */
-static void test_load_degenerate_faces_cut_into_all_triangles(void **state) {
+TEST(test_load_degenerate_faces_cut_into_all_triangles) {
   static const char text[] = SAMPLE_PLY(6, 3) "0 0 0\n10 0 0\n20 0 0\n30 0 0\n0 10 0\n10 10 0\n"
                                               "4 0 1 2 3\n5 0 1 2 3 4\n4 0 5 4 1\n";
   char path[256];
@@ -201,7 +201,7 @@ static void test_load_degenerate_faces_cut_into_all_triangles(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_load_face_of_too_many_corners_refused(void **state) {
+TEST(test_load_face_of_too_many_corners_refused) {
   enum { CORNERS = 1025 };
   char text[256 + 8 * CORNERS];
   int length = snprintf(text, sizeof text, SAMPLE_PLY(3, 1) "0 0 0\n1 0 0\n0 1 0\n%d", CORNERS);
@@ -212,7 +212,7 @@ static void test_load_face_of_too_many_corners_refused(void **state) {
 }
 
 /* Two nodes hold the tetrahedron: one moved, one mirrored and moved; both face outwards. */
-static void test_load_nodes_transformed_mirror_keeps_sense(void **state) {
+TEST(test_load_nodes_transformed_mirror_keeps_sense) {
   static const char text[] =
       "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
       "{\"children\":[1,2],\"translation\":[0,0,1000]},"
@@ -265,7 +265,7 @@ static double x_under(void **state, const char *name, const char *head, supine_a
   return x;
 }
 
-static void test_load_axes_tag_option_and_comment(void **state) {
+TEST(test_load_axes_tag_option_and_comment) {
   static const struct {
     const char *head;
     supine_axes asked;
@@ -300,7 +300,7 @@ static void test_load_axes_tag_option_and_comment(void **state) {
 }
 
 /* 3D Slicer's binary STL begins with its tag; what follows the header says nothing. */
-static void test_load_axes_tag_in_stl_header(void **state) {
+TEST(test_load_axes_tag_in_stl_header) {
   static const char *const heads[] = {"SPACE=RAS", "a lung, SPACE=RAS", "a lung"};
   for (size_t i = 0; i < 3; ++i) {
     unsigned char stl[134] = {0};
@@ -319,14 +319,14 @@ static void test_load_axes_tag_in_stl_header(void **state) {
   }
 }
 
-static void test_load_axes_foreign_tag_refused(void **state) {
+TEST(test_load_axes_foreign_tag_refused) {
   refuse_text(state, "a.obj", "# SPACE=LLS\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
               SUPINE_ERROR_FORMAT, "SPACE tag");
   refuse_text(state, "a.obj", "# SPACE=RASP\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
               SUPINE_ERROR_FORMAT, "SPACE tag");
 }
 
-static void test_load_units_scaled(void **state) {
+TEST(test_load_units_scaled) {
   static const double scales[] = {0.0, 1.0, 10.0, 0.125};
   for (size_t i = 0; i < sizeof scales / sizeof *scales; ++i) {
     char path[256];
@@ -345,8 +345,7 @@ static void test_load_units_scaled(void **state) {
   }
 }
 
-static void test_unit_is_likely_sides_and_other_units(void **state) {
-  (void)state;
+TEST(test_unit_is_likely_sides_and_other_units) {
   static const struct {
     double side;
     bool likely;
@@ -363,7 +362,7 @@ static void test_unit_is_likely_sides_and_other_units(void **state) {
   }
 }
 
-static void test_load_units_not_positive_argument(void **state) {
+TEST(test_load_units_not_positive_argument) {
   char path[256];
   (void)sample_text(state, "a.obj", tetrahedron_obj, path);
   static const double scales[] = {-1.0, (double)INFINITY, (double)NAN};
@@ -374,7 +373,7 @@ static void test_load_units_not_positive_argument(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-static void test_load_missing_folder_device_unreadable_read(void **state) {
+TEST(test_load_missing_folder_device_unreadable_read) {
   char path[256];
   expect_refused(sample_path(state, "missing.ply", path), NULL, SUPINE_ERROR_READ, "No such file");
   expect_refused(*state, NULL, SUPINE_ERROR_READ, "is a folder");
@@ -387,7 +386,7 @@ static void test_load_missing_folder_device_unreadable_read(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-static void test_load_unknown_kind_format(void **state) {
+TEST(test_load_unknown_kind_format) {
   refuse_text(state, "empty.ply", "", SUPINE_ERROR_FORMAT, "empty");
   refuse_text(state, "a.jpg", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
   refuse_text(state, "none", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
@@ -396,7 +395,7 @@ static void test_load_unknown_kind_format(void **state) {
   refuse_text(state, "a.dae", "\n<a>\n\n</b>\n", SUPINE_ERROR_FORMAT, "malformed");
 }
 
-static void test_load_no_triangles_mesh(void **state) {
+TEST(test_load_no_triangles_mesh) {
   refuse_text(state, "points.obj", "v 1 2 3\nv 4 5 6\n", SUPINE_ERROR_MESH, "no triangles");
   refuse_text(state, "lines.obj", "v 1 2 3\nv 4 5 6\nl 1 2\n", SUPINE_ERROR_MESH, "no triangles");
   refuse_text(state, "flat.obj", "v 1 2 3\nv 4 5 6\nv 1 2 3\nf 1 2 3\n", SUPINE_ERROR_MESH,
@@ -414,7 +413,7 @@ static void test_load_no_triangles_mesh(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-static void test_load_not_finite_mesh_vertex_named(void **state) {
+TEST(test_load_not_finite_mesh_vertex_named) {
   static const char head[] =
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
       "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
@@ -434,7 +433,7 @@ static void test_load_not_finite_mesh_vertex_named(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-static void test_load_stl_binary_that_says_solid(void **state) {
+TEST(test_load_stl_binary_that_says_solid) {
   unsigned char stl[134] = "solid of a scanner that does not know better";
   const float soup[12] = {0, 0, 1, 0, 0, 0, 100, 0, 0, 0, 100, 0};
   stl[80] = 1;
@@ -468,7 +467,7 @@ static void *read_often(void *argument) {
 }
 
 /* A surface needs no materials: the file that an OBJ names is not even opened. */
-static void test_load_obj_materials_not_opened(void **state) {
+TEST(test_load_obj_materials_not_opened) {
   char materials[256];
   char text[1024];
   char path[256];
@@ -486,7 +485,7 @@ static void test_load_obj_materials_not_opened(void **state) {
   assert_int_equal(unlink(materials), 0);
 }
 
-static void test_load_from_threads_good_and_bad(void **state) {
+TEST(test_load_from_threads_good_and_bad) {
   enum { THREADS = 4 };
   static const char *const names[] = {"0", "1", "2", "3"};
   char paths[THREADS][2][256];
@@ -514,31 +513,4 @@ static void test_load_from_threads_good_and_bad(void **state) {
   supine_mesh_free(&mesh);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_load_stl_soup_equals_indexed),
-      cmocka_unit_test(test_load_negative_zero_becomes_zero),
-      cmocka_unit_test(test_load_polygons_cut_points_and_lines_dropped),
-      cmocka_unit_test(test_load_degenerate_and_unreferenced_dropped_counted),
-      cmocka_unit_test(test_load_ply_faces_before_vertices_same_surface),
-      cmocka_unit_test(test_load_ply_strips_refused),
-      cmocka_unit_test(test_load_concave_face_cut_inside),
-      cmocka_unit_test(test_load_degenerate_faces_cut_into_all_triangles),
-      cmocka_unit_test(test_load_face_of_too_many_corners_refused),
-      cmocka_unit_test(test_load_nodes_transformed_mirror_keeps_sense),
-      cmocka_unit_test(test_load_axes_tag_option_and_comment),
-      cmocka_unit_test(test_load_axes_tag_in_stl_header),
-      cmocka_unit_test(test_load_axes_foreign_tag_refused),
-      cmocka_unit_test(test_load_units_scaled),
-      cmocka_unit_test(test_unit_is_likely_sides_and_other_units),
-      cmocka_unit_test(test_load_units_not_positive_argument),
-      cmocka_unit_test(test_load_missing_folder_device_unreadable_read),
-      cmocka_unit_test(test_load_unknown_kind_format),
-      cmocka_unit_test(test_load_no_triangles_mesh),
-      cmocka_unit_test(test_load_not_finite_mesh_vertex_named),
-      cmocka_unit_test(test_load_stl_binary_that_says_solid),
-      cmocka_unit_test(test_load_obj_materials_not_opened),
-      cmocka_unit_test(test_load_from_threads_good_and_bad),
-  };
-  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
-}
+TEST_GROUP(sample_folder_create, sample_folder_remove)

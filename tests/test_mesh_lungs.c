@@ -27,8 +27,7 @@ static supine_topology topology_of(const supine_mesh *mesh) {
 }
 
 /* Closed lungs: numbers of vertices and triangles, genus, litres to one decimal. */
-static void test_lungs_closed_known_numbers(void **state) {
-  (void)state;
+TEST(test_lungs_closed_known_numbers) {
   static const struct {
     const char *name;
     size_t vertices;
@@ -65,8 +64,7 @@ static void test_lungs_closed_known_numbers(void **state) {
   }
 }
 
-static void test_lungs_stl_soup_welds_closed(void **state) {
-  (void)state;
+TEST(test_lungs_stl_soup_welds_closed) {
   static const struct {
     const char *name;
     size_t vertices;
@@ -89,8 +87,7 @@ static void test_lungs_stl_soup_welds_closed(void **state) {
   }
 }
 
-static void test_lungs_defect_boundary_and_non_manifold(void **state) {
-  (void)state;
+TEST(test_lungs_defect_boundary_and_non_manifold) {
   supine_mesh mesh = lung_load("covid/covid005_left_DEFECT.ply", NULL);
   supine_topology topology = topology_of(&mesh);
   assert_int_equal(topology.boundary_edges, 2);
@@ -103,7 +100,7 @@ static void test_lungs_defect_boundary_and_non_manifold(void **state) {
 }
 
 /* Saved as triangle soup and loaded again, a lung is the same surface. */
-static void test_lungs_stl_round_trip_same_surface(void **state) {
+TEST(test_lungs_stl_round_trip_same_surface) {
   supine_mesh mesh = lung_load("lungs/chaste_left.ply", NULL);
   char path[256];
   const supine_mesh_save_options options = {.axes = SUPINE_AXES_RAS};
@@ -122,12 +119,4 @@ static void test_lungs_stl_round_trip_same_surface(void **state) {
   supine_mesh_free(&mesh);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_lungs_closed_known_numbers),
-      cmocka_unit_test(test_lungs_stl_soup_welds_closed),
-      cmocka_unit_test(test_lungs_defect_boundary_and_non_manifold),
-      cmocka_unit_test(test_lungs_stl_round_trip_same_surface),
-  };
-  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
-}
+TEST_GROUP(sample_folder_create, sample_folder_remove)

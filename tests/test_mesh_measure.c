@@ -18,8 +18,7 @@ static void expect_near(double found, double expected, double tolerance) {
   }
 }
 
-static void test_volume_box_and_tetrahedron_literal(void **state) {
-  (void)state;
+TEST(test_volume_box_and_tetrahedron_literal) {
   supine_mesh box = sample_box();
   supine_mesh tetrahedron = sample_tetrahedron();
   expect_near(supine_mesh_volume(&box), 1430000.0, rounding(12, 1430000.0));
@@ -28,8 +27,7 @@ static void test_volume_box_and_tetrahedron_literal(void **state) {
   supine_mesh_free(&tetrahedron);
 }
 
-static void test_volume_flipped_negative(void **state) {
-  (void)state;
+TEST(test_volume_flipped_negative) {
   supine_mesh box = sample_box();
   for (size_t t = 0; t < box.triangle_count; ++t) {
     const uint32_t swap = box.triangles[3 * t];
@@ -43,8 +41,7 @@ static void test_volume_flipped_negative(void **state) {
 /* Corners (R + r cos b) cos a, (R + r cos b) sin a, r sin b, in steps of 2 pi / n and 2 pi / m:
  * cut at any height the solid is a ring between two regular n-gons, so its volume is
  * n sin(2 pi / n) R (m / 2) r^2 sin(2 pi / m). Far from the origin, where sums about it cancel. */
-static void test_volume_torus_far_from_origin_closed_form(void **state) {
-  (void)state;
+TEST(test_volume_torus_far_from_origin_closed_form) {
   enum { N = 37, M = 23 };
   const double R = 83.0;
   const double r = 29.0;
@@ -73,8 +70,7 @@ static void test_volume_torus_far_from_origin_closed_form(void **state) {
   supine_mesh_free(&torus);
 }
 
-static void test_box_literal(void **state) {
-  (void)state;
+TEST(test_box_literal) {
   supine_mesh box = sample_box();
   double minimum[3];
   double maximum[3];
@@ -86,8 +82,7 @@ static void test_box_literal(void **state) {
   supine_mesh_free(&box);
 }
 
-static void test_vertex_area_tetrahedron_literal(void **state) {
-  (void)state;
+TEST(test_vertex_area_tetrahedron_literal) {
   supine_mesh mesh = sample_tetrahedron();
   double area[4];
   supine_mesh_vertex_area(&mesh, area);
@@ -100,8 +95,7 @@ static void test_vertex_area_tetrahedron_literal(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_vertex_area_sums_to_surface(void **state) {
-  (void)state;
+TEST(test_vertex_area_sums_to_surface) {
   supine_mesh box = sample_box();
   double area[8];
   supine_mesh_vertex_area(&box, area);
@@ -113,8 +107,7 @@ static void test_vertex_area_sums_to_surface(void **state) {
   supine_mesh_free(&box);
 }
 
-static void test_measures_empty_mesh_zero(void **state) {
-  (void)state;
+TEST(test_measures_empty_mesh_zero) {
   const supine_mesh mesh = {0};
   double minimum[3] = {1, 1, 1};
   double maximum[3] = {1, 1, 1};
@@ -123,17 +116,4 @@ static void test_measures_empty_mesh_zero(void **state) {
     assert_true(minimum[axis] == 0.0 && maximum[axis] == 0.0);
   }
   assert_true(supine_mesh_volume(&mesh) == 0.0);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_volume_box_and_tetrahedron_literal),
-      cmocka_unit_test(test_volume_flipped_negative),
-      cmocka_unit_test(test_volume_torus_far_from_origin_closed_form),
-      cmocka_unit_test(test_box_literal),
-      cmocka_unit_test(test_vertex_area_tetrahedron_literal),
-      cmocka_unit_test(test_vertex_area_sums_to_surface),
-      cmocka_unit_test(test_measures_empty_mesh_zero),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -79,7 +79,7 @@ static supine_status load(const char *path, supine_error *error) {
   return status;
 }
 
-static void test_load_each_allocation_failing_memory(void **state) {
+TEST(test_load_each_allocation_failing_memory) {
   static const struct {
     const char *name;
     const char *text;
@@ -114,7 +114,7 @@ static supine_status find_edges(const char *path, supine_error *error) {
   return supine_error_set(error, status, "out of memory"); /* it has no words of its own */
 }
 
-static void test_topology_each_allocation_failing_memory(void **state) {
+TEST(test_topology_each_allocation_failing_memory) {
   char path[256];
   (void)sample_text(state, "a.ply", SAMPLE_PLY(4, 1) "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n",
                     path);
@@ -135,7 +135,7 @@ static supine_status save(const char *path, supine_error *error) {
 /* Writers take no memory, but VTP's, but what opening the output takes; the folder's removal finds
  * leftovers.
  */
-static void test_save_each_allocation_failing_memory(void **state) {
+TEST(test_save_each_allocation_failing_memory) {
   static const char *const names[] = {"a.ply", "a.obj", "a.stl", "a.vtp"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     char path[256];
@@ -161,22 +161,16 @@ static supine_status save_series(const char *path, supine_error *error) {
   return status;
 }
 
-static void test_series_each_allocation_failing_memory(void **state) {
+TEST(test_series_each_allocation_failing_memory) {
   char path[256];
   fail_each(save_series, sample_path(state, "a.vtp", path),
             5); /* itself, offsets, bytes, packed, sizes */
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_load_each_allocation_failing_memory),
-      cmocka_unit_test(test_topology_each_allocation_failing_memory),
-      cmocka_unit_test(test_save_each_allocation_failing_memory),
-      cmocka_unit_test(test_series_each_allocation_failing_memory),
-  };
+static int setup(void **state) {
   allocations_failed = mmap(NULL, sizeof *allocations_failed, PROT_READ | PROT_WRITE,
                             MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  return allocations_failed == MAP_FAILED
-             ? 1
-             : cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
+  return allocations_failed == MAP_FAILED ? -1 : sample_folder_create(state);
 }
+
+TEST_GROUP(setup, sample_folder_remove)

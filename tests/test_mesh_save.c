@@ -55,7 +55,7 @@ static void expect_same(const supine_mesh *found, const supine_mesh *expected, d
   }
 }
 
-static void test_save_load_round_trip_each_format_and_axes(void **state) {
+TEST(test_save_load_round_trip_each_format_and_axes) {
   static const supine_axes all_axes[] = {SUPINE_AXES_AUTO, SUPINE_AXES_LPS, SUPINE_AXES_RAS};
   supine_mesh mesh = make_crooked();
   for (size_t k = 0; k < 3; ++k) { /* VTP is not read */
@@ -83,7 +83,7 @@ static void test_save_load_round_trip_each_format_and_axes(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_save_load_indexed_keeps_order(void **state) {
+TEST(test_save_load_indexed_keeps_order) {
   supine_mesh mesh = sample_box();
   char path[256];
   save(sample_path(state, "a.ply", path), &mesh, NULL);
@@ -113,7 +113,7 @@ static const char *find(const unsigned char *bytes, size_t size, const char *tex
 }
 
 /* One vertex moved by (3, 4, 12) mm, 13 mm in all; in RAS it is (-3, -4, 12). */
-static void test_save_ply_displacement_rows(void **state) {
+TEST(test_save_ply_displacement_rows) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
   memcpy(rest, mesh.vertices, sizeof rest);
@@ -143,7 +143,7 @@ static void test_save_ply_displacement_rows(void **state) {
 }
 
 /* Millimetres also where the file is in centimetres; after the displacement where there is one. */
-static void test_save_expected_error_stays_in_millimetres(void **state) {
+TEST(test_save_expected_error_stays_in_millimetres) {
   static const float errors[4] = {1.5F, 2.5F, 3.5F, 4.5F};
   supine_mesh mesh = sample_tetrahedron();
   for (int moved = 0; moved < 2; ++moved) {
@@ -171,7 +171,7 @@ static void test_save_expected_error_stays_in_millimetres(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_save_stl_layout_and_normals(void **state) {
+TEST(test_save_stl_layout_and_normals) {
   supine_mesh mesh = sample_tetrahedron();
   const supine_mesh_save_options options = {
       .comment = "a comment that is far too long for the eighty bytes that a binary STL file has "
@@ -216,7 +216,7 @@ static const unsigned char *unpack(const unsigned char *at, unsigned char *array
   return at + 32 + packed;
 }
 
-static void test_save_vtp_layout(void **state) {
+TEST(test_save_vtp_layout) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
   memcpy(rest, mesh.vertices, sizeof rest);
@@ -258,7 +258,7 @@ static void test_save_vtp_layout(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-static void test_save_vtp_opens_in_vtk(void **state) {
+TEST(test_save_vtp_opens_in_vtk) {
   static const char check[] =
       "import sys, vtk\n"
       "r = vtk.vtkXMLPolyDataReader()\n"
@@ -297,7 +297,7 @@ static void test_save_vtp_opens_in_vtk(void **state) {
 }
 
 /* A series: refused where it cannot be, gone where it was not committed. */
-static void test_series_statuses(void **state) {
+TEST(test_series_statuses) {
   static const double times[2] = {0.0, 0.5};
   supine_mesh mesh = sample_tetrahedron();
   supine_mesh_series *series = NULL;
@@ -338,7 +338,7 @@ static void test_series_statuses(void **state) {
 }
 
 /* Other axes and units turn and scale everything; lengths are on a grid, in the file's units. */
-static void test_save_vtp_axes_units_and_rounding(void **state) {
+TEST(test_save_vtp_axes_units_and_rounding) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
   memcpy(rest, mesh.vertices, sizeof rest);
@@ -382,7 +382,7 @@ static void test_save_vtp_axes_units_and_rounding(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-static void test_save_unknown_ending_argument(void **state) {
+TEST(test_save_unknown_ending_argument) {
   static const char *const names[] = {"a.txt", "a", "a.ply.gz", "ply", ".ply/a"};
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -400,7 +400,7 @@ static void test_save_unknown_ending_argument(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_save_not_finite_mesh_no_file(void **state) {
+TEST(test_save_not_finite_mesh_no_file) {
   static const double bad[] = {(double)NAN, (double)INFINITY, -1.0e39};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_mesh mesh = sample_tetrahedron();
@@ -415,14 +415,14 @@ static void test_save_not_finite_mesh_no_file(void **state) {
   }
 }
 
-static void test_save_too_large_argument(void **state) {
+TEST(test_save_too_large_argument) {
   const supine_mesh mesh = {.vertex_count = (size_t)INT32_MAX + 1};
   char path[256];
   assert_int_equal(supine_mesh_save(sample_path(state, "a.ply", path), &mesh, NULL, NULL),
                    SUPINE_ERROR_ARGUMENT);
 }
 
-static void test_save_missing_folder_write(void **state) {
+TEST(test_save_missing_folder_write) {
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof endings / sizeof *endings; ++i) {
     char name[64];
@@ -437,7 +437,7 @@ static void test_save_missing_folder_write(void **state) {
 }
 
 /* A name with our ending that leads to a device which is always full. */
-static void test_save_full_disk_write(void **state) {
+TEST(test_save_full_disk_write) {
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof endings / sizeof *endings; ++i) {
     char path[256];
@@ -450,7 +450,7 @@ static void test_save_full_disk_write(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_save_failure_leaves_old_file(void **state) {
+TEST(test_save_failure_leaves_old_file) {
   supine_mesh mesh = sample_tetrahedron();
   char path[256];
   (void)sample_text(state, "a.ply", "precious", path);
@@ -470,23 +470,4 @@ static void test_save_failure_leaves_old_file(void **state) {
   assert_int_equal(unlink(path), 0);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_save_load_round_trip_each_format_and_axes),
-      cmocka_unit_test(test_save_load_indexed_keeps_order),
-      cmocka_unit_test(test_save_ply_displacement_rows),
-      cmocka_unit_test(test_save_expected_error_stays_in_millimetres),
-      cmocka_unit_test(test_save_stl_layout_and_normals),
-      cmocka_unit_test(test_save_vtp_layout),
-      cmocka_unit_test(test_save_vtp_opens_in_vtk),
-      cmocka_unit_test(test_save_vtp_axes_units_and_rounding),
-      cmocka_unit_test(test_series_statuses),
-      cmocka_unit_test(test_save_unknown_ending_argument),
-      cmocka_unit_test(test_save_not_finite_mesh_no_file),
-      cmocka_unit_test(test_save_too_large_argument),
-      cmocka_unit_test(test_save_missing_folder_write),
-      cmocka_unit_test(test_save_full_disk_write),
-      cmocka_unit_test(test_save_failure_leaves_old_file),
-  };
-  return cmocka_run_group_tests(tests, sample_folder_create, sample_folder_remove);
-}
+TEST_GROUP(sample_folder_create, sample_folder_remove)

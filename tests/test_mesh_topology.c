@@ -51,16 +51,14 @@ static supine_mesh make_torus(uint32_t around, uint32_t across) {
   return mesh;
 }
 
-static void test_topology_closed_surfaces_known_numbers(void **state) {
-  (void)state;
+TEST(test_topology_closed_surfaces_known_numbers) {
   expect_closed(sample_tetrahedron(), 4, 6, 4, 1, 0);
   expect_closed(sample_box(), 8, 18, 12, 1, 0);
   expect_closed(make_torus(7, 5), 35, 105, 70, 1, 1);
   expect_closed(make_torus(64, 48), 3072, 9216, 6144, 1, 1);
 }
 
-static void test_topology_edges_sorted_and_complete(void **state) {
-  (void)state;
+TEST(test_topology_edges_sorted_and_complete) {
   supine_mesh mesh = make_torus(9, 11);
   supine_topology topology = topology_of(&mesh);
   for (size_t e = 0; e < topology.edge_count; ++e) {
@@ -79,8 +77,7 @@ static void test_topology_edges_sorted_and_complete(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_open_sheet_boundary_counted(void **state) {
-  (void)state;
+TEST(test_topology_open_sheet_boundary_counted) {
   static const double vertices[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
   static const uint32_t triangles[] = {0, 1, 2, 0, 2, 3};
   supine_mesh mesh = sample_make(4, vertices, 2, triangles);
@@ -94,8 +91,7 @@ static void test_topology_open_sheet_boundary_counted(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_two_tetrahedra_components_in_order(void **state) {
-  (void)state;
+TEST(test_topology_two_tetrahedra_components_in_order) {
   /* Vertices of the two take turns, so that a component's vertices are not next to each other. */
   static const double vertices[24] = {0};
   static const uint32_t triangles[] = {1, 5, 3, 1, 3, 7, 1, 7, 5, 3, 5, 7,
@@ -112,8 +108,7 @@ static void test_topology_two_tetrahedra_components_in_order(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_components_joined_late_one(void **state) {
-  (void)state;
+TEST(test_topology_components_joined_late_one) {
   /* A strip whose parts meet in its last triangles alone; the first vertex is the last named. */
   static const double vertices[27] = {0};
   static const uint32_t triangles[] = {8, 7, 6, 5, 4, 3, 2, 1, 0, 6, 5, 7, 3, 2, 4};
@@ -128,8 +123,7 @@ static void test_topology_components_joined_late_one(void **state) {
 }
 
 /* A closed surface whose two ends are one vertex: V - E + F is 1, and half a hole is none. */
-static void test_topology_pinched_in_a_vertex_no_genus(void **state) {
-  (void)state;
+TEST(test_topology_pinched_in_a_vertex_no_genus) {
   static const double vertices[21] = {0};
   static const uint32_t triangles[] = {0, 2, 1, 0, 3, 2, 0, 1, 3, 1, 2, 5, 1, 5, 4, 2, 3, 6,
                                        2, 6, 5, 3, 1, 4, 3, 4, 6, 0, 4, 5, 0, 5, 6, 0, 6, 4};
@@ -143,8 +137,7 @@ static void test_topology_pinched_in_a_vertex_no_genus(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_fan_on_one_edge_non_manifold(void **state) {
-  (void)state;
+TEST(test_topology_fan_on_one_edge_non_manifold) {
   static const double vertices[15] = {0};
   static const uint32_t triangles[] = {0, 1, 2, 1, 0, 3, 0, 1, 4};
   supine_mesh mesh = sample_make(5, vertices, 3, triangles);
@@ -158,8 +151,7 @@ static void test_topology_fan_on_one_edge_non_manifold(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_flipped_triangle_inconsistent(void **state) {
-  (void)state;
+TEST(test_topology_flipped_triangle_inconsistent) {
   supine_mesh mesh = sample_box();
   const uint32_t swap = mesh.triangles[0];
   mesh.triangles[0] = mesh.triangles[1];
@@ -175,8 +167,7 @@ static void test_topology_flipped_triangle_inconsistent(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_hub_of_many_edges_sorted(void **state) {
-  (void)state;
+TEST(test_topology_hub_of_many_edges_sorted) {
   /* A disc whose hub is vertex 0, its rim named in a stride that leaves no order to find. */
   enum { RIM = 997 };
   static double vertices[3 * (RIM + 1)];
@@ -199,8 +190,7 @@ static void test_topology_hub_of_many_edges_sorted(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_touching_tetrahedra_no_genus(void **state) {
-  (void)state;
+TEST(test_topology_touching_tetrahedra_no_genus) {
   /* Two closed surfaces that share one vertex: V - E + F = 7 - 12 + 8 = 3 is none of a surface. */
   static const double vertices[21] = {0};
   static const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3,
@@ -215,8 +205,7 @@ static void test_topology_touching_tetrahedra_no_genus(void **state) {
   supine_mesh_free(&mesh);
 }
 
-static void test_topology_illegal_triangles_argument(void **state) {
-  (void)state;
+TEST(test_topology_illegal_triangles_argument) {
   static const double vertices[9] = {0};
   static const uint32_t beyond[] = {0, 1, 3};
   static const uint32_t twice[] = {0, 1, 1};
@@ -231,8 +220,7 @@ static void test_topology_illegal_triangles_argument(void **state) {
   }
 }
 
-static void test_topology_empty_mesh_not_closed(void **state) {
-  (void)state;
+TEST(test_topology_empty_mesh_not_closed) {
   const supine_mesh mesh = {0};
   supine_topology topology = topology_of(&mesh);
   assert_int_equal(topology.edge_count, 0);
@@ -240,22 +228,4 @@ static void test_topology_empty_mesh_not_closed(void **state) {
   assert_false(topology.closed);
   supine_mesh_topology_free(&topology);
   supine_mesh_topology_free(&topology);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_topology_closed_surfaces_known_numbers),
-      cmocka_unit_test(test_topology_edges_sorted_and_complete),
-      cmocka_unit_test(test_topology_open_sheet_boundary_counted),
-      cmocka_unit_test(test_topology_two_tetrahedra_components_in_order),
-      cmocka_unit_test(test_topology_components_joined_late_one),
-      cmocka_unit_test(test_topology_pinched_in_a_vertex_no_genus),
-      cmocka_unit_test(test_topology_fan_on_one_edge_non_manifold),
-      cmocka_unit_test(test_topology_flipped_triangle_inconsistent),
-      cmocka_unit_test(test_topology_hub_of_many_edges_sorted),
-      cmocka_unit_test(test_topology_touching_tetrahedra_no_genus),
-      cmocka_unit_test(test_topology_illegal_triangles_argument),
-      cmocka_unit_test(test_topology_empty_mesh_not_closed),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,7 +2,6 @@
 /* A patient's law: from landmarks, held out, known constants found again; and what is refused. */
 #include "test.h"
 
-#include <gsl/gsl_errno.h>
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 
@@ -94,8 +93,7 @@ static supine_patient_record record_of(const supine_patient *patient) {
 
 /* Held-out blocks of the five public pairs: below what the quadratic law of 220ee0d left on the
  * same blocks, whichever way round the pair is told and counted from either of the two. */
-static void test_fit_public_pairs_below_quadratic_law(void **state) {
-  (void)state;
+TEST(test_fit_public_pairs_below_quadratic_law) {
   static const struct {
     const char *name;
     double quadratic[2]; /* mm RMS: from the inhaled image, from the exhaled one */
@@ -146,8 +144,7 @@ static void test_fit_public_pairs_below_quadratic_law(void **state) {
 }
 
 /* Evaluated at its own points the correction gives back what the fit predicts there. */
-static void test_correct_at_fitted_points_matches_prediction(void **state) {
-  (void)state;
+TEST(test_correct_at_fitted_points_matches_prediction) {
   supine_patient_pairs pairs = scatter(150, 8);
   supine_patient truth = known(&pairs);
   supine_patient found;
@@ -178,8 +175,7 @@ static void test_correct_at_fitted_points_matches_prediction(void **state) {
 
 /* Lungs move each by its own: a point beyond the midline belongs to the lung that it is said to lie
  * in. */
-static void test_find_side_given_overrides_midline(void **state) {
-  (void)state;
+TEST(test_find_side_given_overrides_midline) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   const double point[3] = {patient.frame.midline - 3.0, -70.0, -50.0};
@@ -193,8 +189,7 @@ static void test_find_side_given_overrides_midline(void **state) {
 }
 
 /* Points of the emptier state are taken to where the law says they were in the fuller one. */
-static void test_refer_moved_points_returns_them(void **state) {
-  (void)state;
+TEST(test_refer_moved_points_returns_them) {
   supine_patient_pairs pairs = scatter(60, 12);
   supine_patient truth = known(&pairs);
   for (size_t k = 0; k < 3; ++k) {
@@ -212,8 +207,7 @@ static void test_refer_moved_points_returns_them(void **state) {
   supine_patient_pairs_free(&pairs);
 }
 
-static void test_noisy_landmarks_return_the_constants(void **state) {
-  (void)state;
+TEST(test_noisy_landmarks_return_the_constants) {
   supine_patient_pairs pairs = scatter(300, 4241);
   const supine_patient truth = known(&pairs);
   supine_patient found;
@@ -242,8 +236,7 @@ static void test_noisy_landmarks_return_the_constants(void **state) {
 }
 
 /* What a unit of each unknown moves along a row is the difference that a small step makes. */
-static void test_power_design_each_unknown_matches_difference(void **state) {
-  (void)state;
+TEST(test_power_design_each_unknown_matches_difference) {
   supine_patient_pairs pairs = scatter(20, 3);
   const supine_patient truth = known(&pairs);
   supine_patient_row rows[60];
@@ -274,8 +267,7 @@ static void test_power_design_each_unknown_matches_difference(void **state) {
 
 /* Free constants come back from points without noise, though the search begins with the deep law.
  */
-static void test_law_fit_free_constants_returns_them(void **state) {
-  (void)state;
+TEST(test_law_fit_free_constants_returns_them) {
   supine_patient_pairs pairs = scatter(200, 3);
   const supine_patient truth = known(&pairs);
   const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER};
@@ -292,8 +284,7 @@ static void test_law_fit_free_constants_returns_them(void **state) {
   supine_patient_pairs_free(&pairs);
 }
 
-static void test_motion_between_scans_is_told_from_the_law(void **state) {
-  (void)state;
+TEST(test_motion_between_scans_is_told_from_the_law) {
   supine_patient_pairs pairs = scatter(250, 5);
   const supine_patient truth = known(&pairs);
   supine_patient found;
@@ -327,8 +318,7 @@ static void refused(const supine_patient_pairs *pairs, bool moved, const char *w
   }
 }
 
-static void test_impossible_pairs_are_refused(void **state) {
-  (void)state;
+TEST(test_impossible_pairs_are_refused) {
   supine_patient_pairs pairs = scatter(60, 99);
   const supine_patient truth = known(&pairs);
   char message[sizeof((supine_error *)0)->message];
@@ -391,8 +381,7 @@ static supine_status load_text(const char *text, bool reverse, supine_patient_pa
   return status;
 }
 
-static void test_pair_files_say_what_is_wrong(void **state) {
-  (void)state;
+TEST(test_pair_files_say_what_is_wrong) {
   static const struct {
     const char *text, *words;
   } bad[] = {{"x,y,z,to_x,to_y\n1,2,3,4,5\n", "no column \"to_z\""},
@@ -415,8 +404,7 @@ static void test_pair_files_say_what_is_wrong(void **state) {
                    SUPINE_ERROR_READ);
 }
 
-static void test_pair_files_go_from_rest(void **state) {
-  (void)state;
+TEST(test_pair_files_go_from_rest) {
   static const char images[] = "im1_x,im1_y,im1_z,im2_x,im2_y,im2_z\n1,2,3,4,5,6\n";
   static const char plain[] = "x,y,z,to_x,to_y,to_z\n1,2,3,4,5,6\n";
   supine_patient_pairs pairs = {0};
@@ -433,8 +421,7 @@ static void test_pair_files_go_from_rest(void **state) {
   }
 }
 
-static void test_fit_fewer_points_than_unknowns_refused(void **state) {
-  (void)state;
+TEST(test_fit_fewer_points_than_unknowns_refused) {
   supine_patient_pairs pairs = scatter(14, 3);
   const supine_patient truth = known(&pairs);
   const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER,
@@ -454,8 +441,7 @@ static void test_fit_fewer_points_than_unknowns_refused(void **state) {
 
 /* --- patient.json and what it makes of a surface --------------------------------------------- */
 
-static void test_record_written_and_read_same(void **state) {
-  (void)state;
+TEST(test_record_written_and_read_same) {
   static const char path[] = "test_patient_record.json";
   supine_patient_pairs pairs = scatter(30, 2);
   supine_patient patient = known(&pairs);
@@ -517,8 +503,7 @@ static void test_record_written_and_read_same(void **state) {
 }
 
 /* The share at rest is what the two states show, and a scan that is one of them needs no name. */
-static void test_scan_of_fitted_states_is_known(void **state) {
-  (void)state;
+TEST(test_scan_of_fitted_states_is_known) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   supine_patient_record record = record_of(&patient);
@@ -558,8 +543,7 @@ static void test_scan_of_fitted_states_is_known(void **state) {
   supine_patient_pairs_free(&pairs);
 }
 
-static void test_force_is_one_at_the_centre_in_the_fitted_posture(void **state) {
-  (void)state;
+TEST(test_force_is_one_at_the_centre_in_the_fitted_posture) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   static const double postures[4][3] = {{0, 1, 0}, {0, -1, 0}, {0, 0, -1}, {0, 0, 1}};
@@ -589,8 +573,7 @@ static void test_force_is_one_at_the_centre_in_the_fitted_posture(void **state) 
 
 /* Known gains come back from a third scan, prone or upright, within three of their standard errors;
  * one in the same posture tells none. */
-static void test_third_scan_tells_what_turns(void **state) {
-  (void)state;
+TEST(test_third_scan_tells_what_turns) {
   static const double postures[2][3] = {{0.0, -1.0, 0.0}, {0.0, 0.0, -1.0}};
   static const double gains[2] = {0.23, 0.71};
   supine_patient_pairs pairs = scatter(200, 55);
@@ -643,8 +626,7 @@ static void test_third_scan_tells_what_turns(void **state) {
 }
 
 /* Each map finds what it can express, and nothing beyond: literal maps, their own distances. */
-static void test_maps_explain_what_they_can(void **state) {
-  (void)state;
+TEST(test_maps_explain_what_they_can) {
   supine_patient_pairs pairs = scatter(80, 21);
   supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT];
   supine_error error;
@@ -721,27 +703,4 @@ static void test_maps_explain_what_they_can(void **state) {
       SUPINE_OK);
   assert_true(fabs(distance[SUPINE_PATIENT_MAP_SIMILARITY].rms -
                    sqrt((2800.0 - 2400.0 * 2400.0 / 2800.0) / 6.0)) < 1e-9);
-}
-
-int main(void) {
-  static const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_fit_public_pairs_below_quadratic_law),
-      cmocka_unit_test(test_correct_at_fitted_points_matches_prediction),
-      cmocka_unit_test(test_find_side_given_overrides_midline),
-      cmocka_unit_test(test_refer_moved_points_returns_them),
-      cmocka_unit_test(test_scan_of_fitted_states_is_known),
-      cmocka_unit_test(test_noisy_landmarks_return_the_constants),
-      cmocka_unit_test(test_power_design_each_unknown_matches_difference),
-      cmocka_unit_test(test_law_fit_free_constants_returns_them),
-      cmocka_unit_test(test_motion_between_scans_is_told_from_the_law),
-      cmocka_unit_test(test_impossible_pairs_are_refused),
-      cmocka_unit_test(test_pair_files_say_what_is_wrong),
-      cmocka_unit_test(test_pair_files_go_from_rest),
-      cmocka_unit_test(test_fit_fewer_points_than_unknowns_refused),
-      cmocka_unit_test(test_third_scan_tells_what_turns),
-      cmocka_unit_test(test_maps_explain_what_they_can),
-      cmocka_unit_test(test_record_written_and_read_same),
-      cmocka_unit_test(test_force_is_one_at_the_centre_in_the_fitted_posture)};
-  (void)gsl_set_error_handler_off();
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,7 +3,6 @@
  * with noise, and are kept where they are there and not where they are not. */
 #include "test.h"
 
-#include <gsl/gsl_errno.h>
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 #include <gsl/gsl_statistics.h>
@@ -123,8 +122,7 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
-static void test_lesion_of_a_real_lung_comes_back(void **state_) {
-  (void)state_;
+TEST(test_lesion_of_a_real_lung_comes_back) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -145,8 +143,7 @@ static void made(size_t vertices, supine_lungs *lungs) {
   supine_mesh_free(&mesh);
 }
 
-static void test_lesion_of_made_lungs_comes_back(void **state_) {
-  (void)state_;
+TEST(test_lesion_of_made_lungs_comes_back) {
   const supine_lesion lesion = {{-108.0, -139.0, -195.0}, 64.0, 3.0};
   supine_lungs rest = {0};
   supine_lungs other = {0};
@@ -157,8 +154,7 @@ static void test_lesion_of_made_lungs_comes_back(void **state_) {
   supine_lungs_free(&other);
 }
 
-static void test_even_lungs_keep_no_stiffness(void **state_) {
-  (void)state_;
+TEST(test_even_lungs_keep_no_stiffness) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   static supine_patient_record found;
@@ -215,8 +211,7 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
   free(is);
 }
 
-static void test_gradient_of_made_lungs_comes_back(void **state_) {
-  (void)state_;
+TEST(test_gradient_of_made_lungs_comes_back) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   made(1600, &rest);
@@ -226,8 +221,7 @@ static void test_gradient_of_made_lungs_comes_back(void **state_) {
   supine_lungs_free(&other);
 }
 
-static void test_gradient_of_a_real_lung_comes_back(void **state_) {
-  (void)state_;
+TEST(test_gradient_of_a_real_lung_comes_back) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -236,15 +230,4 @@ static void test_gradient_of_a_real_lung_comes_back(void **state_) {
   check_gradient(&rest, &other);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
-}
-
-int main(void) {
-  static const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_lesion_of_a_real_lung_comes_back),
-      cmocka_unit_test(test_lesion_of_made_lungs_comes_back),
-      cmocka_unit_test(test_even_lungs_keep_no_stiffness),
-      cmocka_unit_test(test_gradient_of_made_lungs_comes_back),
-      cmocka_unit_test(test_gradient_of_a_real_lung_comes_back)};
-  (void)gsl_set_error_handler_off();
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

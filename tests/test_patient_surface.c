@@ -3,7 +3,6 @@
 #include "test.h"
 
 #include <gsl/gsl_cdf.h>
-#include <gsl/gsl_errno.h>
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 
@@ -27,8 +26,7 @@ static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   return positions;
 }
 
-static void test_known_law_is_found_from_another_meshing(void **state_) {
-  (void)state_;
+TEST(test_known_law_is_found_from_another_meshing) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -39,16 +37,16 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
   double *target = moved_by_truth(&other, &largest);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   gsl_rng_set(random, 271);
-  supine_mesh state = other.mesh;
-  for (size_t i = 0; i < 3 * state.vertex_count; ++i) {
+  supine_mesh moved = other.mesh;
+  for (size_t i = 0; i < 3 * moved.vertex_count; ++i) {
     target[i] += gsl_ran_gaussian(random, 0.5);
   }
   gsl_rng_free(random);
-  state.vertices = target;
+  moved.vertices = target;
 
   const supine_model model = truth(); /* its stiffness and reach are known; the rest is found */
   const supine_patient_surface_task task = {.rest = &rest,
-                                            .state = &state,
+                                            .state = &moved,
                                             .model = &model,
                                             .options = {.law = SUPINE_PATIENT_PAPER},
                                             .options.gravity = {0.0, 1.0, 0.0}};
@@ -112,8 +110,7 @@ static void test_known_law_is_found_from_another_meshing(void **state_) {
 
 /* Law and kriging from surfaces of another meshing, a law that is far from deep: as the basis moves
  * it, the surface lies on the other state. */
-static void test_fit_surface_deep_law_meets_other_meshing(void **state_) {
-  (void)state_;
+TEST(test_fit_surface_deep_law_meets_other_meshing) {
   supine_mesh coarse = helper_lump(9, 70.3, 5);
   supine_mesh fine = helper_lump(15, 70.3, 5);
   supine_lungs rest = {0};
@@ -122,11 +119,11 @@ static void test_fit_surface_deep_law_meets_other_meshing(void **state_) {
   assert_int_equal(supine_lungs_create(&coarse, 1, NULL, &rest, &error), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&fine, 1, NULL, &other, &error), SUPINE_OK);
   double largest = 0.0;
-  supine_mesh state = other.mesh;
-  state.vertices = moved_by_truth(&other, &largest);
+  supine_mesh moved = other.mesh;
+  moved.vertices = moved_by_truth(&other, &largest);
   const supine_model model = truth();
   const supine_patient_surface_task task = {
-      .rest = &rest, .state = &state, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
+      .rest = &rest, .state = &moved, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
   static supine_patient_record fit;
   assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_OK);
   printf("largest move %.1f mm; %.2f mm before, %.3f in the end; deep alone %.2f, held out %.3f "
@@ -138,7 +135,7 @@ static void test_fit_surface_deep_law_meets_other_meshing(void **state_) {
               4.0 * fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
   assert_true(fit.surface.before > 3.0 && fit.surface.after < 0.2);
   assert_true(fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] < 0.4);
-  free(state.vertices);
+  free(moved.vertices);
   supine_mesh_free(&coarse);
   supine_mesh_free(&fine);
   supine_lungs_free(&rest);
@@ -147,8 +144,7 @@ static void test_fit_surface_deep_law_meets_other_meshing(void **state_) {
 
 /* A force that is fixed to the body does not follow gravity, and that shows; a turn of gravity
  * turns the correlation round. */
-static void test_force_that_ignores_gravity_shows(void **state_) {
-  (void)state_;
+TEST(test_force_that_ignores_gravity_shows) {
   supine_mesh lump = helper_lump(9, 70.3, 5);
   supine_lungs rest = {0};
   supine_error error;
@@ -157,16 +153,16 @@ static void test_force_that_ignores_gravity_shows(void **state_) {
   double found[3];
   for (int k = 0; k < 3; ++k) {
     supine_solution solution = {0};
-    supine_mesh state = rest.mesh;
+    supine_mesh moved = rest.mesh;
     static supine_patient_record fit;
     model.force = k == 0 ? (supine_force_law){.base = 0.5, .box = {0.9, 0.0, 0.1}}
                          : (supine_force_law){.base = 0.6, .gain = 0.8};
     assert_int_equal(supine_physics_solve(&rest, &model, supine_gravity, &solution, &error),
                      SUPINE_OK);
-    state.vertices = malloc(3 * state.vertex_count * sizeof(double));
-    supine_physics_solution_apply(&solution, &rest.mesh, 1.0, state.vertices);
+    moved.vertices = malloc(3 * moved.vertex_count * sizeof(double));
+    supine_physics_solution_apply(&solution, &rest.mesh, 1.0, moved.vertices);
     const supine_patient_surface_task task = {.rest = &rest,
-                                              .state = &state,
+                                              .state = &moved,
                                               .model = &model,
                                               .options = {.law = SUPINE_PATIENT_PAPER},
                                               .options.gravity = {0.0, k == 2 ? -1.0 : 1.0, 0.0}};
@@ -178,7 +174,7 @@ static void test_force_that_ignores_gravity_shows(void **state_) {
     assert_true(fit.applied.left < 0.1 * fit.applied.spread);
     assert_true(fabs(fit.applied.slopes[0] - (k == 0 ? 0.9 : 0.0)) < 0.05);
     assert_true(fabs(fit.applied.slopes[1] - (k == 0 ? 0.0 : -0.8)) < 0.05);
-    free(state.vertices);
+    free(moved.vertices);
     supine_physics_solution_free(&solution);
   }
   assert_true(fabs(found[0]) < 0.5);
@@ -190,8 +186,7 @@ static void test_force_that_ignores_gravity_shows(void **state_) {
 
 /* Of normal errors the median's 1.4826-fold is the standard deviation, and 4.685 of those are where
  * nothing counts any more (95 % efficiency: Tukey's biweight). Outliers do not move that. */
-static void test_weights_end_at_4_685_standard_deviations(void **state_) {
-  (void)state_;
+TEST(test_weights_end_at_4_685_standard_deviations) {
   enum { NORMAL = 2000, LOOK = 4, OUTLIERS = 100, COUNT = NORMAL + LOOK + OUTLIERS };
   static const double sigma = 0.37;
   static const double look[LOOK] = {1.5, -3.0, 4.5, -4.9}; /* standard deviations */
@@ -222,10 +217,10 @@ static void test_weights_end_at_4_685_standard_deviations(void **state_) {
   free(m.space);
 }
 
-static void refused(const supine_lungs *rest, const supine_mesh *state, const char *words) {
+static void refused(const supine_lungs *rest, const supine_mesh *moved, const char *words) {
   const supine_model model = truth();
   const supine_patient_surface_task task = {
-      .rest = rest, .state = state, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
+      .rest = rest, .state = moved, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
   static supine_patient_record fit;
   supine_error error = {0};
   assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_ERROR_MESH);
@@ -234,53 +229,41 @@ static void refused(const supine_lungs *rest, const supine_mesh *state, const ch
   }
 }
 
-static void test_other_frames_units_and_sides_are_refused(void **state_) {
-  (void)state_;
+TEST(test_other_frames_units_and_sides_are_refused) {
   supine_mesh lump = helper_lump(7, 70.3, 5);
   supine_lungs rest = {0};
   supine_error error;
   assert_int_equal(supine_lungs_create(&lump, 1, NULL, &rest, &error), SUPINE_OK);
-  supine_mesh state = rest.mesh;
-  state.vertices = malloc(3 * state.vertex_count * sizeof(double));
-  const size_t n = 3 * state.vertex_count;
-  memcpy(state.vertices, rest.mesh.vertices, n * sizeof(double));
-  refused(&rest, &state, "the same as the one at rest");
+  supine_mesh moved = rest.mesh;
+  moved.vertices = malloc(3 * moved.vertex_count * sizeof(double));
+  const size_t n = 3 * moved.vertex_count;
+  memcpy(moved.vertices, rest.mesh.vertices, n * sizeof(double));
+  refused(&rest, &moved, "the same as the one at rest");
   for (size_t i = 0; i < n; ++i) {
-    state.vertices[i] = 0.1 * rest.mesh.vertices[i];
+    moved.vertices[i] = 0.1 * rest.mesh.vertices[i];
   }
-  refused(&rest, &state, "check that units");
+  refused(&rest, &moved, "check that units");
   for (size_t i = 0; i < n; ++i) {
-    state.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
+    moved.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
   }
-  refused(&rest, &state, "do not overlap along z");
+  refused(&rest, &moved, "do not overlap along z");
   for (size_t i = 0; i < n; ++i) { /* the other side of the chest */
-    state.vertices[i] = rest.mesh.vertices[i] - (i % 3 == 0 ? 150.0 : 0.0);
+    moved.vertices[i] = rest.mesh.vertices[i] - (i % 3 == 0 ? 150.0 : 0.0);
   }
-  refused(&rest, &state, "do not overlap along x");
-  uint32_t *inwards = malloc(3 * state.triangle_count * sizeof *inwards);
-  for (size_t t = 0; t < state.triangle_count; ++t) {
-    inwards[3 * t] = state.triangles[3 * t];
-    inwards[3 * t + 1] = state.triangles[3 * t + 2];
-    inwards[3 * t + 2] = state.triangles[3 * t + 1];
+  refused(&rest, &moved, "do not overlap along x");
+  uint32_t *inwards = malloc(3 * moved.triangle_count * sizeof *inwards);
+  for (size_t t = 0; t < moved.triangle_count; ++t) {
+    inwards[3 * t] = moved.triangles[3 * t];
+    inwards[3 * t + 1] = moved.triangles[3 * t + 2];
+    inwards[3 * t + 2] = moved.triangles[3 * t + 1];
   }
   for (size_t i = 0; i < n; ++i) {
-    state.vertices[i] = 1.05 * rest.mesh.vertices[i];
+    moved.vertices[i] = 1.05 * rest.mesh.vertices[i];
   }
-  state.triangles = inwards;
-  refused(&rest, &state, "facing the same way");
+  moved.triangles = inwards;
+  refused(&rest, &moved, "facing the same way");
   free(inwards);
-  free(state.vertices);
+  free(moved.vertices);
   supine_mesh_free(&lump);
   supine_lungs_free(&rest);
-}
-
-int main(void) {
-  static const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_known_law_is_found_from_another_meshing),
-      cmocka_unit_test(test_fit_surface_deep_law_meets_other_meshing),
-      cmocka_unit_test(test_force_that_ignores_gravity_shows),
-      cmocka_unit_test(test_weights_end_at_4_685_standard_deviations),
-      cmocka_unit_test(test_other_frames_units_and_sides_are_refused)};
-  (void)gsl_set_error_handler_off();
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

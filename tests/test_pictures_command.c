@@ -104,8 +104,7 @@ static void check_posture(const json_t *posture) {
               1.1 * json_number_value(json_object_get(top, "expansion")));
 }
 
-static void test_compare_json_holds_what_it_says(void **state) {
-  (void)state;
+TEST(test_compare_json_holds_what_it_says) {
   EXPECT(0, "{",
          "compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8 "
          "--volume rest --breath 400 --json");
@@ -138,8 +137,7 @@ static void test_compare_json_holds_what_it_says(void **state) {
   json_decref(root);
 }
 
-static void test_compare_table_names_every_posture(void **state) {
-  (void)state;
+TEST(test_compare_table_names_every_posture) {
   EXPECT(0, "Between postures", "compare lungs.safetensors");
   static const char *const words[] = {"supine",    "prone",     "left",        "right",    "500 mL",
                                       "lowermost", "uppermost", "differ most", "farthest", "odd"};
@@ -148,8 +146,7 @@ static void test_compare_table_names_every_posture(void **state) {
   }
 }
 
-static void test_compare_csv_has_six_fields_a_row(void **state) {
-  (void)state;
+TEST(test_compare_csv_has_six_fields_a_row) {
   EXPECT(0, "", "compare lungs.safetensors --postures supine,prone,left --csv rows.csv");
   size_t size = 0;
   char *text = read_file("rows.csv", &size);
@@ -220,8 +217,7 @@ static void check_report(const char *name) {
   free(text);
 }
 
-static void test_compare_without_breath_finds_nothing_moved(void **state) {
-  (void)state;
+TEST(test_compare_without_breath_finds_nothing_moved) {
   EXPECT(0, "0.000", "compare lungs.safetensors --volume scan -o still.html");
   assert_null(strstr(printed, "nan"));
   size_t size = 0;
@@ -232,14 +228,12 @@ static void test_compare_without_breath_finds_nothing_moved(void **state) {
   free(text);
 }
 
-static void test_report_is_well_formed_and_needs_nothing_else(void **state) {
-  (void)state;
+TEST(test_report_is_well_formed_and_needs_nothing_else) {
   EXPECT(0, "", "compare lungs.safetensors --postures supine,prone,left -o report.html");
   check_report("report.html");
 }
 
-static void test_compare_open_surface_wants_rms(void **state) {
-  (void)state;
+TEST(test_compare_open_surface_wants_rms) {
   EXPECT(2, "--rms MM", "compare open.safetensors");
   EXPECT(0, "{", "compare open.safetensors --rms 5 --json --postures supine,prone,left");
   json_t *root = json_loads(printed, 0, NULL);
@@ -253,8 +247,7 @@ static void test_compare_open_surface_wants_rms(void **state) {
   EXPECT(0, "", "compare open.safetensors --rms 5 --csv open.csv -o open.html");
 }
 
-static void test_compare_misuse_is_a_usage_error(void **state) {
-  (void)state;
+TEST(test_compare_misuse_is_a_usage_error) {
   EXPECT(1, "did you mean 'prone'", "compare lungs.safetensors --postures supine,pron");
   EXPECT(1, "not all 0", "compare lungs.safetensors --postures 0:0:0");
   EXPECT(1, "three numbers", "compare lungs.safetensors --postures 1:2");
@@ -272,8 +265,7 @@ static void test_compare_misuse_is_a_usage_error(void **state) {
   EXPECT(0, "Usage", "compare --help");
 }
 
-static void test_render_misuse_is_a_usage_error(void **state) {
-  (void)state;
+TEST(test_render_misuse_is_a_usage_error) {
   EXPECT(1, ".png", "render lungs.safetensors --posture prone");
   EXPECT(1, ".png", "render lungs.safetensors --posture prone -o lung.gif");
   EXPECT(1, "which posture", "render lungs.safetensors -o lung.png");
@@ -344,8 +336,7 @@ static double png_difference(const char *a, const char *b) {
 }
 
 /* Other fonts and drivers change a picture by less than another posture does. */
-static void test_render_agrees_with_golden_picture(void **state) {
-  (void)state;
+TEST(test_render_agrees_with_golden_picture) {
   static const double tolerance = 1.5;
   char path[256];
   if (!render("lungs.safetensors --posture prone --largest 40 --size 240x180 -o golden.png")) {
@@ -395,8 +386,7 @@ static void find_arrow(const char *path, double place[2]) {
 
 /* Seen from the front, left is on the right and feet are below; who lies supine or prone is seen
  * along gravity. */
-static void test_render_arrow_points_where_gravity_does(void **state) {
-  (void)state;
+TEST(test_render_arrow_points_where_gravity_does) {
   static const struct {
     const char *posture;
     int toward[2]; /* right, down */
@@ -419,8 +409,7 @@ static void test_render_arrow_points_where_gravity_does(void **state) {
 }
 
 /* One point alone inside is seen. */
-static void test_render_one_point_inside_is_seen(void **state) {
-  (void)state;
+TEST(test_render_one_point_inside_is_seen) {
   char path[2][256];
   (void)snprintf(path[0], sizeof path[0], "%s/one.csv", folder);
   FILE *points = fopen(path[0], "w");
@@ -441,8 +430,7 @@ static void test_render_one_point_inside_is_seen(void **state) {
 
 /* Lungs that are seen through are a grey shell, fainter the less opaque, where whole ones have
  * colours. */
-static void test_render_opacity_below_one_draws_a_grey_shell(void **state) {
-  (void)state;
+TEST(test_render_opacity_below_one_draws_a_grey_shell) {
   static const char *const shares[3] = {"1", "0.5", "0.25"};
   cairo_surface_t *image[3];
   size_t coloured = 0;
@@ -512,8 +500,7 @@ static double frame_difference(const unsigned char *a, const unsigned char *b, s
 }
 
 /* Every frame is another; the last rests; there and back again begin and end alike. */
-static void test_render_turn_plays_from_posture_to_posture(void **state) {
-  (void)state;
+TEST(test_render_turn_plays_from_posture_to_posture) {
   enum { FRAMES = 7, WIDTH = 240, HEIGHT = 180 };
   static const double loss = 2.5; /* of 255, by the codec and the words about degrees */
   WebPAnimInfo info;
@@ -566,8 +553,7 @@ static void corner_of(const char *name, int rgb[3]) {
 }
 
 /* A dark page is all but black, a light one all but white, both all but grey. */
-static void test_render_themes_are_dark_and_light(void **state) {
-  (void)state;
+TEST(test_render_themes_are_dark_and_light) {
   int rgb[2][3];
   if (!render("lungs.safetensors --posture supine --size 260x380 --theme dark -o dark.png")) {
     skip();
@@ -584,8 +570,7 @@ static void test_render_themes_are_dark_and_light(void **state) {
   }
 }
 
-static void test_render_options_change_the_picture(void **state) {
-  (void)state;
+TEST(test_render_options_change_the_picture) {
   static const char *const variants[] = {
       "",
       "--view lateral",
@@ -615,8 +600,7 @@ static void test_render_options_change_the_picture(void **state) {
   }
 }
 
-static void test_render_many_postures_and_open_surfaces_work(void **state) {
-  (void)state;
+TEST(test_render_many_postures_and_open_surfaces_work) {
   if (!render("lungs.safetensors --posture supine,prone,left,right,upright,inverted,0.6:0:-0.8 "
               "--size 1400x260 -o row.png")) {
     skip();
@@ -628,24 +612,4 @@ static void test_render_many_postures_and_open_surfaces_work(void **state) {
   assert_int_equal(count_files("open2.png") + count_files("tiny.png"), 0);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_compare_json_holds_what_it_says),
-      cmocka_unit_test(test_compare_table_names_every_posture),
-      cmocka_unit_test(test_compare_csv_has_six_fields_a_row),
-      cmocka_unit_test(test_compare_without_breath_finds_nothing_moved),
-      cmocka_unit_test(test_report_is_well_formed_and_needs_nothing_else),
-      cmocka_unit_test(test_compare_open_surface_wants_rms),
-      cmocka_unit_test(test_compare_misuse_is_a_usage_error),
-      cmocka_unit_test(test_render_misuse_is_a_usage_error),
-      cmocka_unit_test(test_render_agrees_with_golden_picture),
-      cmocka_unit_test(test_render_arrow_points_where_gravity_does),
-      cmocka_unit_test(test_render_one_point_inside_is_seen),
-      cmocka_unit_test(test_render_opacity_below_one_draws_a_grey_shell),
-      cmocka_unit_test(test_render_themes_are_dark_and_light),
-      cmocka_unit_test(test_render_turn_plays_from_posture_to_posture),
-      cmocka_unit_test(test_render_options_change_the_picture),
-      cmocka_unit_test(test_render_many_postures_and_open_surfaces_work),
-  };
-  return cmocka_run_group_tests(tests, setup, remove_folder);
-}
+TEST_GROUP(setup, remove_folder)

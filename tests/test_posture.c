@@ -16,8 +16,7 @@ static void assert_vector(const double v[3], double x, double y, double z) {
   assert_true(fabs(v[2] - z) <= tolerance);
 }
 
-static void test_gravity_named_postures_literal(void **state) {
-  (void)state;
+TEST(test_gravity_named_postures_literal) {
   static const struct {
     const char *name;
     double x, y, z;
@@ -40,8 +39,7 @@ static void test_gravity_named_postures_literal(void **state) {
   }
 }
 
-static void test_gravity_unknown_name_untouched(void **state) {
-  (void)state;
+TEST(test_gravity_unknown_name_untouched) {
   static const char *const names[] = {"", "supin", "supines", "HF", "left_lateral", " prone"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     double g[3] = {9, 8, 7};
@@ -50,8 +48,7 @@ static void test_gravity_unknown_name_untouched(void **state) {
   }
 }
 
-static void test_name_every_index_is_known(void **state) {
-  (void)state;
+TEST(test_name_every_index_is_known) {
   assert_int_equal(supine_posture_count(), 16);
   for (size_t i = 0; i < supine_posture_count(); ++i) {
     double g[3];
@@ -61,8 +58,7 @@ static void test_name_every_index_is_known(void **state) {
   assert_null(supine_posture_name(supine_posture_count()));
 }
 
-static void test_nearest_misspelling_suggests(void **state) {
-  (void)state;
+TEST(test_nearest_misspelling_suggests) {
   static const char *const cases[][2] = {
       {"suppine", "supine"},
       {"spuine", "supine"},
@@ -85,8 +81,7 @@ static void test_nearest_misspelling_suggests(void **state) {
   assert_non_null(supine_posture_nearest(text));
 }
 
-static void test_quaternion_known_orientations_literal(void **state) {
-  (void)state;
+TEST(test_quaternion_known_orientations_literal) {
   const double h = sqrt(0.5);
   double g[3];
   assert_int_equal(supine_posture_quaternion((double[]){1, 0, 0, 0}, g), SUPINE_OK);
@@ -113,8 +108,7 @@ static void rotate(const double q[4], const double v[3], double out[3]) {
   out[2] = v[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
 }
 
-static void test_quaternion_random_rotates_to_world_down(void **state) {
-  (void)state;
+TEST(test_quaternion_random_rotates_to_world_down) {
   uint64_t random = 20080321;
   for (int i = 0; i < 1000; ++i) {
     double q[4];
@@ -134,8 +128,7 @@ static void test_quaternion_random_rotates_to_world_down(void **state) {
   }
 }
 
-static void test_quaternion_zero_or_not_finite_refused(void **state) {
-  (void)state;
+TEST(test_quaternion_zero_or_not_finite_refused) {
   double g[3];
   assert_int_equal(supine_posture_quaternion((double[]){0, 0, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_posture_quaternion((double[]){1, NAN, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
@@ -147,8 +140,7 @@ static void test_quaternion_zero_or_not_finite_refused(void **state) {
   assert_vector(g, 0, 0, -1);
 }
 
-static void test_tilt_postures_literal(void **state) {
-  (void)state;
+TEST(test_tilt_postures_literal) {
   const double c = 0.96592582628906831; /* cos 15 degrees, Abramowitz & Stegun 4.3.128 */
   const double s = 0.25881904510252074; /* sin 15 degrees */
   double g[3] = {0, 1, 0};
@@ -164,18 +156,4 @@ static void test_tilt_postures_literal(void **state) {
   assert_vector(g, 0, 0, 1);
   assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, NAN, g), SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_posture_tilt((double[]){0, INFINITY, 0}, 1, g), SUPINE_ERROR_ARGUMENT);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_gravity_named_postures_literal),
-      cmocka_unit_test(test_gravity_unknown_name_untouched),
-      cmocka_unit_test(test_name_every_index_is_known),
-      cmocka_unit_test(test_nearest_misspelling_suggests),
-      cmocka_unit_test(test_quaternion_known_orientations_literal),
-      cmocka_unit_test(test_quaternion_random_rotates_to_world_down),
-      cmocka_unit_test(test_quaternion_zero_or_not_finite_refused),
-      cmocka_unit_test(test_tilt_postures_literal),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -154,14 +154,12 @@ static void check_coefficients(const char *const *names, supine_axes axes) {
   free(ones);
 }
 
-static void test_precompute_real_adult_coefficients_equal_direct_solution(void **state) {
-  (void)state;
+TEST(test_precompute_real_adult_coefficients_equal_direct_solution) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   check_coefficients(names, SUPINE_AXES_AUTO);
 }
 
-static void test_precompute_real_ras_lungs_coefficients_equal_direct_solution(void **state) {
-  (void)state;
+TEST(test_precompute_real_ras_lungs_coefficients_equal_direct_solution) {
   static const char *const names[] = {"covid/covid001_left.ply", "covid/covid001_right.ply"};
   check_coefficients(names, SUPINE_AXES_RAS);
 }
@@ -334,8 +332,7 @@ static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t
   supine_basis_close(basis);
 }
 
-static void test_precompute_stated_error_equals_deform_against_solve(void **state) {
-  (void)state;
+TEST(test_precompute_stated_error_equals_deform_against_solve) {
   supine_lungs lungs = phantom(2000);
   check_stated_error(&lungs, 3, 0, 0.0);
   check_stated_error(&lungs, 15, 16, 0.0);
@@ -343,8 +340,7 @@ static void test_precompute_stated_error_equals_deform_against_solve(void **stat
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_stated_error_is_found_on_other_directions(void **state) {
-  (void)state;
+TEST(test_precompute_stated_error_is_found_on_other_directions) {
   supine_lungs lungs = phantom(1500);
   check_error_elsewhere(&lungs, 3, 0, 0.0, "phantom, 16 harmonics");
   check_error_elsewhere(&lungs, 15, 16, 0.0, "phantom, best modes of band 15");
@@ -352,8 +348,7 @@ static void test_precompute_stated_error_is_found_on_other_directions(void **sta
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_real_lung_stated_error_is_found_and_small(void **state) {
-  (void)state;
+TEST(test_precompute_real_lung_stated_error_is_found_and_small) {
   static const char *const names[] = {"lungs/chaste_left_5k.obj"};
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &lungs)) {
@@ -385,14 +380,12 @@ static void check_default_basis(const char *name, supine_axes axes, double softe
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_real_lung_default_error_within_half_a_percent(void **state) {
-  (void)state;
+TEST(test_precompute_real_lung_default_error_within_half_a_percent) {
   check_default_basis("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 0.0, 0.005, 8.0);
   check_default_basis("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 1.0, 0.006, 8.0);
 }
 
-static void test_precompute_another_real_lung_same_ratio(void **state) {
-  (void)state;
+TEST(test_precompute_another_real_lung_same_ratio) {
   check_default_basis("covid/covid002_right.ply", SUPINE_AXES_RAS, 0.0, 0.005, 8.0);
   check_default_basis("covid/covid002_right.ply", SUPINE_AXES_RAS, 1.0, 0.006, 8.0);
 }
@@ -453,8 +446,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
   supine_basis_close(basis);
 }
 
-static void test_precompute_volumes_exact_in_every_direction(void **state) {
-  (void)state;
+TEST(test_precompute_volumes_exact_in_every_direction) {
   supine_lungs lungs = phantom(3000);
   check_volumes(&lungs, 3, 0, 0.0, -300.0);
   /* head down, a softening phantom folds at -299 mL */
@@ -462,15 +454,13 @@ static void test_precompute_volumes_exact_in_every_direction(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_real_lungs_volumes_exact_in_every_direction(void **state) {
-  (void)state;
+TEST(test_precompute_real_lungs_volumes_exact_in_every_direction) {
   supine_lungs lungs = real_pair();
   check_volumes(&lungs, 15, 16, 0.0, -300.0);
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_default_law_keeps_four_modes(void **state) {
-  (void)state;
+TEST(test_precompute_default_law_keeps_four_modes) {
   supine_lungs lungs = phantom(1000);
   const supine_precompute_report report = make_basis(&lungs, 15, 16, 0.0, 0);
   assert_int_equal(report.mode_count, 4);
@@ -478,8 +468,7 @@ static void test_precompute_default_law_keeps_four_modes(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_open_surface_has_no_volume(void **state) {
-  (void)state;
+TEST(test_precompute_open_surface_has_no_volume) {
   supine_mesh lump = helper_lump(6, 80.0, 3);
   supine_lungs lungs = {0};
   --lump.triangle_count;
@@ -546,8 +535,7 @@ static double turned_over_at_run_time(double volume) {
 /* Lungs that are emptied in one posture, not at all in the opposite one and half in the others:
  * what the one turns over is found, beside what all of them turn over half emptied. Of the postures
  * those are taken that turn over the most: left, supine and right. */
-static void test_turned_over_looks_at_either_end_of_an_axis(void **state) {
-  (void)state;
+TEST(test_turned_over_looks_at_either_end_of_an_axis) {
   supine_lungs lungs = phantom(1500);
   const size_t n = lungs.mesh.vertex_count;
   const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -592,8 +580,7 @@ static void test_turned_over_looks_at_either_end_of_an_axis(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_turned_over_is_what_the_run_time_turns(void **state) {
-  (void)state;
+TEST(test_precompute_turned_over_is_what_the_run_time_turns) {
   supine_lungs lungs = phantom(3000);
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 4, .held_out = 20};
@@ -614,8 +601,7 @@ static void test_precompute_turned_over_is_what_the_run_time_turns(void **state)
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_reach_keeps_a_fine_real_surface_whole(void **state) {
-  (void)state;
+TEST(test_precompute_reach_keeps_a_fine_real_surface_whole) {
   supine_lungs lungs = real_pair();
   const supine_precompute_report links = make_basis(&lungs, 7, 4, 0.0, 20);
   reach = 10.0;
@@ -634,8 +620,7 @@ static bool stop_once(void *context, double fraction) {
   return (*(int *)context)-- != 0;
 }
 
-static void test_precompute_interrupted_anywhere_leaves_old_file(void **state) {
-  (void)state;
+TEST(test_precompute_interrupted_anywhere_leaves_old_file) {
   supine_lungs lungs = phantom(200);
   for (size_t r = 0; r < 2; ++r) {
     (void)make_basis(&lungs, 3, 0, 0.0, 0);
@@ -664,8 +649,7 @@ static void test_precompute_interrupted_anywhere_leaves_old_file(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_unwritable_leaves_old_file(void **state) {
-  (void)state;
+TEST(test_precompute_unwritable_leaves_old_file) {
   supine_lungs lungs = phantom(500);
   const supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 16};
@@ -677,8 +661,7 @@ static void test_precompute_unwritable_leaves_old_file(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_precompute_bad_options_refused(void **state) {
-  (void)state;
+TEST(test_precompute_bad_options_refused) {
   supine_lungs lungs = phantom(500);
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 65, .modes = 16};
@@ -695,25 +678,4 @@ static void test_precompute_bad_options_refused(void **state) {
   supine_lungs_free(&lungs);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_precompute_real_adult_coefficients_equal_direct_solution),
-      cmocka_unit_test(test_precompute_real_ras_lungs_coefficients_equal_direct_solution),
-      cmocka_unit_test(test_precompute_stated_error_equals_deform_against_solve),
-      cmocka_unit_test(test_precompute_stated_error_is_found_on_other_directions),
-      cmocka_unit_test(test_precompute_real_lung_stated_error_is_found_and_small),
-      cmocka_unit_test(test_precompute_real_lung_default_error_within_half_a_percent),
-      cmocka_unit_test(test_precompute_another_real_lung_same_ratio),
-      cmocka_unit_test(test_precompute_volumes_exact_in_every_direction),
-      cmocka_unit_test(test_precompute_real_lungs_volumes_exact_in_every_direction),
-      cmocka_unit_test(test_precompute_default_law_keeps_four_modes),
-      cmocka_unit_test(test_precompute_open_surface_has_no_volume),
-      cmocka_unit_test(test_turned_over_looks_at_either_end_of_an_axis),
-      cmocka_unit_test(test_precompute_turned_over_is_what_the_run_time_turns),
-      cmocka_unit_test(test_precompute_reach_keeps_a_fine_real_surface_whole),
-      cmocka_unit_test(test_precompute_interrupted_anywhere_leaves_old_file),
-      cmocka_unit_test(test_precompute_unwritable_leaves_old_file),
-      cmocka_unit_test(test_precompute_bad_options_refused),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

@@ -37,8 +37,7 @@ static int setup(void **state) {
          run("precompute lungs.ply -o lungs.safetensors --band 3 --modes harmonics") != 0;
 }
 
-static void test_help_every_command_teaches(void **state) {
-  (void)state;
+TEST(test_help_every_command_teaches) {
   static const char *const commands[] = {"phantom", "precompute", "info",    "deform",
                                          "compare", "render",     "breathe", "export",
                                          "solve",   "pv",         "fit",     "validate"};
@@ -57,8 +56,7 @@ static void test_help_every_command_teaches(void **state) {
   EXPECT(1, "needs a value", "deform lungs.safetensors -o");
 }
 
-static void test_deform_each_way_to_say_prone_same_file(void **state) {
-  (void)state;
+TEST(test_deform_each_way_to_say_prone_same_file) {
   static const char *const ways[] = {"--posture prone",
                                      "--posture HFP",
                                      "--posture ffp",
@@ -89,8 +87,7 @@ static void test_deform_each_way_to_say_prone_same_file(void **state) {
   }
 }
 
-static void test_deform_volumes_and_scale_as_asked(void **state) {
-  (void)state;
+TEST(test_deform_volumes_and_scale_as_asked) {
   EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume scan-300 -o a.ply");
   EXPECT(0, "+350.00 mL",
          "deform lungs.safetensors --posture left --volume left=scan+100,right=scan+250 -o a.vtp");
@@ -126,8 +123,7 @@ static void test_deform_volumes_and_scale_as_asked(void **state) {
 }
 
 /* Volumes as people mean them, of synthetic lungs of 2714.1 and 3285.9 mL: shares of resting.h. */
-static void test_deform_rest_and_full_by_posture(void **state) {
-  (void)state;
+TEST(test_deform_rest_and_full_by_posture) {
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture supine -o a.ply");
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture inverted --volume rest -o a.ply");
   EXPECT(0, "-3031.86 mL", "deform lungs.safetensors --posture upright -o a.ply");
@@ -177,8 +173,7 @@ static double positions_apart(const char *first, const char *second) {
 }
 
 /* A scan's own state and frame come back. */
-static void test_scanned_state_and_frame_come_back(void **state) {
-  (void)state;
+TEST(test_scanned_state_and_frame_come_back) {
   EXPECT(0, "-2000.00 mL",
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
   EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL; full inflation 6000 mL",
@@ -205,7 +200,8 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   EXPECT(0, "mm",
          "solve ras.ply --units cm --posture left --volume full --as-scanned -o solved.ply");
   assert_true(positions_apart("ras.ply", "solved.ply") < 2e-5);
-  EXPECT(0, "breath", "breathe ras.safetensors --posture left --as-scanned --fps 0.2 -o breath.pvd");
+  EXPECT(0, "breath",
+         "breathe ras.safetensors --posture left --as-scanned --fps 0.2 -o breath.pvd");
   static char text[1 << 20];
   assert_true(take_file("breath/frame_00000.vtp", text, sizeof text) > 0);
   assert_non_null(strstr(text, "RAS"));
@@ -246,8 +242,7 @@ static void test_scanned_state_and_frame_come_back(void **state) {
   assert_int_equal(count_files("b."), 0);
 }
 
-static void test_orientation_bad_values_refused(void **state) {
-  (void)state;
+TEST(test_orientation_bad_values_refused) {
   EXPECT(1, "did you mean 'prone'", "deform lungs.safetensors --posture pron -o c.ply");
   EXPECT(1, "no direction", "deform lungs.safetensors --gravity 0,0,0 -o c.ply");
   EXPECT(1, "three finite numbers", "deform lungs.safetensors --gravity 0,nan,0 -o c.ply");
@@ -260,8 +255,7 @@ static void test_orientation_bad_values_refused(void **state) {
   EXPECT(0, "gravity 0,0.6,0.8", "deform lungs.safetensors --gravity 0,3,4 -o d.ply");
 }
 
-static void test_output_impossible_exit_4_and_nothing_left(void **state) {
-  (void)state;
+TEST(test_output_impossible_exit_4_and_nothing_left) {
   EXPECT(4, "nowhere/out", "deform lungs.safetensors --posture prone -o nowhere/out.ply");
   EXPECT(4, "nowhere/out", "precompute lungs.ply -o nowhere/out.safetensors");
   EXPECT(4, "/dev/full", "precompute lungs.ply -o /dev/full");
@@ -270,8 +264,7 @@ static void test_output_impossible_exit_4_and_nothing_left(void **state) {
   EXPECT(1, "must end in", "deform lungs.safetensors --posture prone -o out.xyz");
 }
 
-static void test_basis_damaged_or_foreign_refused(void **state) {
-  (void)state;
+TEST(test_basis_damaged_or_foreign_refused) {
   static char bytes[1 << 20];
   const size_t size = take_file("lungs.safetensors", bytes, sizeof bytes);
   assert_true(size < sizeof bytes);
@@ -289,8 +282,7 @@ static void test_basis_damaged_or_foreign_refused(void **state) {
   assert_int_equal(count_files("e."), 0);
 }
 
-static void test_mesh_bad_input_named_and_nothing_left(void **state) {
-  (void)state;
+TEST(test_mesh_bad_input_named_and_nothing_left) {
   static char bytes[1 << 20];
   EXPECT(2, "missing.ply", "precompute missing.ply -o f.safetensors");
   write_text("empty.ply", "");
@@ -313,8 +305,7 @@ static void test_mesh_bad_input_named_and_nothing_left(void **state) {
   assert_int_equal(count_files("f."), 0);
 }
 
-static void test_mesh_open_surface_explains_volume(void **state) {
-  (void)state;
+TEST(test_mesh_open_surface_explains_volume) {
   write_text("open.obj", "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
   EXPECT(0, "not closed", "precompute open.obj -o open.safetensors --band 2");
   EXPECT(2, "close the mesh", "deform open.safetensors --posture prone --volume scan+5 -o g.ply");
@@ -324,8 +315,7 @@ static void test_mesh_open_surface_explains_volume(void **state) {
   EXPECT(0, "displacement 5.000 mm", "deform open.safetensors --posture prone --scale 5 -o g.ply");
 }
 
-static void test_mesh_wrong_units_refused(void **state) {
-  (void)state;
+TEST(test_mesh_wrong_units_refused) {
   write_text("metres.obj",
              "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.25\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   EXPECT(2, "--units m", "solve metres.obj --posture prone -o h.ply");
@@ -333,8 +323,7 @@ static void test_mesh_wrong_units_refused(void **state) {
   assert_null(strstr(printed, "units"));
 }
 
-static void test_mesh_inward_lung_turned_round_and_told(void **state) {
-  (void)state;
+TEST(test_mesh_inward_lung_turned_round_and_told) {
   write_text("in.obj",
              "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n");
   EXPECT(0, "note: the triangles of the left lung faced inwards: reversed",
@@ -344,8 +333,7 @@ static void test_mesh_inward_lung_turned_round_and_told(void **state) {
   EXPECT(2, "runs through the right lung", "solve in.obj --midline 49 --posture prone -o h.ply");
 }
 
-static void test_direction_file_moves_vertices_along_it(void **state) {
-  (void)state;
+TEST(test_direction_file_moves_vertices_along_it) {
   write_text("tetra.obj",
              "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   write_text("d.csv", "dx,dy,dz\n0,0,0\n0,0,0\n0,0,0\n3,0,4\n");
@@ -359,8 +347,7 @@ static void test_direction_file_moves_vertices_along_it(void **state) {
   assert_int_equal(count_files("j."), 0);
 }
 
-static void test_solve_unit_force_writes_column(void **state) {
-  (void)state;
+TEST(test_solve_unit_force_writes_column) {
   static char text[1 << 20];
   EXPECT(0, "", "solve lungs.ply --unit-force 17 -o column.csv");
   text[take_file("column.csv", text, sizeof text - 1)] = '\0';
@@ -388,8 +375,7 @@ static int sweep(const char *path, const struct stat *status, int type, struct F
   return 0;
 }
 
-static void test_mesh_hostile_files_never_crash(void **state) {
-  (void)state;
+TEST(test_mesh_hostile_files_never_crash) {
   char defects[] = SUPINE_TEST_DATA "/defects";
   char *real = realpath(defects, NULL);
   if (real == NULL) {
@@ -404,23 +390,4 @@ static void test_mesh_hostile_files_never_crash(void **state) {
   assert_int_equal(sweep_failures, 0);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_help_every_command_teaches),
-      cmocka_unit_test(test_deform_each_way_to_say_prone_same_file),
-      cmocka_unit_test(test_deform_volumes_and_scale_as_asked),
-      cmocka_unit_test(test_deform_rest_and_full_by_posture),
-      cmocka_unit_test(test_scanned_state_and_frame_come_back),
-      cmocka_unit_test(test_orientation_bad_values_refused),
-      cmocka_unit_test(test_output_impossible_exit_4_and_nothing_left),
-      cmocka_unit_test(test_basis_damaged_or_foreign_refused),
-      cmocka_unit_test(test_mesh_bad_input_named_and_nothing_left),
-      cmocka_unit_test(test_mesh_open_surface_explains_volume),
-      cmocka_unit_test(test_mesh_wrong_units_refused),
-      cmocka_unit_test(test_mesh_inward_lung_turned_round_and_told),
-      cmocka_unit_test(test_direction_file_moves_vertices_along_it),
-      cmocka_unit_test(test_solve_unit_force_writes_column),
-      cmocka_unit_test(test_mesh_hostile_files_never_crash),
-  };
-  return cmocka_run_group_tests(tests, setup, remove_folder);
-}
+TEST_GROUP(setup, remove_folder)

@@ -63,7 +63,7 @@ static double *weights_at(const supine_lungs *lungs, const supine_model *model,
 /* The grid is fine enough for the kinks of the lowest and highest vertex: one of many times the
  * directions, summed one by one, gives the same functions, but for what is far below any error that
  * a basis states. */
-static void test_projection_grid_is_fine_enough_for_the_kinks(void **state) {
+TEST(test_projection_grid_is_fine_enough_for_the_kinks) {
   enum { LATITUDES = 512, LONGITUDES = 513 };
   static const size_t bands[] = {1, 15};
   static const double most[] = {5e-5, 2e-5};
@@ -141,7 +141,7 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
   free(weights);
 }
 
-static void test_projection_few_solves_sum_to_any_full_solve(void **state) {
+TEST(test_projection_few_solves_sum_to_any_full_solve) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   static const double softens[] = {0.0, 0.5, 1.0, 2.0, 5.0};
@@ -163,8 +163,7 @@ static void test_projection_few_solves_sum_to_any_full_solve(void **state) {
   free(stiffness);
 }
 
-static void test_projection_impossible_softening_refused(void **state) {
-  (void)state;
+TEST(test_projection_impossible_softening_refused) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -247,7 +246,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
   free(c);
 }
 
-static void test_modes_equal_dense_decomposition(void **state) {
+TEST(test_modes_equal_dense_decomposition) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   double *weight = calloc(n, sizeof *weight);
@@ -271,7 +270,7 @@ static void test_modes_equal_dense_decomposition(void **state) {
   free(weight);
 }
 
-static void test_modes_beat_harmonics_of_the_same_number(void **state) {
+TEST(test_modes_beat_harmonics_of_the_same_number) {
   const supine_lungs *lungs = *state;
   static const double softens[] = {0.0, 1.0};
   char path[] = "/tmp/supine-projection-XXXXXX";
@@ -297,8 +296,7 @@ static void test_modes_beat_harmonics_of_the_same_number(void **state) {
 
 /* Singular values of 3e-7 and 3e-8 of the first lie on either side of what the Gram matrix tells
  * from rounding. */
-static void test_modes_end_where_rounding_begins(void **state) {
-  (void)state;
+TEST(test_modes_end_where_rounding_begins) {
   enum { ROWS = 7, TERMS = 4 };
   static const double sizes[TERMS] = {2.0, 0.5, 2.0 * 3e-7, 2.0 * 3e-8};
   double columns[ROWS * TERMS] = {0.0};
@@ -321,8 +319,7 @@ static void test_modes_end_where_rounding_begins(void **state) {
 }
 
 /* Bins are 1/256 of a power of two wide, and a percentile is the upper edge of its bin. */
-static void test_tally_percentile_is_the_edge_above(void **state) {
-  (void)state;
+TEST(test_tally_percentile_is_the_edge_above) {
   supine_tally *tally = calloc(1, sizeof *tally);
   supine_tally *other = calloc(1, sizeof *other);
   static const double low[] = {1.0, 1.001, 1.003};
@@ -338,15 +335,4 @@ static void test_tally_percentile_is_the_edge_above(void **state) {
   free(other);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_projection_few_solves_sum_to_any_full_solve),
-      cmocka_unit_test(test_projection_impossible_softening_refused),
-      cmocka_unit_test(test_projection_grid_is_fine_enough_for_the_kinks),
-      cmocka_unit_test(test_modes_equal_dense_decomposition),
-      cmocka_unit_test(test_modes_end_where_rounding_begins),
-      cmocka_unit_test(test_tally_percentile_is_the_edge_above),
-      cmocka_unit_test(test_modes_beat_harmonics_of_the_same_number),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

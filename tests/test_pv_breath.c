@@ -4,8 +4,6 @@
 
 #include "test.h"
 
-#include <gsl/gsl_errno.h>
-
 #include "program/breath/pv.h"
 
 #define assert_near(value, expected, within) assert_true(fabs((value) - (expected)) <= (within))
@@ -24,8 +22,7 @@ static supine_pv_breath breath_of(supine_pv_course course) {
                             .course = course};
 }
 
-static void test_breath_each_course_rests_and_reaches_tidal(void **state) {
-  (void)state;
+TEST(test_breath_each_course_rests_and_reaches_tidal) {
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
     const supine_pv_breath breath = breath_of((supine_pv_course)course);
     const double period = 60.0 / breath.rate;
@@ -49,8 +46,7 @@ static void test_breath_each_course_rests_and_reaches_tidal(void **state) {
   }
 }
 
-static void test_breath_each_course_rises_then_falls_and_repeats(void **state) {
-  (void)state;
+TEST(test_breath_each_course_rises_then_falls_and_repeats) {
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
     const supine_pv_breath breath = breath_of((supine_pv_course)course);
     const double period = 60.0 / breath.rate;
@@ -81,8 +77,7 @@ static void test_breath_each_course_rises_then_falls_and_repeats(void **state) {
 }
 
 /* Pressure follows its course, and volume the limbs. */
-static void test_breath_volume_follows_scaled_limbs(void **state) {
-  (void)state;
+TEST(test_breath_volume_follows_scaled_limbs) {
   const supine_pv *normal = supine_breath_normal();
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
     const supine_pv_breath breath = breath_of((supine_pv_course)course);
@@ -115,8 +110,7 @@ static void test_breath_volume_follows_scaled_limbs(void **state) {
 }
 
 /* [Santhanam2008] V: 500 mL over 5 s of inhalation, in steps of 15 ms (66.66 a second): 1.5 mL. */
-static void test_breath_constant_flow_is_paper_step(void **state) {
-  (void)state;
+TEST(test_breath_constant_flow_is_paper_step) {
   const supine_pv_breath breath = {
       .tidal = 500.0, .rate = 6.0, .inhale_fraction = 0.5, .course = SUPINE_PV_CONSTANT_FLOW};
   double times[334];
@@ -133,8 +127,7 @@ static void test_breath_constant_flow_is_paper_step(void **state) {
   assert_near(volumes[333], 500.0, rounding * 500.0);
 }
 
-static void test_breath_default_is_quiet_breathing(void **state) {
-  (void)state;
+TEST(test_breath_default_is_quiet_breathing) {
   const supine_pv_breath breath = supine_breath_default();
   assert_true(breath.tidal == 500.0 && breath.rate == 12.0);
   const double times[2] = {0.0, 5.0 / 3.0};
@@ -160,8 +153,7 @@ static void expect_argument(const supine_pv *pv, const supine_pv_breath *breath,
   }
 }
 
-static void test_breath_out_of_range_refused(void **state) {
-  (void)state;
+TEST(test_breath_out_of_range_refused) {
   const supine_pv *normal = supine_breath_normal();
   const double bad[] = {0.0, -3.0, NAN, INFINITY};
   for (size_t i = 0; i < 4; ++i) {
@@ -192,17 +184,4 @@ static void test_breath_out_of_range_refused(void **state) {
   breath = breath_of(SUPINE_PV_COSINE);
   expect_argument(&narrow, &breath, 1.0, "outside the exhale limb's range");
   assert_int_equal(supine_breath_evaluate(normal, &breath, 0, NULL, NULL, NULL, NULL), SUPINE_OK);
-}
-
-int main(void) {
-  (void)gsl_set_error_handler_off();
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_breath_each_course_rests_and_reaches_tidal),
-      cmocka_unit_test(test_breath_each_course_rises_then_falls_and_repeats),
-      cmocka_unit_test(test_breath_volume_follows_scaled_limbs),
-      cmocka_unit_test(test_breath_constant_flow_is_paper_step),
-      cmocka_unit_test(test_breath_default_is_quiet_breathing),
-      cmocka_unit_test(test_breath_out_of_range_refused),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

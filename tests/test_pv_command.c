@@ -2,8 +2,6 @@
 /* supine pv: exit codes, and what it prints. */
 #include "test.h"
 
-#include <gsl/gsl_errno.h>
-
 #include "program/breath/pv.h"
 
 #include "command_helpers.h"
@@ -50,8 +48,7 @@ static int teardown(void **state) {
 
 #define RUN(kept, ...) COMMAND_RUN(&supine_command_pv, kept, text, __VA_ARGS__)
 
-static void test_command_fit_writes_parameters_that_load(void **state) {
-  (void)state;
+TEST(test_command_fit_writes_parameters_that_load) {
   assert_int_equal(RUN(KEPT_OUT, "fit", good, "-o", out), 0);
   assert_non_null(strstr(text, "inhale: 16 samples, 0 to 30 cmH2O"));
   assert_non_null(strstr(text, "exhale: no samples"));
@@ -62,8 +59,7 @@ static void test_command_fit_writes_parameters_that_load(void **state) {
   assert_true(difference < 1e-6 && difference > -1e-6);
 }
 
-static void test_command_fit_json_has_each_field(void **state) {
-  (void)state;
+TEST(test_command_fit_json_has_each_field) {
   assert_int_equal(RUN(KEPT_OUT, "fit", "--json", "--confidence", "0.5", good), 0);
   static const char *const keys[] = {"{\"confidence\": 0.5, \"inhale\": {\"samples\": 16",
                                      "\"pressure_cmH2O\": [0.0, 30.0]",
@@ -80,8 +76,7 @@ static void test_command_fit_json_has_each_field(void **state) {
   assert_string_equal(text + strlen(text) - 3, "}}\n");
 }
 
-static void test_command_show_prints_curve(void **state) {
-  (void)state;
+TEST(test_command_show_prints_curve) {
   assert_int_equal(RUN(KEPT_OUT, "show", "--step", "12.5"), 0);
   double cell[4][5];
   char *at = strchr(text, '\n');
@@ -104,8 +99,7 @@ static void test_command_show_prints_curve(void **state) {
   assert_true(cell[0][4] > cell[3][4]);                   /* and stiffens */
 }
 
-static void test_command_help_teaches(void **state) {
-  (void)state;
+TEST(test_command_help_teaches) {
   assert_int_equal(RUN(KEPT_OUT, "--help"), 0);
   assert_non_null(strstr(text, "pressure_cmH2O,volume_mL,limb"));
   assert_non_null(strstr(text, "Examples:"));
@@ -117,8 +111,7 @@ static void expect_printed(const char *message) {
   }
 }
 
-static void test_command_failures_have_their_exit_codes(void **state) {
-  (void)state;
+TEST(test_command_failures_have_their_exit_codes) {
   assert_int_equal(RUN(KEPT_ERR, "fit"), 1);
   expect_printed("give 'fit FILE'");
   assert_int_equal(RUN(KEPT_ERR, "fit", good, bad), 1);
@@ -139,14 +132,4 @@ static void test_command_failures_have_their_exit_codes(void **state) {
   expect_printed("/nonexistent/p.csv");
 }
 
-int main(void) {
-  (void)gsl_set_error_handler_off();
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_command_fit_writes_parameters_that_load),
-      cmocka_unit_test(test_command_fit_json_has_each_field),
-      cmocka_unit_test(test_command_show_prints_curve),
-      cmocka_unit_test(test_command_help_teaches),
-      cmocka_unit_test(test_command_failures_have_their_exit_codes),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

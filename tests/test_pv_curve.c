@@ -4,8 +4,6 @@
 
 #include "test.h"
 
-#include <gsl/gsl_errno.h>
-
 #include "program/breath/pv.h"
 
 #define assert_near(value, expected, within) assert_true(fabs((value) - (expected)) <= (within))
@@ -25,8 +23,7 @@ static void spread(double low, double high, double *at) {
   at[COUNT - 1] = high;
 }
 
-static void test_evaluate_constant_control_gives_salazar_knowles(void **state) {
-  (void)state;
+TEST(test_evaluate_constant_control_gives_salazar_knowles) {
   /* V = Vmax (1 - exp(-k P)), emphysema to fibrosis */
   static const double k[] = {0.31, 0.0914, 0.043};
   for (size_t i = 0; i < sizeof k / sizeof *k; ++i) {
@@ -50,8 +47,7 @@ static void test_evaluate_constant_control_gives_salazar_knowles(void **state) {
   }
 }
 
-static void test_evaluate_second_control_gives_gaussian_compliance(void **state) {
-  (void)state;
+TEST(test_evaluate_second_control_gives_gaussian_compliance) {
   /* u = c_2 x: compliance is exp(c_2 (x^2 - 1) / 2), its integral the error function */
   const double c2 = -7.3;
   const double root = sqrt(-c2 / 2.0);
@@ -68,8 +64,7 @@ static void test_evaluate_second_control_gives_gaussian_compliance(void **state)
 }
 
 /* u' from differences of the logarithm of compliance matches the sum over Legendre polynomials. */
-static void test_evaluate_any_controls_satisfy_equation(void **state) {
-  (void)state;
+TEST(test_evaluate_any_controls_satisfy_equation) {
   const double half = 0.5 * (sigmoid.pressure[1] - sigmoid.pressure[0]);
   const double step = 1e-4;
   for (int j = 0; j < 12; ++j) {
@@ -88,8 +83,7 @@ static void test_evaluate_any_controls_satisfy_equation(void **state) {
   }
 }
 
-static void test_evaluate_ends_and_order_exact(void **state) {
-  (void)state;
+TEST(test_evaluate_ends_and_order_exact) {
   const double middle = 11.3;
   const double pressures[5] = {sigmoid.pressure[1], middle, sigmoid.pressure[0], middle,
                                sigmoid.pressure[1]};
@@ -104,8 +98,7 @@ static void test_evaluate_ends_and_order_exact(void **state) {
   assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 0, NULL, NULL, NULL, NULL), SUPINE_OK);
 }
 
-static void test_evaluate_wild_controls_still_rise(void **state) {
-  (void)state;
+TEST(test_evaluate_wild_controls_still_rise) {
   const supine_pv_curve wild = {{0.0, 20.0}, {0.0, 1.0}, {9.1, -17.3, 21.7, 14.9, -11.3}};
   double pressures[COUNT];
   double volumes[COUNT];
@@ -119,8 +112,7 @@ static void test_evaluate_wild_controls_still_rise(void **state) {
   }
 }
 
-static void test_invert_every_volume_returns_its_pressure(void **state) {
-  (void)state;
+TEST(test_invert_every_volume_returns_its_pressure) {
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};
   enum { CURVES = 4 };
   const supine_pv_curve *curves[CURVES] = {&sigmoid, &stiff,
@@ -142,8 +134,7 @@ static void test_invert_every_volume_returns_its_pressure(void **state) {
   }
 }
 
-static void test_invert_salazar_knowles_matches_logarithm(void **state) {
-  (void)state;
+TEST(test_invert_salazar_knowles_matches_logarithm) {
   const supine_pv_curve *curve = &supine_breath_normal()->limb[SUPINE_PV_EXHALE];
   const double k = log(2.0) / 7.58;
   const double most = 6000.0 / -expm1(-30.0 * k);
@@ -155,8 +146,7 @@ static void test_invert_salazar_knowles_matches_logarithm(void **state) {
   }
 }
 
-static void test_evaluate_outside_range_or_bad_curve_refused(void **state) {
-  (void)state;
+TEST(test_evaluate_outside_range_or_bad_curve_refused) {
   supine_error error = {0};
   double out = 0.0;
   const double beyond[] = {-4.4, 38.8, NAN, INFINITY};
@@ -188,8 +178,7 @@ static void test_evaluate_outside_range_or_bad_curve_refused(void **state) {
   }
 }
 
-static void test_normal_lung_is_its_stated_curves(void **state) {
-  (void)state;
+TEST(test_normal_lung_is_its_stated_curves) {
   const double k = log(2.0) / 7.58; /* [Salazar1964]: half-inflation pressure 7.58 cmH2O */
   const double rise = 1.0 / (1.0 + exp(-20.0 / 6.0)) - 1.0 / (1.0 + exp(10.0 / 6.0));
   double pressures[COUNT];
@@ -213,26 +202,8 @@ static void test_normal_lung_is_its_stated_curves(void **state) {
   }
 }
 
-static void test_limb_name_any_value_not_null(void **state) {
-  (void)state;
+TEST(test_limb_name_any_value_not_null) {
   assert_string_equal(supine_breath_limb_name(SUPINE_PV_INHALE), "inhale");
   assert_string_equal(supine_breath_limb_name(SUPINE_PV_EXHALE), "exhale");
   assert_non_null(supine_breath_limb_name(SUPINE_PV_LIMB_COUNT));
-}
-
-int main(void) {
-  (void)gsl_set_error_handler_off();
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_evaluate_constant_control_gives_salazar_knowles),
-      cmocka_unit_test(test_evaluate_second_control_gives_gaussian_compliance),
-      cmocka_unit_test(test_evaluate_any_controls_satisfy_equation),
-      cmocka_unit_test(test_evaluate_ends_and_order_exact),
-      cmocka_unit_test(test_evaluate_wild_controls_still_rise),
-      cmocka_unit_test(test_invert_every_volume_returns_its_pressure),
-      cmocka_unit_test(test_invert_salazar_knowles_matches_logarithm),
-      cmocka_unit_test(test_evaluate_outside_range_or_bad_curve_refused),
-      cmocka_unit_test(test_normal_lung_is_its_stated_curves),
-      cmocka_unit_test(test_limb_name_any_value_not_null),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

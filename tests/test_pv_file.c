@@ -2,8 +2,6 @@
 /* Files of samples and of parameters. */
 #include "test.h"
 
-#include <gsl/gsl_errno.h>
-
 #include "program/breath/pv.h"
 
 static char folder[] = "/tmp/supine-pv-XXXXXX";
@@ -42,8 +40,7 @@ static void expect_load(const char *text, size_t size, const char *expected) {
   }
 }
 
-static void test_fit_file_malformed_names_the_line(void **state) {
-  (void)state;
+TEST(test_fit_file_malformed_names_the_line) {
   static const struct {
     const char *text;
     const char *expected;
@@ -75,8 +72,7 @@ static void test_fit_file_malformed_names_the_line(void **state) {
   expect_load(nul, sizeof nul - 1, ":2: a NUL byte");
 }
 
-static void test_load_missing_file_or_folder_reports_read(void **state) {
-  (void)state;
+TEST(test_load_missing_file_or_folder_reports_read) {
   supine_pv pv;
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   supine_error error = {0};
@@ -87,8 +83,7 @@ static void test_load_missing_file_or_folder_reports_read(void **state) {
   assert_int_equal(supine_breath_load(folder, &pv, &error), SUPINE_ERROR_READ);
 }
 
-static void test_save_load_same_numbers(void **state) {
-  (void)state;
+TEST(test_save_load_same_numbers) {
   const supine_pv written = {
       {{{-1.0 / 3.0, 29.9}, {1234.5678901234567, 5.0e3}, {0.1, -2.0 / 7.0, 1e-17, 49.9, -50.0}},
        {{0.0, 30.0}, {-0.0, 6000.1}, {0.0, 1.0, 2.0, 3.0, 4.0}}}};
@@ -101,8 +96,7 @@ static void test_save_load_same_numbers(void **state) {
   assert_memory_equal(&read, supine_breath_normal(), sizeof read);
 }
 
-static void test_save_bad_target_or_curve_refused(void **state) {
-  (void)state;
+TEST(test_save_bad_target_or_curve_refused) {
   supine_error error = {0};
   assert_int_equal(supine_breath_save("/nonexistent/p.csv", supine_breath_normal(), &error),
                    SUPINE_ERROR_WRITE);
@@ -115,8 +109,7 @@ static void test_save_bad_target_or_curve_refused(void **state) {
 #define HEADER                                                                                     \
   "limb,pressure_low_cmH2O,pressure_high_cmH2O,volume_low_mL,volume_high_mL,c1,c2,c3,c4,c5\n"
 
-static void test_load_one_limb_serves_both(void **state) {
-  (void)state;
+TEST(test_load_one_limb_serves_both) {
   static const char *const texts[] = {HEADER "exhale,0,30,0,6000,-1,2,3,4,5\n",
                                       HEADER "inhale,0,30,0,6000,-1,2,3,4,5\n"};
   for (size_t i = 0; i < 2; ++i) {
@@ -128,8 +121,7 @@ static void test_load_one_limb_serves_both(void **state) {
   }
 }
 
-static void test_load_malformed_parameters_name_the_line(void **state) {
-  (void)state;
+TEST(test_load_malformed_parameters_name_the_line) {
   static const struct {
     const char *text;
     const char *expected;
@@ -174,8 +166,7 @@ static void write_limbs(bool inhale, bool exhale) {
   assert_int_equal(fclose(file), 0);
 }
 
-static void test_fit_file_each_limb_its_own_or_the_other(void **state) {
-  (void)state;
+TEST(test_fit_file_each_limb_its_own_or_the_other) {
   for (int which = 1; which <= 3; ++which) {
     write_limbs((which & 1) != 0, (which & 2) != 0);
     supine_pv pv;
@@ -193,16 +184,4 @@ static void test_fit_file_each_limb_its_own_or_the_other(void **state) {
   }
 }
 
-int main(void) {
-  (void)gsl_set_error_handler_off();
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_fit_file_malformed_names_the_line),
-      cmocka_unit_test(test_load_missing_file_or_folder_reports_read),
-      cmocka_unit_test(test_save_load_same_numbers),
-      cmocka_unit_test(test_save_bad_target_or_curve_refused),
-      cmocka_unit_test(test_load_one_limb_serves_both),
-      cmocka_unit_test(test_load_malformed_parameters_name_the_line),
-      cmocka_unit_test(test_fit_file_each_limb_its_own_or_the_other),
-  };
-  return cmocka_run_group_tests(tests, folder_make, folder_remove);
-}
+TEST_GROUP(folder_make, folder_remove)

@@ -2,7 +2,6 @@
 /* The inverse problem: curves of the literature, noise, confidence, bad samples. */
 #include "test.h"
 
-#include <gsl/gsl_errno.h>
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 
@@ -91,8 +90,7 @@ static supine_status fit(size_t count, const double *pressures, const double *vo
                            report != NULL ? report : &ignored, error);
 }
 
-static void test_fit_published_curves_under_one_percent(void **state) {
-  (void)state;
+TEST(test_fit_published_curves_under_one_percent) {
   for (size_t i = 0; i < TRUTHS; ++i) {
     double pressures[SAMPLES];
     double volumes[SAMPLES];
@@ -118,8 +116,7 @@ static void test_fit_published_curves_under_one_percent(void **state) {
   }
 }
 
-static void test_fit_one_percent_noise_follows_truth(void **state) {
-  (void)state;
+TEST(test_fit_one_percent_noise_follows_truth) {
   enum { SEEDS = 20 };
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   assert_non_null(random);
@@ -160,8 +157,7 @@ static void model_sample(size_t count, double *pressures, double *volumes) {
                    SUPINE_OK);
 }
 
-static void test_fit_model_own_data_recovers_parameters(void **state) {
-  (void)state;
+TEST(test_fit_model_own_data_recovers_parameters) {
   static const size_t counts[] = {8, 9, 13, 33};
   for (size_t n = 0; n < sizeof counts / sizeof *counts; ++n) {
     for (int reversed = 0; reversed <= 1; ++reversed) {
@@ -193,8 +189,7 @@ static void test_fit_model_own_data_recovers_parameters(void **state) {
 
 /* The number of fits whose interval holds the true parameter is binomial: over 400 seeds at 0.95,
  * 380 +- 4.4. Within 5 deviations, and a rate of 0.80 outside them. */
-static void test_fit_intervals_cover_truth_at_nominal_rate(void **state) {
-  (void)state;
+TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
   enum { SEEDS = 400, COUNT = 21 };
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   assert_non_null(random);
@@ -236,8 +231,7 @@ static void test_fit_intervals_cover_truth_at_nominal_rate(void **state) {
 }
 
 /* The minimum is one: a small move of any parameter makes the misfit worse. */
-static void test_fit_result_is_a_minimum(void **state) {
-  (void)state;
+TEST(test_fit_result_is_a_minimum) {
   double pressures[SAMPLES];
   double volumes[SAMPLES];
   truth_sample(&truths[11], SAMPLES, pressures, volumes);
@@ -274,8 +268,7 @@ static void expect_format(size_t count, const double *pressures, const double *v
   }
 }
 
-static void test_fit_bad_samples_name_the_line(void **state) {
-  (void)state;
+TEST(test_fit_bad_samples_name_the_line) {
   double p[SAMPLES];
   double v[SAMPLES];
   model_sample(SAMPLES, p, v);
@@ -304,8 +297,7 @@ static void test_fit_bad_samples_name_the_line(void **state) {
 }
 
 /* A limb recorded from high to low pressure is blamed by its own lines. */
-static void test_fit_falling_limb_names_its_line(void **state) {
-  (void)state;
+TEST(test_fit_falling_limb_names_its_line) {
   double p[SAMPLES];
   double v[SAMPLES];
   double reversed_p[SAMPLES];
@@ -320,8 +312,7 @@ static void test_fit_falling_limb_names_its_line(void **state) {
 }
 
 /* A small dip in smooth samples is no noise; the same dip among noise of its size is. */
-static void test_fit_dip_judged_against_noise(void **state) {
-  (void)state;
+TEST(test_fit_dip_judged_against_noise) {
   double p[SAMPLES];
   double v[SAMPLES];
   const truth *lung = &truths[10];
@@ -394,8 +385,7 @@ static double fall_of(const double *v, size_t count) {
 
 /* Few samples may fall by 8 % of the range, many by 15 %, and by no more than 7 sqrt(2) times the
  * noise, 1.4826 of the median residual; 15 samples are many. */
-static void test_fit_falls_are_allowed_up_to_the_stated_limits(void **state) {
-  (void)state;
+TEST(test_fit_falls_are_allowed_up_to_the_stated_limits) {
   double p[SAMPLES];
   double v[SAMPLES];
   supine_pv_curve curve;
@@ -421,20 +411,4 @@ static void test_fit_falls_are_allowed_up_to_the_stated_limits(void **state) {
   const double fall = fall_of(v, SAMPLES);
   assert_true(fall < 0.1); /* of the noise, not of the range */
   assert_near(fall, 7.0 * sqrt(2.0) * sigma, 1e-4 * fall);
-}
-
-int main(void) {
-  (void)gsl_set_error_handler_off();
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_fit_published_curves_under_one_percent),
-      cmocka_unit_test(test_fit_one_percent_noise_follows_truth),
-      cmocka_unit_test(test_fit_model_own_data_recovers_parameters),
-      cmocka_unit_test(test_fit_intervals_cover_truth_at_nominal_rate),
-      cmocka_unit_test(test_fit_result_is_a_minimum),
-      cmocka_unit_test(test_fit_bad_samples_name_the_line),
-      cmocka_unit_test(test_fit_falling_limb_names_its_line),
-      cmocka_unit_test(test_fit_falls_are_allowed_up_to_the_stated_limits),
-      cmocka_unit_test(test_fit_dip_judged_against_noise),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -57,8 +57,7 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
 }
 
 /* Over all nodes, masses and springs, with the link weights of equilibrium.h and nothing else. */
-static void test_reach_equals_dense_definition(void **state) {
-  (void)state;
+TEST(test_reach_equals_dense_definition) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);
   const supine_mesh *mesh = &lungs.mesh;
@@ -155,8 +154,7 @@ static void test_reach_equals_dense_definition(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_reach_constant_force_stays_constant(void **state) {
-  (void)state;
+TEST(test_reach_constant_force_stays_constant) {
   supine_lungs lungs = lungs_of(helper_lump(12, 60.0, 5), 25.0);
   double *force = irregular(lungs.mesh.vertex_count, 0.7, 0.0, 1);
   double *found = solve(&lungs, NULL, force);
@@ -216,8 +214,7 @@ static double harmonic_error(size_t frequency, double irregularity, double reach
   return sqrt(error / norm);
 }
 
-static void test_reach_on_sphere_damps_harmonics_as_the_laplacian_does(void **state) {
-  (void)state;
+TEST(test_reach_on_sphere_damps_harmonics_as_the_laplacian_does) {
   static const double reaches[] = {10.0, 25.0, 60.0};
   for (size_t r = 0; r < 3; ++r) {
     for (size_t l = 1; l <= 5; ++l) {
@@ -263,8 +260,7 @@ static double spread(size_t frequency, double reach) {
 }
 
 /* In the plane the response to a point is K_0(r / R), whose root mean square radius is 2 R. */
-static void test_reach_is_a_length_where_links_are_not(void **state) {
-  (void)state;
+TEST(test_reach_is_a_length_where_links_are_not) {
   double with[3];
   double without[3];
   static const size_t frequencies[] = {12, 24, 48};
@@ -280,8 +276,7 @@ static void test_reach_is_a_length_where_links_are_not(void **state) {
 }
 
 /* Twice as expandable tissue moves twice as far, outside the reach of where it ends. */
-static void test_reach_twice_expandable_half_moves_twice_as_far(void **state) {
-  (void)state;
+TEST(test_reach_twice_expandable_half_moves_twice_as_far) {
   const double reach = 10.0;
   supine_lungs lungs = lungs_of(sphere(24, 0.1), reach);
   const size_t n = lungs.mesh.vertex_count;
@@ -311,15 +306,4 @@ static void test_reach_twice_expandable_half_moves_twice_as_far(void **state) {
   free(even);
   free(uneven);
   supine_lungs_free(&lungs);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_reach_equals_dense_definition),
-      cmocka_unit_test(test_reach_constant_force_stays_constant),
-      cmocka_unit_test(test_reach_on_sphere_damps_harmonics_as_the_laplacian_does),
-      cmocka_unit_test(test_reach_is_a_length_where_links_are_not),
-      cmocka_unit_test(test_reach_twice_expandable_half_moves_twice_as_far),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

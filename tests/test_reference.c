@@ -86,8 +86,7 @@ static double farthest(const double *a, const double *b, size_t count) {
   return most;
 }
 
-static void test_axes_values_met_and_harmonics_agree_everywhere(void **state) {
-  (void)state;
+TEST(test_axes_values_met_and_harmonics_agree_everywhere) {
   static const double values[6] = {-3.1, 2.7, 0.4, -1.9, 5.3, 0.08};
   double harmonics[9];
   uint64_t seed = 77;
@@ -114,8 +113,7 @@ static void test_axes_values_met_and_harmonics_agree_everywhere(void **state) {
   }
 }
 
-static void test_resting_defaults_and_options(void **state) {
-  (void)state;
+TEST(test_resting_defaults_and_options) {
   static const double left[6] = {0.413, 0.563, 0.418, 0.464, 0.418, 0.481};
   static const double right[6] = {0.546, 0.435, 0.440, 0.475, 0.440, 0.506};
   supine_resting resting = supine_reference_resting_default();
@@ -156,8 +154,7 @@ static void test_resting_defaults_and_options(void **state) {
 }
 
 /* Volumes in mL become shares of the lungs' own size; what was not told keeps its proportion. */
-static void test_resting_settle_volumes_become_shares(void **state) {
-  (void)state;
+TEST(test_resting_settle_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
   supine_resting resting = supine_reference_resting_default();
@@ -185,8 +182,7 @@ static void test_resting_settle_volumes_become_shares(void **state) {
   assert_non_null(strstr(error.message, "--resting"));
 }
 
-static void test_scan_parse_states_taken_and_refused(void **state) {
-  (void)state;
+TEST(test_scan_parse_states_taken_and_refused) {
   static const struct {
     const char *text;
     supine_volume_kind kind;
@@ -223,8 +219,7 @@ static void test_scan_parse_states_taken_and_refused(void **state) {
 
 /* Milic-Emili's lines: at rest and full each lung holds its share; between, all go the same part
  * of the way; below rest they keep their proportion. */
-static void test_share_out_follows_the_lines(void **state) {
-  (void)state;
+TEST(test_share_out_follows_the_lines) {
   static const double left_side[3] = {1.0, 0.0, 0.0};
   static const double upright[3] = {0.0, 0.0, -1.0};
   const supine_reference r = {.known = true,
@@ -246,8 +241,7 @@ static void test_share_out_follows_the_lines(void **state) {
 }
 
 /* In the posture that it was fitted in the split of the gradient changes nothing. */
-static void test_deep_law_supine_is_its_unsplit_form(void **state) {
-  (void)state;
+TEST(test_deep_law_supine_is_its_unsplit_form) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   supine_lungs lungs = made_lungs();
   const supine_model split = supine_physics_model(SUPINE_LAW_DEEP);
@@ -270,8 +264,7 @@ static void test_deep_law_supine_is_its_unsplit_form(void **state) {
   supine_lungs_free(&lungs);
 }
 
-static void test_laws_constants_are_as_tabled(void **state) {
-  (void)state;
+TEST(test_laws_constants_are_as_tabled) {
   static const struct {
     const char *name;
     double base, gain, box[3], c[6], reach;
@@ -292,8 +285,7 @@ static void test_laws_constants_are_as_tabled(void **state) {
 }
 
 /* Lungs of one person come out alike whatever state they were scanned in. */
-static void test_scan_of_any_state_gives_the_full_lungs_back(void **state) {
-  (void)state;
+TEST(test_scan_of_any_state_gives_the_full_lungs_back) {
   static const struct {
     const char *scanned;
     double volume; /* of the scan, mL */
@@ -341,8 +333,7 @@ static void test_scan_of_any_state_gives_the_full_lungs_back(void **state) {
 }
 
 /* ECSC 1993 by hand: a man of 1.78 m has 7.1422 L, 6.4402 L lying, and 0.86 L of tissue. */
-static void test_capacity_follows_height_and_sex(void **state) {
-  (void)state;
+TEST(test_capacity_follows_height_and_sex) {
   static const struct {
     supine_person person;
     double range[2];
@@ -359,8 +350,7 @@ static void test_capacity_follows_height_and_sex(void **state) {
 }
 
 /* A doubt where a scan is no adult's at full inflation, and where what is told of rest differs. */
-static void test_doubt_names_the_option(void **state) {
-  (void)state;
+TEST(test_doubt_names_the_option) {
   static const struct {
     const char *scanned;
     double full;        /* of each lung */
@@ -394,8 +384,7 @@ static void test_doubt_names_the_option(void **state) {
 }
 
 /* The promise of 30 solves, on real lungs as empty as 0.35 of full. */
-static void test_real_scans_reach_full_inflation(void **state) {
-  (void)state;
+TEST(test_real_scans_reach_full_inflation) {
   static const char *const pairs[][2] = {{"lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj"},
                                          {"covid/covid001_left.ply", "covid/covid001_right.ply"}};
   static const char *const states[] = {"supine:rest", "left:rest", "prone:rest", "upright:rest"};
@@ -464,8 +453,7 @@ static double *positions_in(const supine_basis *basis, const supine_state *state
 }
 
 /* What the library makes of a basis from a scan that was not full. */
-static void test_basis_reproduces_its_scan_and_rests_where_it_should(void **state) {
-  (void)state;
+TEST(test_basis_reproduces_its_scan_and_rests_where_it_should) {
   static const char *const scans[] = {"supine-20:full-2500", "supine:rest", "left:rest",
                                       "upright:rest+300", "upright:full"};
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -512,8 +500,7 @@ static void test_basis_reproduces_its_scan_and_rests_where_it_should(void **stat
   supine_lungs_free(&full);
 }
 
-static void test_states_that_cannot_be_are_refused(void **state) {
-  (void)state;
+TEST(test_states_that_cannot_be_are_refused) {
   supine_lungs lungs = made_lungs();
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const supine_resting resting = supine_reference_resting_default();
@@ -565,8 +552,7 @@ static void test_states_that_cannot_be_are_refused(void **state) {
 }
 
 /* A lung given alone has nearly the field that it has beside its fellow. */
-static void test_lung_alone_moves_as_in_its_pair(void **state) {
-  (void)state;
+TEST(test_lung_alone_moves_as_in_its_pair) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   static const double postures[][3] = {{0, 1, 0},  {0, -1, 0}, {1, 0, 0},
                                        {-1, 0, 0}, {0, 0, -1}, {0, 0, 1}};
@@ -613,21 +599,4 @@ static int remove_path(void **state) {
   return unlink(path);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_axes_values_met_and_harmonics_agree_everywhere),
-      cmocka_unit_test(test_resting_defaults_and_options),
-      cmocka_unit_test(test_resting_settle_volumes_become_shares),
-      cmocka_unit_test(test_scan_parse_states_taken_and_refused),
-      cmocka_unit_test(test_share_out_follows_the_lines),
-      cmocka_unit_test(test_capacity_follows_height_and_sex),
-      cmocka_unit_test(test_doubt_names_the_option),
-      cmocka_unit_test(test_real_scans_reach_full_inflation),
-      cmocka_unit_test(test_laws_constants_are_as_tabled),
-      cmocka_unit_test(test_deep_law_supine_is_its_unsplit_form),
-      cmocka_unit_test(test_scan_of_any_state_gives_the_full_lungs_back),
-      cmocka_unit_test(test_basis_reproduces_its_scan_and_rests_where_it_should),
-      cmocka_unit_test(test_states_that_cannot_be_are_refused),
-      cmocka_unit_test(test_lung_alone_moves_as_in_its_pair)};
-  return cmocka_run_group_tests(tests, make_path, remove_path);
-}
+TEST_GROUP(make_path, remove_path)

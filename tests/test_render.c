@@ -9,8 +9,7 @@
 
 #include "tests/poses.h"
 
-static void test_view_axes_are_right_handed_and_orthonormal(void **state) {
-  (void)state;
+TEST(test_view_axes_are_right_handed_and_orthonormal) {
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     double a[3][3];
     assert_non_null(supine_render_view_name(view));
@@ -30,8 +29,7 @@ static void test_view_axes_are_right_handed_and_orthonormal(void **state) {
 }
 
 /* In front of the patient his left is on the right; the viewer from the left looks to the right. */
-static void test_view_axes_look_where_their_names_say(void **state) {
-  (void)state;
+TEST(test_view_axes_look_where_their_names_say) {
   static const struct {
     supine_view view;
     double towards[3];
@@ -55,8 +53,7 @@ static double lightness(const double rgb[3]) {
   return 116 * cbrt(y) - 16;
 }
 
-static void test_colours_grow_lighter_in_even_steps(void **state) {
-  (void)state;
+TEST(test_colours_grow_lighter_in_even_steps) {
   enum { STEPS = 64 };
   for (supine_colours map = 0; map < SUPINE_COLOURS_COUNT; ++map) {
     double before = 0;
@@ -75,8 +72,7 @@ static void test_colours_grow_lighter_in_even_steps(void **state) {
   }
 }
 
-static void test_colours_beyond_the_ends_are_the_ends(void **state) {
-  (void)state;
+TEST(test_colours_beyond_the_ends_are_the_ends) {
   static const supine_colours map = SUPINE_COLOURS_DIFFERENCE;
   double a[3];
   double b[3];
@@ -88,8 +84,7 @@ static void test_colours_beyond_the_ends_are_the_ends(void **state) {
   assert_memory_equal(a, b, sizeof a);
 }
 
-static void test_bar_ends_at_a_round_tick(void **state) {
-  (void)state;
+TEST(test_bar_ends_at_a_round_tick) {
   static const double cases[][3] = {{31.6, 5, 35}, {18.7, 2, 20}, {20, 5, 20}, {0.043, 0.01, 0.05},
                                     {7.99, 1, 8},  {8, 2, 8},     {0, 0.2, 1}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -166,8 +161,7 @@ static double difference(const uint32_t *a, const uint32_t *b) {
   return sum / (4.0 * PIXELS);
 }
 
-static void test_draw_shows_lungs_on_clear_ground(void **state) {
-  (void)state;
+TEST(test_draw_shows_lungs_on_clear_ground) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const double weights[5] = {0};
@@ -186,8 +180,7 @@ static void test_draw_shows_lungs_on_clear_ground(void **state) {
 }
 
 /* The made lungs' values grow with z, so that seen from the front the top is lighter. */
-static void test_draw_puts_the_head_on_top(void **state) {
-  (void)state;
+TEST(test_draw_puts_the_head_on_top) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const double weights[5] = {0};
@@ -205,8 +198,7 @@ static void test_draw_puts_the_head_on_top(void **state) {
 }
 
 /* Vertices at the lungs' outermost places come to lie at the outermost pixels drawn. */
-static void test_project_agrees_with_the_drawing(void **state) {
-  (void)state;
+TEST(test_project_agrees_with_the_drawing) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const supine_basis_info *info = supine_basis_get_info(m.basis);
@@ -247,8 +239,7 @@ static void test_project_agrees_with_the_drawing(void **state) {
   unmake(&m);
 }
 
-static void test_draw_same_state_twice_is_equal(void **state) {
-  (void)state;
+TEST(test_draw_same_state_twice_is_equal) {
   static uint32_t first[PIXELS];
   static uint32_t second[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 9, 62));
@@ -261,8 +252,7 @@ static void test_draw_same_state_twice_is_equal(void **state) {
   unmake(&m);
 }
 
-static void test_draw_impossible_size_is_refused(void **state) {
-  (void)state;
+TEST(test_draw_impossible_size_is_refused) {
   uint32_t pixel = 0;
   made m = make(fixture_create(100, 3, 2, 1, false, false, 1, 65));
   const double weights[3] = {0};
@@ -276,8 +266,7 @@ static void test_draw_impossible_size_is_refused(void **state) {
   unmake(&m);
 }
 
-static void test_png_is_a_png(void **state) {
-  (void)state;
+TEST(test_png_is_a_png) {
   static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
   made m = make(fixture_create(300, 3, 2, 1, false, false, 1, 66));
   const double weights[3] = {0};
@@ -299,21 +288,4 @@ static void test_png_is_a_png(void **state) {
   assert_memory_equal(png + size - 8, "IEND\xAE\x42\x60\x82", 8);
   free(png);
   unmake(&m);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_view_axes_are_right_handed_and_orthonormal),
-      cmocka_unit_test(test_view_axes_look_where_their_names_say),
-      cmocka_unit_test(test_colours_grow_lighter_in_even_steps),
-      cmocka_unit_test(test_colours_beyond_the_ends_are_the_ends),
-      cmocka_unit_test(test_bar_ends_at_a_round_tick),
-      cmocka_unit_test(test_draw_shows_lungs_on_clear_ground),
-      cmocka_unit_test(test_draw_puts_the_head_on_top),
-      cmocka_unit_test(test_project_agrees_with_the_drawing),
-      cmocka_unit_test(test_draw_same_state_twice_is_equal),
-      cmocka_unit_test(test_draw_impossible_size_is_refused),
-      cmocka_unit_test(test_png_is_a_png),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

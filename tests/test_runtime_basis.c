@@ -24,8 +24,7 @@ static supine_status open_copy(const unsigned char *bytes, size_t size, supine_e
   return status;
 }
 
-static void test_open_made_basis_holds_what_was_written(void **state) {
-  (void)state;
+TEST(test_open_made_basis_holds_what_was_written) {
   fixture *f = fixture_create(37, 7, 3, 3, false, true, 9, 1);
   char *folder = fixture_folder();
   char path[128];
@@ -55,8 +54,7 @@ static void test_open_made_basis_holds_what_was_written(void **state) {
   fixture_destroy(f);
 }
 
-static void test_open_every_truncation_refused(void **state) {
-  (void)state;
+TEST(test_open_every_truncation_refused) {
   fixture *f = fixture_create(11, 2, 1, 2, false, true, 9, 2);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
@@ -111,8 +109,7 @@ static void assert_same_basis(const unsigned char *a, const unsigned char *b, si
   supine_basis_close(right);
 }
 
-static void test_open_every_flipped_bit_refused_or_same(void **state) {
-  (void)state;
+TEST(test_open_every_flipped_bit_refused_or_same) {
   fixture *f = fixture_create(11, 2, 1, 2, false, true, 9, 3);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
@@ -219,8 +216,7 @@ static void spoil_lung_first(fixture *f) {
   f->lung[0] = 1;
 }
 
-static void test_open_wrong_content_refused_with_reason(void **state) {
-  (void)state;
+TEST(test_open_wrong_content_refused_with_reason) {
   expect_refused(spoil_triangle, "a triangle names vertex 12 of 12");
   expect_refused(spoil_vertex, "'vertices' has a number that is not finite, or 2^30 or more");
   expect_refused(spoil_direction, "'direction' has a number that is not finite, or 2^30 or more");
@@ -285,8 +281,7 @@ static supine_status open_parts(const parts *p) {
   return status;
 }
 
-static void test_open_wrong_structure_refused(void **state) {
-  (void)state;
+TEST(test_open_wrong_structure_refused) {
   parts p = sound();
   assert_int_equal(open_parts(&p), SUPINE_OK);
   for (size_t i = 0; i < 9; ++i) { /* each tensor missing, misnamed, of other type */
@@ -337,8 +332,7 @@ static void test_open_wrong_structure_refused(void **state) {
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
 }
 
-static void test_open_too_many_modes_or_bands_refused(void **state) {
-  (void)state;
+TEST(test_open_too_many_modes_or_bands_refused) {
   fixture *f = fixture_create(5, SUPINE_MODES_MAX, 0, 1, false, false, 1, 6);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
@@ -367,8 +361,7 @@ static void test_open_too_many_modes_or_bands_refused(void **state) {
   fixture_destroy(f);
 }
 
-static void test_open_foreign_files_refused(void **state) {
-  (void)state;
+TEST(test_open_foreign_files_refused) {
   static const struct {
     const char *text;
     size_t size;
@@ -439,15 +432,13 @@ static void check_view(bool vector, bool volume) {
   fixture_destroy(f);
 }
 
-static void test_view_shows_the_file(void **state) {
-  (void)state;
+TEST(test_view_shows_the_file) {
   check_view(false, true);
   check_view(true, true);
   check_view(false, false);
 }
 
-static void test_version_of_library_is_that_of_headers(void **state) {
-  (void)state;
+TEST(test_version_of_library_is_that_of_headers) {
   int part[3] = {0};
   char text[32];
   assert_string_equal(supine_version(), SUPINE_VERSION);
@@ -457,8 +448,7 @@ static void test_version_of_library_is_that_of_headers(void **state) {
   assert_string_equal(text, SUPINE_VERSION);
 }
 
-static void test_weights_bad_gravity_refused(void **state) {
-  (void)state;
+TEST(test_weights_bad_gravity_refused) {
   fixture *f = fixture_create(5, 2, 1, 1, false, false, 1, 6);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
@@ -482,20 +472,4 @@ static void test_weights_bad_gravity_refused(void **state) {
   supine_basis_close(basis);
   free(bytes);
   fixture_destroy(f);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_open_made_basis_holds_what_was_written),
-      cmocka_unit_test(test_open_every_truncation_refused),
-      cmocka_unit_test(test_open_every_flipped_bit_refused_or_same),
-      cmocka_unit_test(test_open_wrong_content_refused_with_reason),
-      cmocka_unit_test(test_open_wrong_structure_refused),
-      cmocka_unit_test(test_open_too_many_modes_or_bands_refused),
-      cmocka_unit_test(test_open_foreign_files_refused),
-      cmocka_unit_test(test_weights_bad_gravity_refused),
-      cmocka_unit_test(test_view_shows_the_file),
-      cmocka_unit_test(test_version_of_library_is_that_of_headers),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

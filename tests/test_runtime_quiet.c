@@ -178,8 +178,7 @@ static void setting_close(setting *s) {
   fixture_folder_remove(s->folder);
 }
 
-static void test_open_basis_asks_nothing_of_the_system(void **state) {
-  (void)state;
+TEST(test_open_basis_asks_nothing_of_the_system) {
   setting s = setting_open();
   supine_basis *basis = NULL;
   calls = live = attempts = fail_at = 0;
@@ -199,8 +198,7 @@ static void test_open_basis_asks_nothing_of_the_system(void **state) {
   setting_close(&s);
 }
 
-static void test_open_each_allocation_failing_reports_memory(void **state) {
-  (void)state;
+TEST(test_open_each_allocation_failing_reports_memory) {
   setting s = setting_open();
   supine_status status = SUPINE_ERROR_MEMORY;
   size_t failures = 0;
@@ -223,12 +221,4 @@ static void test_open_each_allocation_failing_reports_memory(void **state) {
   assert_int_equal(status, SUPINE_OK);
   assert_true(failures > 5);
   setting_close(&s);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_open_basis_asks_nothing_of_the_system),
-      cmocka_unit_test(test_open_each_allocation_failing_reports_memory),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,8 +46,7 @@ static void *work(void *context) {
   return NULL;
 }
 
-static void test_basis_many_threads_same_bits(void **state) {
-  (void)state;
+TEST(test_basis_many_threads_same_bits) {
   fixture *f = fixture_create(VERTICES, 7, 2, 2, false, false, 9, 21);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
@@ -82,11 +81,4 @@ static void test_basis_many_threads_same_bits(void **state) {
   supine_basis_close(basis);
   free(bytes);
   fixture_destroy(f);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_basis_many_threads_same_bits),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -48,8 +48,7 @@ static void write_sample(const char *path, const char *value) {
                    SUPINE_OK);
 }
 
-static void test_write_then_open_same_content(void **state) {
-  (void)state;
+TEST(test_write_then_open_same_content) {
   char *folder = fixture_folder();
   char path[128];
   (void)snprintf(path, sizeof path, "%s/a", folder);
@@ -88,8 +87,7 @@ static void test_write_then_open_same_content(void **state) {
 }
 
 /* Numbers begin at a multiple of 8 bytes, however long the header's text is. */
-static void test_write_header_of_any_length_is_padded_to_eight_bytes(void **state) {
-  (void)state;
+TEST(test_write_header_of_any_length_is_padded_to_eight_bytes) {
   char *folder = fixture_folder();
   char path[256];
   (void)snprintf(path, sizeof path, "%s/padded", folder);
@@ -109,8 +107,7 @@ static void test_write_header_of_any_length_is_padded_to_eight_bytes(void **stat
   fixture_folder_remove(folder);
 }
 
-static void test_write_bad_arguments_refused(void **state) {
-  (void)state;
+TEST(test_write_bad_arguments_refused) {
   const supine_tensor good = {"a", SUPINE_U8, 1, {3}, bytes3};
   const supine_tensor twice[] = {good, good};
   const supine_tensor rank0 = {"a", SUPINE_U8, 0, {3}, bytes3};
@@ -142,8 +139,7 @@ static void test_write_bad_arguments_refused(void **state) {
   assert_int_equal(fclose(file), 0);
 }
 
-static void test_write_refused_or_failing_leaves_no_file(void **state) {
-  (void)state;
+TEST(test_write_refused_or_failing_leaves_no_file) {
   const supine_tensor good = {"a", SUPINE_U8, 1, {3}, bytes3};
   const supine_tensor twice[] = {good, good};
   const char *missing = "/nonexistent-folder/file";
@@ -164,8 +160,7 @@ static void test_write_refused_or_failing_leaves_no_file(void **state) {
 
 #define A8 "\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}"
 
-static void test_open_valid_headers_accepted(void **state) {
-  (void)state;
+TEST(test_open_valid_headers_accepted) {
   static const struct {
     const char *header;
     size_t data;
@@ -188,8 +183,7 @@ static void test_open_valid_headers_accepted(void **state) {
   }
 }
 
-static void test_open_bad_headers_refused(void **state) {
-  (void)state;
+TEST(test_open_bad_headers_refused) {
   static const struct {
     const char *header;
     size_t data;
@@ -269,8 +263,7 @@ static void test_open_bad_headers_refused(void **state) {
   }
 }
 
-static void test_open_hostile_lengths_refused(void **state) {
-  (void)state;
+TEST(test_open_hostile_lengths_refused) {
   static const uint64_t lengths[] = {0, 1, 3, 100, UINT64_C(1) << 32, UINT64_MAX - 7, UINT64_MAX};
   for (size_t i = 0; i < sizeof lengths / sizeof *lengths; ++i) {
     unsigned char *bytes = malloc(10);
@@ -294,8 +287,7 @@ static void test_open_hostile_lengths_refused(void **state) {
   }
 }
 
-static void test_open_unreadable_paths_report_read(void **state) {
-  (void)state;
+TEST(test_open_unreadable_paths_report_read) {
   supine_safetensors *file = NULL;
   supine_error error;
   assert_int_equal(supine_safetensors_open("/nonexistent", &file, &error), SUPINE_ERROR_READ);
@@ -306,8 +298,7 @@ static void test_open_unreadable_paths_report_read(void **state) {
   supine_safetensors_close(NULL);
 }
 
-static void test_open_memory_any_alignment_same_content(void **state) {
-  (void)state;
+TEST(test_open_memory_any_alignment_same_content) {
   char *folder = fixture_folder();
   char path[128];
   (void)snprintf(path, sizeof path, "%s/a", folder);
@@ -333,8 +324,7 @@ static void test_open_memory_any_alignment_same_content(void **state) {
   fixture_folder_remove(folder);
 }
 
-static void test_checksum_any_bit_or_order_noticed(void **state) {
-  (void)state;
+TEST(test_checksum_any_bit_or_order_noticed) {
   /* Sizes around the block of 64 bytes; every bit of each. */
   for (size_t size = 1; size <= 200; size += size < 130 ? 43 : 7) {
     unsigned char data[256] = {0};
@@ -369,8 +359,7 @@ static void test_checksum_any_bit_or_order_noticed(void **state) {
 }
 
 /* Pins the format: a change of either hash would refuse every file that exists. */
-static void test_checksum_sample_literal(void **state) {
-  (void)state;
+TEST(test_checksum_sample_literal) {
   const supine_tensor tensor = {"four", SUPINE_F32, 2, {2, 2}, four};
   const supine_metadata pair = {"key", "value"};
   char text[CHECKSUM_SIZE];
@@ -381,21 +370,4 @@ static void test_checksum_sample_literal(void **state) {
   assert_string_equal(text, "xxh64:e8c275eed575467e");
   supine_safetensors_checksum_text("0", &tensor, 1, &pair, 1, text); /* of version 1 */
   assert_string_equal(text, "a0c3581784e54cae");
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_write_then_open_same_content),
-      cmocka_unit_test(test_write_header_of_any_length_is_padded_to_eight_bytes),
-      cmocka_unit_test(test_write_bad_arguments_refused),
-      cmocka_unit_test(test_write_refused_or_failing_leaves_no_file),
-      cmocka_unit_test(test_open_valid_headers_accepted),
-      cmocka_unit_test(test_open_bad_headers_refused),
-      cmocka_unit_test(test_open_hostile_lengths_refused),
-      cmocka_unit_test(test_open_unreadable_paths_report_read),
-      cmocka_unit_test(test_open_memory_any_alignment_same_content),
-      cmocka_unit_test(test_checksum_any_bit_or_order_noticed),
-      cmocka_unit_test(test_checksum_sample_literal),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

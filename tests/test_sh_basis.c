@@ -49,8 +49,7 @@ static void closed_forms(const double d[3], double y[25]) {
   y[24] = 0.1875 * sqrt(35 * p) * (x * x * (x * x - 3 * yy * yy) - yy * yy * (3 * x * x - yy * yy));
 }
 
-static void test_index_every_harmonic_is_its_position(void **state) {
-  (void)state;
+TEST(test_index_every_harmonic_is_its_position) {
   size_t position = 0;
   for (size_t l = 0; l <= SUPINE_SH_BAND_MAX; ++l) {
     for (int m = -(int)l; m <= (int)l; ++m, ++position) {
@@ -60,8 +59,7 @@ static void test_index_every_harmonic_is_its_position(void **state) {
   }
 }
 
-static void test_evaluate_to_band_4_matches_closed_forms(void **state) {
-  (void)state;
+TEST(test_evaluate_to_band_4_matches_closed_forms) {
   const double tolerance = 16 * DBL_EPSILON;
   uint64_t seed = 7368787;
   for (int trial = 0; trial < 500; ++trial) {
@@ -113,8 +111,7 @@ static double gram_error(size_t band) {
   return worst;
 }
 
-static void test_evaluate_under_rule_orthonormal(void **state) {
-  (void)state;
+TEST(test_evaluate_under_rule_orthonormal) {
   static const size_t bands[] = {0, 1, 3, 7, 15, 20};
   for (size_t i = 0; i < sizeof bands / sizeof *bands; ++i) {
     const double worst = gram_error(bands[i]);
@@ -124,8 +121,7 @@ static void test_evaluate_under_rule_orthonormal(void **state) {
 
 /* Band 64 in full is 7e10 products, but longitude separates the orders: the sum over a ring is
  * exact for longitudes > 2 band, so one order against itself, by latitudes alone, is the rest. */
-static void test_evaluate_band_64_orthonormal_in_latitude(void **state) {
-  (void)state;
+TEST(test_evaluate_band_64_orthonormal_in_latitude) {
   const size_t band = SUPINE_SH_BAND_MAX;
   supine_sh_grid *grid = NULL;
   assert_int_equal(supine_sh_grid_create(band + 1, 2 * band + 1, &grid), SUPINE_OK);
@@ -156,8 +152,7 @@ static void test_evaluate_band_64_orthonormal_in_latitude(void **state) {
 }
 
 /* sum over m of Y_lm(a) Y_lm(b) = (2 l + 1) / (4 pi) P_l(a.b) */
-static void test_evaluate_two_directions_obey_addition_theorem(void **state) {
-  (void)state;
+TEST(test_evaluate_two_directions_obey_addition_theorem) {
   const double tolerance = 2048 * DBL_EPSILON;
   static double ya[COUNT_MAX];
   static double yb[COUNT_MAX];
@@ -186,8 +181,7 @@ static void test_evaluate_two_directions_obey_addition_theorem(void **state) {
   }
 }
 
-static void test_evaluate_poles_only_zonal(void **state) {
-  (void)state;
+TEST(test_evaluate_poles_only_zonal) {
   static double y[COUNT_MAX];
   for (int south = 0; south < 2; ++south) {
     const double d[3] = {0, 0, south ? -1 : 1};
@@ -203,8 +197,7 @@ static void test_evaluate_poles_only_zonal(void **state) {
 
 /* Y(l, 1) near the pole is sqrt((2 l + 1) l (l + 1) / (8 pi)) x: the slope must survive where
  * 1 - z^2 has lost every digit. */
-static void test_evaluate_near_pole_keeps_relative_accuracy(void **state) {
-  (void)state;
+TEST(test_evaluate_near_pole_keeps_relative_accuracy) {
   static double y[COUNT_MAX];
   const double x = 1.2345e-11;
   const double d[3] = {x, 0, 1};
@@ -216,8 +209,7 @@ static void test_evaluate_near_pole_keeps_relative_accuracy(void **state) {
   }
 }
 
-static void test_evaluate_any_length_same_harmonics(void **state) {
-  (void)state;
+TEST(test_evaluate_any_length_same_harmonics) {
   static const double scales[] = {5e-324 * 0x1p60, 1e-200, 0.37, 3e7, 1e200, 0x1p1022};
   double y[25];
   double expected[25];
@@ -232,8 +224,7 @@ static void test_evaluate_any_length_same_harmonics(void **state) {
   }
 }
 
-static void test_evaluate_bad_argument_refused(void **state) {
-  (void)state;
+TEST(test_evaluate_bad_argument_refused) {
   static double y[COUNT_MAX];
   const double zero[3] = {0, -0.0, 0};
   const double good[3] = {0.1, 0.2, 0.3};
@@ -251,8 +242,7 @@ static void test_evaluate_bad_argument_refused(void **state) {
                    SUPINE_ERROR_ARGUMENT);
 }
 
-static void test_evaluate_many_rows_equal_single(void **state) {
-  (void)state;
+TEST(test_evaluate_many_rows_equal_single) {
   enum { BAND = 6, COUNT = (BAND + 1) * (BAND + 1), DIRECTIONS = 11 };
   double d[DIRECTIONS][3];
   double y[DIRECTIONS][COUNT];
@@ -269,20 +259,4 @@ static void test_evaluate_many_rows_equal_single(void **state) {
   d[DIRECTIONS - 1][1] = NAN;
   assert_int_equal(supine_sh_evaluate_many(BAND, DIRECTIONS, d[0], y[0]), SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_sh_evaluate_many(BAND, 0, NULL, NULL), SUPINE_OK);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_index_every_harmonic_is_its_position),
-      cmocka_unit_test(test_evaluate_to_band_4_matches_closed_forms),
-      cmocka_unit_test(test_evaluate_under_rule_orthonormal),
-      cmocka_unit_test(test_evaluate_band_64_orthonormal_in_latitude),
-      cmocka_unit_test(test_evaluate_two_directions_obey_addition_theorem),
-      cmocka_unit_test(test_evaluate_poles_only_zonal),
-      cmocka_unit_test(test_evaluate_near_pole_keeps_relative_accuracy),
-      cmocka_unit_test(test_evaluate_any_length_same_harmonics),
-      cmocka_unit_test(test_evaluate_bad_argument_refused),
-      cmocka_unit_test(test_evaluate_many_rows_equal_single),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

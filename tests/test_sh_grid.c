@@ -8,8 +8,7 @@
 #include "sh_helpers.h"
 
 /* M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, table 25.4, n = 5. */
-static void test_grid_five_latitudes_match_table(void **state) {
-  (void)state;
+TEST(test_grid_five_latitudes_match_table) {
   static const double z[] = {0.906179845938664, 0.538469310105683, 0, -0.538469310105683,
                              -0.906179845938664};
   static const double w[] = {0.236926885056189, 0.478628670499366, 0.568888888888889,
@@ -26,8 +25,7 @@ static void test_grid_five_latitudes_match_table(void **state) {
 }
 
 /* n nodes integrate z^p exactly for p < 2 n. Tables are kept for some n, others are computed. */
-static void test_grid_any_size_integrates_powers(void **state) {
-  (void)state;
+TEST(test_grid_any_size_integrates_powers) {
   static const size_t sizes[] = {1, 2, 7, 16, 17, 20, 21, 31, 33, 63, 65, 127, 130};
   for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {
     const size_t n = sizes[s];
@@ -47,8 +45,7 @@ static void test_grid_any_size_integrates_powers(void **state) {
   }
 }
 
-static void test_grid_direction_is_unit_and_in_place(void **state) {
-  (void)state;
+TEST(test_grid_direction_is_unit_and_in_place) {
   supine_sh_grid *grid = NULL;
   assert_int_equal(supine_sh_grid_create(6, 8, &grid), SUPINE_OK);
   for (size_t j = 0; j < 6; ++j) {
@@ -64,8 +61,7 @@ static void test_grid_direction_is_unit_and_in_place(void **state) {
   supine_sh_grid_destroy(grid);
 }
 
-static void test_grid_bad_size_refused(void **state) {
-  (void)state;
+TEST(test_grid_bad_size_refused) {
   supine_sh_grid *grid = NULL;
   assert_int_equal(supine_sh_grid_create(0, 4, &grid), SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_sh_grid_create(4, 0, &grid), SUPINE_ERROR_ARGUMENT);
@@ -73,14 +69,4 @@ static void test_grid_bad_size_refused(void **state) {
   assert_int_equal(supine_sh_grid_create(4, SUPINE_SH_GRID_MAX + 1, &grid), SUPINE_ERROR_ARGUMENT);
   assert_null(grid);
   supine_sh_grid_destroy(NULL);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_grid_five_latitudes_match_table),
-      cmocka_unit_test(test_grid_any_size_integrates_powers),
-      cmocka_unit_test(test_grid_direction_is_unit_and_in_place),
-      cmocka_unit_test(test_grid_bad_size_refused),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

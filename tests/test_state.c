@@ -7,8 +7,7 @@
 
 static const supine_state unset = {.gravity = {0.0, 1.0, 0.0}};
 
-static void test_state_parse_every_form_gives_posture_and_volume(void **unused) {
-  (void)unused;
+TEST(test_state_parse_every_form_gives_posture_and_volume) {
   static const struct {
     const char *text;
     double gravity[3];
@@ -39,53 +38,51 @@ static void test_state_parse_every_form_gives_posture_and_volume(void **unused) 
        "prone-20"},
   };
   for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
-    supine_state state = unset;
+    supine_state parsed = unset;
     supine_state again = unset;
     char text[160];
-    assert_int_equal(supine_state_parse(rows[i].text, &state, NULL), SUPINE_OK);
+    assert_int_equal(supine_state_parse(rows[i].text, &parsed, NULL), SUPINE_OK);
     for (int k = 0; k < 3; ++k) {
-      assert_true(fabs(state.gravity[k] - (rows[i].gravity[k])) <= 1e-15);
+      assert_true(fabs(parsed.gravity[k] - (rows[i].gravity[k])) <= 1e-15);
     }
-    assert_int_equal(state.volume.kind, rows[i].volume.kind);
-    assert_true(fabs(state.volume.ml - (rows[i].volume.ml)) <= 0);
-    assert_int_equal(supine_state_print(&state, text, sizeof text), strlen(rows[i].printed));
+    assert_int_equal(parsed.volume.kind, rows[i].volume.kind);
+    assert_true(fabs(parsed.volume.ml - (rows[i].volume.ml)) <= 0);
+    assert_int_equal(supine_state_print(&parsed, text, sizeof text), strlen(rows[i].printed));
     assert_string_equal(text, rows[i].printed);
     assert_int_equal(supine_state_parse(text, &again, NULL), SUPINE_OK);
     for (int k = 0; k < 3; ++k) {
-      assert_true(fabs(again.gravity[k] - (state.gravity[k])) <= 1e-9);
+      assert_true(fabs(again.gravity[k] - (parsed.gravity[k])) <= 1e-9);
     }
   }
 }
 
-static void test_state_parse_volumes_by_lung_keeps_each_name(void **unused) {
-  (void)unused;
-  supine_state state = unset;
+TEST(test_state_parse_volumes_by_lung_keeps_each_name) {
+  supine_state parsed = unset;
   char text[160];
-  assert_int_equal(supine_state_parse("right:left=rest+100,right=2600mL", &state, NULL), SUPINE_OK);
-  assert_int_equal(state.lung_count, 2);
-  assert_string_equal(state.lungs[0].name, "left");
-  assert_int_equal(state.lungs[1].volume.kind, SUPINE_VOLUME_ABSOLUTE);
-  (void)supine_state_print(&state, text, sizeof text);
+  assert_int_equal(supine_state_parse("right:left=rest+100,right=2600mL", &parsed, NULL),
+                   SUPINE_OK);
+  assert_int_equal(parsed.lung_count, 2);
+  assert_string_equal(parsed.lungs[0].name, "left");
+  assert_int_equal(parsed.lungs[1].volume.kind, SUPINE_VOLUME_ABSOLUTE);
+  (void)supine_state_print(&parsed, text, sizeof text);
   assert_string_equal(text, "right:left=rest+100,right=2600mL");
-  (void)supine_state_describe(&state, text, sizeof text);
+  (void)supine_state_describe(&parsed, text, sizeof text);
   assert_string_equal(text, "right side, left lung at rest + 100 mL, right lung at 2600 mL");
 }
 
-static void test_state_parse_bare_number_names_what_it_could_mean(void **unused) {
-  (void)unused;
+TEST(test_state_parse_bare_number_names_what_it_could_mean) {
   static const char *const numbers[] = {"500", "+500", "supine:500", "left=500,right=rest"};
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
-    supine_state state = unset;
+    supine_state parsed = unset;
     supine_error error;
-    assert_int_equal(supine_state_parse(numbers[i], &state, &error), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_state_parse(numbers[i], &parsed, &error), SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "rest+500"));
     assert_non_null(strstr(error.message, "500mL"));
-    assert_memory_equal(&state, &unset, sizeof state);
+    assert_memory_equal(&parsed, &unset, sizeof parsed);
   }
 }
 
-static void test_state_parse_malformed_text_is_refused_and_changes_nothing(void **unused) {
-  (void)unused;
+TEST(test_state_parse_malformed_text_is_refused_and_changes_nothing) {
   static const char *const texts[] = {
       "",
       "sup",
@@ -115,27 +112,25 @@ static void test_state_parse_malformed_text_is_refused_and_changes_nothing(void 
       "a_name_of_a_lung_that_is_much_too_long=rest",
       "a posture whose name is longer than sixty-four characters, which none is:rest"};
   for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
-    supine_state state = unset;
+    supine_state parsed = unset;
     supine_error error = {0};
-    assert_int_equal(supine_state_parse(texts[i], &state, &error), SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_state_parse(texts[i], &parsed, &error), SUPINE_ERROR_ARGUMENT);
     assert_true(strlen(error.message) > 10);
-    assert_memory_equal(&state, &unset, sizeof state);
+    assert_memory_equal(&parsed, &unset, sizeof parsed);
   }
 }
 
-static void test_state_print_short_buffer_is_cut_and_length_whole(void **unused) {
-  (void)unused;
-  supine_state state = unset;
+TEST(test_state_print_short_buffer_is_cut_and_length_whole) {
+  supine_state parsed = unset;
   char text[8] = "xxxxxxx";
-  assert_int_equal(supine_state_parse("left:rest+500", &state, NULL), SUPINE_OK);
-  assert_int_equal(supine_state_print(&state, text, 5), 13);
+  assert_int_equal(supine_state_parse("left:rest+500", &parsed, NULL), SUPINE_OK);
+  assert_int_equal(supine_state_print(&parsed, text, 5), 13);
   assert_string_equal(text, "left");
   assert_int_equal(text[5], 'x');
-  assert_int_equal(supine_state_print(&state, NULL, 0), 13);
+  assert_int_equal(supine_state_print(&parsed, NULL, 0), 13);
 }
 
-static void test_state_describe_names_posture_and_volume_in_words(void **unused) {
-  (void)unused;
+TEST(test_state_describe_names_posture_and_volume_in_words) {
   static const char *const rows[][2] = {{"left:rest+500", "left side at rest + 500 mL"},
                                         {"prone", "prone"},
                                         {"upright:full", "upright at full inflation"},
@@ -143,22 +138,10 @@ static void test_state_describe_names_posture_and_volume_in_words(void **unused)
                                         {"0.6:0:-0.8", "gravity 0.6:0:-0.8"},
                                         {"supine+15:2600mL", "supine+15 at 2600 mL"}};
   for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
-    supine_state state = unset;
+    supine_state parsed = unset;
     char text[160];
-    assert_int_equal(supine_state_parse(rows[i][0], &state, NULL), SUPINE_OK);
-    (void)supine_state_describe(&state, text, sizeof text);
+    assert_int_equal(supine_state_parse(rows[i][0], &parsed, NULL), SUPINE_OK);
+    (void)supine_state_describe(&parsed, text, sizeof text);
     assert_string_equal(text, rows[i][1]);
   }
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_state_parse_every_form_gives_posture_and_volume),
-      cmocka_unit_test(test_state_parse_volumes_by_lung_keeps_each_name),
-      cmocka_unit_test(test_state_parse_bare_number_names_what_it_could_mean),
-      cmocka_unit_test(test_state_parse_malformed_text_is_refused_and_changes_nothing),
-      cmocka_unit_test(test_state_print_short_buffer_is_cut_and_length_whole),
-      cmocka_unit_test(test_state_describe_names_posture_and_volume_in_words),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,34 +27,29 @@ static void check(const char *text, const char *json, const char *expected) {
   json_decref(data);
 }
 
-static void test_names_are_escaped_text(void **state) {
-  (void)state;
+TEST(test_names_are_escaped_text) {
   check("x {{title}} y", "{\"title\": \"<b a=\\\"1\\\">&'\"}",
         "x &lt;b a=&quot;1&quot;&gt;&amp;' y");
   check("{{n}} {{r}}", "{\"n\": -12, \"r\": 0.1}", "-12 0.1");
   check("é {{title}}", "{\"title\": \"ü\"}", "é ü");
 }
 
-static void test_other_files_are_put_in(void **state) {
-  (void)state;
+TEST(test_other_files_are_put_in) {
   check("{{part.html}}{{style.css}}", "{\"title\": \"&\"}", "<i>&amp;</i>a{{title}}");
 }
 
-static void test_what_is_no_data_is_asked_for(void **state) {
-  (void)state;
+TEST(test_what_is_no_data_is_asked_for) {
   check("a{{tensors}}b", "{}", "a[large tensors]b");
 }
 
-static void test_sections_repeat_and_nest(void **state) {
-  (void)state;
+TEST(test_sections_repeat_and_nest) {
   check("{{#rows}}\n<r>{{name}}:{{#cells}}{{.}}{{unit}},{{/cells}}</r>\n{{/rows}}\nend",
         "{\"unit\": \"mm\", \"rows\": [{\"name\": \"a\", \"cells\": [1, 2]},"
         "{\"name\": \"b\", \"cells\": []}]}",
         "<r>a:1mm,2mm,</r>\n<r>b:</r>\nend");
 }
 
-static void test_sections_ask_whether_there_is_something(void **state) {
-  (void)state;
+TEST(test_sections_ask_whether_there_is_something) {
   static const char text[] = "{{#a}}yes{{b}}{{/a}}.";
   check(text, "{\"a\": {\"b\": 3}}", "yes3.");
   check(text, "{\"a\": true, \"b\": 4}", "yes4.");
@@ -66,29 +61,14 @@ static void test_sections_ask_whether_there_is_something(void **state) {
   check(text, "{}", ".");
 }
 
-static void test_inner_names_come_first(void **state) {
-  (void)state;
+TEST(test_inner_names_come_first) {
   check("{{#a}}{{x}}{{#a}}{{x}}{{/a}}{{/a}}{{x}}",
         "{\"x\": 1, \"a\": {\"x\": 2, \"a\": {\"x\": 3}}}", "231");
 }
 
 /* What is left open goes to the end; nothing is read beyond it. */
-static void test_unclosed_tags_end_with_the_text(void **state) {
-  (void)state;
+TEST(test_unclosed_tags_end_with_the_text) {
   check("{{#a}}x{{b}}", "{\"a\": [{\"b\": 1}, {\"b\": 2}]}", "x1x2");
   check("x{{a", "{\"a\": 1}", "x{{a");
   check("x{{/a}}y", "{\"a\": 1}", "xy");
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_names_are_escaped_text),
-      cmocka_unit_test(test_other_files_are_put_in),
-      cmocka_unit_test(test_what_is_no_data_is_asked_for),
-      cmocka_unit_test(test_sections_repeat_and_nest),
-      cmocka_unit_test(test_sections_ask_whether_there_is_something),
-      cmocka_unit_test(test_inner_names_come_first),
-      cmocka_unit_test(test_unclosed_tags_end_with_the_text),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

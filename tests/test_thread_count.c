@@ -63,16 +63,8 @@ static void check(double soften, double reach) {
   (void)unsetenv("SUPINE_THREADS");
 }
 
-static void test_basis_any_thread_count_same_bytes(void **state) {
-  (void)state;
+TEST(test_basis_any_thread_count_same_bytes) {
   check(0.0, 0.0);
   check(0.0, 10.0);
   check(1.0, 10.0);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_basis_any_thread_count_same_bytes),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

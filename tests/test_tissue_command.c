@@ -58,8 +58,7 @@ static bool same_bytes(const char *first, const char *second) {
   return x == y;
 }
 
-static void test_solve_lesion_factor_one_writes_the_same_bytes(void **state) {
-  (void)state;
+TEST(test_solve_lesion_factor_one_writes_the_same_bytes) {
   char ply[80];
   (void)snprintf(ply, sizeof ply, "%s.ply", other);
   assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
@@ -79,22 +78,19 @@ static void test_solve_lesion_factor_one_writes_the_same_bytes(void **state) {
   (void)unlink(ply);
 }
 
-static void test_solve_lesion_outside_is_warned(void **state) {
-  (void)state;
+TEST(test_solve_lesion_outside_is_warned) {
   assert_int_equal(solve("--lesion", "900,0,0,30,4", out), SUPINE_EXIT_OK);
   assert_non_null(strstr(text, "warning: the lesion at 900,0,0 is "));
   assert_non_null(strstr(text, "mm from the nearest vertex"));
 }
 
-static void test_solve_lesion_deep_inside_says_why_it_changes_nothing(void **state) {
-  (void)state;
+TEST(test_solve_lesion_deep_inside_says_why_it_changes_nothing) {
   assert_int_equal(solve("--lesion", "56,-111,-79,5,4", out), SUPINE_EXIT_OK);
   assert_non_null(strstr(text, "the lesion at 56,-111,-79 is"));
   assert_non_null(strstr(text, "with a radius of 5 mm it changes nothing"));
 }
 
-static void test_solve_bad_tissue_options_are_usage_errors(void **state) {
-  (void)state;
+TEST(test_solve_bad_tissue_options_are_usage_errors) {
   static const char *const bad[][2] = {{"--lesion", "1,2,3,4"},
                                        {"--lesion", "1,2,3,0,4"},
                                        {"--lesion", "1,2,3,4,0"},
@@ -122,8 +118,7 @@ static void test_solve_bad_tissue_options_are_usage_errors(void **state) {
   }
 }
 
-static void test_solve_bad_expandability_file_names_vertex(void **state) {
-  (void)state;
+TEST(test_solve_bad_expandability_file_names_vertex) {
   test_write(csv, "expandability\n1\n1\n-3\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
   assert_non_null(strstr(text, "a.csv:4: expandability -3 of vertex 2 is not positive"));
@@ -134,8 +129,7 @@ static void test_solve_bad_expandability_file_names_vertex(void **state) {
 }
 
 /* A file that holds the same values as the built-in model makes the same lungs. */
-static void test_solve_expandability_file_of_ones_equals_uniform(void **state) {
-  (void)state;
+TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   char ply[80];
   (void)snprintf(ply, sizeof ply, "%s.ply", other);
   supine_mesh mesh = {0};
@@ -155,8 +149,7 @@ static void test_solve_expandability_file_of_ones_equals_uniform(void **state) {
 }
 
 /* The basis of a collapsed lung: volumes exact by lung and in all, by measuring its surfaces. */
-static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **state) {
-  (void)state;
+TEST(test_precompute_collapsed_lung_breathes_its_share_exactly) {
   double volumes[2][2]; /* healthy and ill, by lung, at one scale */
   double rests[2][2];
   supine_basis *healthy = NULL;
@@ -229,8 +222,7 @@ static void test_precompute_collapsed_lung_breathes_its_share_exactly(void **sta
   assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
 }
 
-static void test_lung_that_is_not_there_is_refused(void **state) {
-  (void)state;
+TEST(test_lung_that_is_not_there_is_refused) {
   supine_mesh mesh = {0};
   supine_mesh left = {0};
   char one[80];
@@ -248,16 +240,4 @@ static void test_lung_that_is_not_there_is_refused(void **state) {
   (void)unlink(one);
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_solve_lesion_factor_one_writes_the_same_bytes),
-      cmocka_unit_test(test_solve_lesion_outside_is_warned),
-      cmocka_unit_test(test_solve_lesion_deep_inside_says_why_it_changes_nothing),
-      cmocka_unit_test(test_solve_bad_tissue_options_are_usage_errors),
-      cmocka_unit_test(test_solve_bad_expandability_file_names_vertex),
-      cmocka_unit_test(test_solve_expandability_file_of_ones_equals_uniform),
-      cmocka_unit_test(test_precompute_collapsed_lung_breathes_its_share_exactly),
-      cmocka_unit_test(test_lung_that_is_not_there_is_refused),
-  };
-  return cmocka_run_group_tests(tests, setup, teardown);
-}
+TEST_GROUP(setup, teardown)

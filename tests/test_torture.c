@@ -43,8 +43,7 @@ static void check(const char *what, supine_mesh *mesh, const double *stiffness) 
 }
 
 /* Every third vertex moved onto a neighbour, but for a thousandth of the link. */
-static void test_slivers(void **state) {
-  (void)state;
+TEST(test_slivers) {
   supine_mesh mesh = phantom();
   for (size_t t = 0; t < mesh.triangle_count; t += 7) {
     double *a = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t];
@@ -56,8 +55,7 @@ static void test_slivers(void **state) {
   check("slivers", &mesh, NULL);
 }
 
-static void test_duplicate_faces(void **state) {
-  (void)state;
+TEST(test_duplicate_faces) {
   supine_mesh mesh = phantom();
   const size_t count = mesh.triangle_count;
   mesh.triangles = realloc(mesh.triangles, 6 * count * sizeof *mesh.triangles);
@@ -66,8 +64,7 @@ static void test_duplicate_faces(void **state) {
   check("every face twice", &mesh, NULL);
 }
 
-static void test_ten_thousand_components(void **state) {
-  (void)state;
+TEST(test_ten_thousand_components) {
   enum { COUNT = 10000 };
   static const uint32_t faces[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2};
   supine_mesh mesh = {.vertex_count = 4 * COUNT, .triangle_count = 4 * COUNT};
@@ -89,8 +86,7 @@ static void test_ten_thousand_components(void **state) {
   check("10,000 components", &mesh, NULL);
 }
 
-static void test_flat_mesh(void **state) {
-  (void)state;
+TEST(test_flat_mesh) {
   supine_mesh mesh = phantom();
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     mesh.vertices[3 * i + 1] *= 1e-6;
@@ -98,8 +94,7 @@ static void test_flat_mesh(void **state) {
   check("flat to a ten-thousandth of a millimetre", &mesh, NULL);
 }
 
-static void test_far_off_origin(void **state) {
-  (void)state;
+TEST(test_far_off_origin) {
   supine_mesh mesh = phantom();
   for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
     mesh.vertices[i] += 1e7;
@@ -107,8 +102,7 @@ static void test_far_off_origin(void **state) {
   check("1e7 mm off", &mesh, NULL);
 }
 
-static void test_stiffness_over_six_decades(void **state) {
-  (void)state;
+TEST(test_stiffness_over_six_decades) {
   supine_mesh mesh = phantom();
   uint64_t seed = 66;
   double *stiffness = calloc(mesh.vertex_count, sizeof *stiffness);
@@ -117,13 +111,4 @@ static void test_stiffness_over_six_decades(void **state) {
   }
   check("six decades of stiffness", &mesh, stiffness);
   free(stiffness);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_slivers),        cmocka_unit_test(test_duplicate_faces),
-      cmocka_unit_test(test_flat_mesh),      cmocka_unit_test(test_ten_thousand_components),
-      cmocka_unit_test(test_far_off_origin), cmocka_unit_test(test_stiffness_over_six_decades),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

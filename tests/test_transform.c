@@ -75,8 +75,7 @@ static void sum_harmonics(const setup *s, size_t fields, const double *coefficie
   free(y);
 }
 
-static void test_transform_band_limited_round_trip(void **state) {
-  (void)state;
+TEST(test_transform_band_limited_round_trip) {
   static const size_t sizes[][3] = {/* band, latitudes, longitudes */
                                     {0, 1, 1},    {1, 2, 3},    {3, 4, 8},    {3, 5, 7},
                                     {7, 8, 16},   {7, 9, 15},   {15, 16, 32}, {15, 24, 31},
@@ -97,8 +96,7 @@ static void test_transform_band_limited_round_trip(void **state) {
   }
 }
 
-static void test_forward_highest_band_one_harmonic_is_one_coefficient(void **state) {
-  (void)state;
+TEST(test_forward_highest_band_one_harmonic_is_one_coefficient) {
   setup s = set_up(SUPINE_SH_BAND_MAX, SUPINE_SH_BAND_MAX + 1, 2 * SUPINE_SH_BAND_MAX + 2);
   static const size_t chosen[] = {0, 2, 4095, 4096, 4097, 4159, 4160, 4161, 4223, 4224};
   enum { FIELDS = sizeof chosen / sizeof *chosen };
@@ -126,8 +124,7 @@ static void test_forward_highest_band_one_harmonic_is_one_coefficient(void **sta
 }
 
 /* Values of no band at all: the transform is then still the same sums as plain quadrature. */
-static void test_forward_any_values_equal_direct_quadrature(void **state) {
-  (void)state;
+TEST(test_forward_any_values_equal_direct_quadrature) {
   enum { FIELDS = 5 };
   setup s = set_up(6, 9, 20);
   double *values = make(s.points * FIELDS, 31337);
@@ -155,8 +152,7 @@ static void test_forward_any_values_equal_direct_quadrature(void **state) {
   tear_down(&s);
 }
 
-static void test_create_small_grid_or_high_band_refused(void **state) {
-  (void)state;
+TEST(test_create_small_grid_or_high_band_refused) {
   static const size_t sizes[][3] = {
       {3, 3, 8}, {3, 4, 6}, {SUPINE_SH_BAND_MAX + 1, 200, 400}, {SIZE_MAX, 200, 400}};
   for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
@@ -172,14 +168,4 @@ static void test_create_small_grid_or_high_band_refused(void **state) {
     supine_sh_grid_destroy(grid);
   }
   supine_sh_transform_destroy(NULL);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_transform_band_limited_round_trip),
-      cmocka_unit_test(test_forward_highest_band_one_harmonic_is_one_coefficient),
-      cmocka_unit_test(test_forward_any_values_equal_direct_quadrature),
-      cmocka_unit_test(test_create_small_grid_or_high_band_refused),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,8 +20,7 @@ static bool load(const char *left, const char *right, supine_lungs *lungs) {
 
 /* III-C: at one orientation every vertex moves along one line, nearly in proportion to the volume:
  * by the run-time library on a basis file. */
-static void test_displacement_is_linear_in_volume_along_one_direction(void **state) {
-  (void)state;
+TEST(test_displacement_is_linear_in_volume_along_one_direction) {
   char path[] = "/tmp/supine-validation-XXXXXX";
   supine_lungs lungs = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &lungs)) {
@@ -85,8 +84,7 @@ static void test_displacement_is_linear_in_volume_along_one_direction(void **sta
 
 /* Kaneko et al., J. Appl. Physiol. 21, 1966, 767-777: in supine, prone and both lateral postures
  * ventilation rises from the uppermost to the lowermost zone, with much the same gradient. */
-static void test_ventilation_dependent_zones_ventilate_more_in_all_postures(void **state) {
-  (void)state;
+TEST(test_ventilation_dependent_zones_ventilate_more_in_all_postures) {
   supine_lungs lungs = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &lungs)) {
     skip();
@@ -115,8 +113,7 @@ static void test_ventilation_dependent_zones_ventilate_more_in_all_postures(void
 }
 
 /* The same lungs at 5k and 20k vertices each: a reach takes most of the drift away. */
-static void test_resolution_reach_shrinks_the_drift(void **state) {
-  (void)state;
+TEST(test_resolution_reach_shrinks_the_drift) {
   supine_lungs coarse = {0};
   supine_lungs fine = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &coarse) ||
@@ -152,13 +149,4 @@ static void test_resolution_reach_shrinks_the_drift(void **state) {
   supine_lungs_free(&fine);
   free(moves[0]);
   free(moves[1]);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_displacement_is_linear_in_volume_along_one_direction),
-      cmocka_unit_test(test_ventilation_dependent_zones_ventilate_more_in_all_postures),
-      cmocka_unit_test(test_resolution_reach_shrinks_the_drift),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,8 +5,7 @@
 #include "validation.h"
 
 /* Fig. 8 */
-static void test_plane_equals_mass_spring_damper_at_rest(void **state) {
-  (void)state;
+TEST(test_plane_equals_mass_spring_damper_at_rest) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
   double *force = plane_force(&f);
@@ -36,8 +35,7 @@ static void test_plane_equals_mass_spring_damper_at_rest(void **state) {
 }
 
 /* The same with stiffness that varies fourfold, over links of all lengths. */
-static void test_plane_irregular_equals_mass_spring_damper_at_rest(void **state) {
-  (void)state;
+TEST(test_plane_irregular_equals_mass_spring_damper_at_rest) {
   frame f = frame_plane(15, 7.0);
   const size_t n = f.mesh.vertex_count;
   double *stiffness = calloc(n, sizeof *stiffness);
@@ -65,8 +63,7 @@ static void test_plane_irregular_equals_mass_spring_damper_at_rest(void **state)
 }
 
 /* Fig. 9 */
-static void test_ring_uniform_stays_a_circle(void **state) {
-  (void)state;
+TEST(test_ring_uniform_stays_a_circle) {
   enum { COUNT = 60 };
   frame f = frame_ring(COUNT, 50.0);
   double *force = ones(COUNT);
@@ -89,8 +86,7 @@ static void test_ring_uniform_stays_a_circle(void **state) {
   frame_free(&f);
 }
 
-static void test_ring_mixed_moves_less_where_it_is_stiff(void **state) {
-  (void)state;
+TEST(test_ring_mixed_moves_less_where_it_is_stiff) {
   enum { COUNT = 60 };
   static const double factors[] = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0};
   frame f = frame_ring(COUNT, 50.0);
@@ -123,8 +119,7 @@ static void count_steps(void *context, size_t steps, double held) {
 }
 
 /* Fig. 7: to 1e-6 of the converged solution, in visits of a link from one side. */
-static void test_pitcher_catcher_convergence_beats_mass_spring_damper(void **state) {
-  (void)state;
+TEST(test_pitcher_catcher_convergence_beats_mass_spring_damper) {
   frame f = frame_plane(15, 10.0);
   const size_t n = f.mesh.vertex_count;
   double *force = plane_force(&f);
@@ -151,16 +146,4 @@ static void test_pitcher_catcher_convergence_beats_mass_spring_damper(void **sta
   free(stiffness);
   free(exact);
   free(found);
-}
-
-int main(void) {
-  (void)gsl_set_error_handler_off();
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_plane_equals_mass_spring_damper_at_rest),
-      cmocka_unit_test(test_plane_irregular_equals_mass_spring_damper_at_rest),
-      cmocka_unit_test(test_ring_uniform_stays_a_circle),
-      cmocka_unit_test(test_ring_mixed_moves_less_where_it_is_stiff),
-      cmocka_unit_test(test_pitcher_catcher_convergence_beats_mass_spring_damper),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

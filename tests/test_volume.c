@@ -50,18 +50,15 @@ static void check_lung_volumes(bool vector) {
   fixture_destroy(f);
 }
 
-static void test_lung_volume_scalar_equals_surface(void **state) {
-  (void)state;
+TEST(test_lung_volume_scalar_equals_surface) {
   check_lung_volumes(false);
 }
 
-static void test_lung_volume_vector_equals_surface(void **state) {
-  (void)state;
+TEST(test_lung_volume_vector_equals_surface) {
   check_lung_volumes(true);
 }
 
-static void test_scale_random_volumes_reached(void **state) {
-  (void)state;
+TEST(test_scale_random_volumes_reached) {
   fixture *f = fixture_create(47, 5, 2, 2, false, true, 9, 77);
   unsigned char *bytes = NULL;
   supine_basis *basis = open_bytes(f, &bytes);
@@ -106,8 +103,7 @@ static supine_basis *open_cubic(double a, double b, double c, unsigned char **by
   return basis;
 }
 
-static void test_scale_cubics_branch_of_rest_only(void **state) {
-  (void)state;
+TEST(test_scale_cubics_branch_of_rest_only) {
   static const struct {
     double a, b, c, volume, scale; /* scale NAN: out of reach */
   } cases[] = {
@@ -155,8 +151,7 @@ static void test_scale_cubics_branch_of_rest_only(void **state) {
   }
 }
 
-static void test_scale_not_finite_volume_refused(void **state) {
-  (void)state;
+TEST(test_scale_not_finite_volume_refused) {
   unsigned char *bytes = NULL;
   supine_basis *basis = open_cubic(2, 0, 0, &bytes);
   const double one = 1;
@@ -169,15 +164,14 @@ static void test_scale_not_finite_volume_refused(void **state) {
   free(bytes);
 }
 
-static void test_pose_open_surface_says_so(void **unused) {
-  (void)unused;
+TEST(test_pose_open_surface_says_so) {
   fixture *f = fixture_create(9, 3, 1, 1, false, false, 9, 5);
   unsigned char *bytes = NULL;
   supine_basis *basis = open_bytes(f, &bytes);
-  const supine_state state = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_SCAN, 10}};
+  const supine_state scan = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_SCAN, 10}};
   supine_pose pose;
   supine_error error;
-  assert_int_equal(supine_basis_pose(basis, &state, &pose, &error), SUPINE_ERROR_OPEN_SURFACE);
+  assert_int_equal(supine_basis_pose(basis, &scan, &pose, &error), SUPINE_ERROR_OPEN_SURFACE);
   assert_non_null(strstr(error.message, "--scale"));
   supine_basis_close(basis);
   free(bytes);
@@ -195,8 +189,7 @@ static double box_volume(const double *gains) {
   return 3000 * ((1 + 0.2 * gains[0]) * (1 + 0.25 * gains[1]) * (1 + 0.3 * gains[2]) - 1);
 }
 
-static void test_volume_form_gains_every_volume_met_on_the_path(void **state) {
-  (void)state;
+TEST(test_volume_form_gains_every_volume_met_on_the_path) {
   const double rest = box_volume((double[]){-1, -1, -1});
   double last[3] = {1, 1, 1};
   for (double part = -0.3; part < 1.5; part += 0.1) {
@@ -213,8 +206,7 @@ static void test_volume_form_gains_every_volume_met_on_the_path(void **state) {
   }
 }
 
-static void test_volume_form_gains_at_rest_equal_on_all_axes(void **state) {
-  (void)state;
+TEST(test_volume_form_gains_at_rest_equal_on_all_axes) {
   const double rest = box_volume((double[]){-1, -1, -1});
   double gains[3];
   assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, rest, gains, NULL),
@@ -225,8 +217,7 @@ static void test_volume_form_gains_at_rest_equal_on_all_axes(void **state) {
 }
 
 /* Slopes along the path as published for it: rest 1, 0.1, 1.9; full 1, 1.45, 0.55. */
-static void test_volume_bend_slopes_as_stated(void **state) {
-  (void)state;
+TEST(test_volume_bend_slopes_as_stated) {
   static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
   for (size_t end = 0; end < 2; ++end) {
     for (int side = -1; side <= 1; side += 2) { /* value and slope are continuous at rest */
@@ -243,11 +234,9 @@ static void test_volume_bend_slopes_as_stated(void **state) {
 }
 
 /* Full inflation and beyond, between full and rest, below rest. */
-static void test_volume_bend_values_as_stated(void **state) {
-  (void)state;
-  static const double at[][3] = {{-0.2, -0.2864, -0.1136},
-                                 {0.4, 0.5512, 0.2488},
-                                 {1.3, 1.244062423021089, 1.355937576978911}};
+TEST(test_volume_bend_values_as_stated) {
+  static const double at[][3] = {
+      {-0.2, -0.2864, -0.1136}, {0.4, 0.5512, 0.2488}, {1.3, 1.244062423021089, 1.355937576978911}};
   for (size_t i = 0; i < 3; ++i) {
     double ratio[3];
     supine_volume_bend(box_bend, at[i][0], ratio);
@@ -256,8 +245,7 @@ static void test_volume_bend_values_as_stated(void **state) {
   }
 }
 
-static void test_volume_form_gains_straight_path_one_scale(void **state) {
-  (void)state;
+TEST(test_volume_form_gains_straight_path_one_scale) {
   static const double straight[3] = {0, 0, 0};
   double gains[3];
   assert_int_equal(supine_volume_form_gains(&box_form, straight, 0, -900, gains, NULL), SUPINE_OK);
@@ -265,8 +253,7 @@ static void test_volume_form_gains_straight_path_one_scale(void **state) {
   assert_true(fabs(box_volume(gains) + 900) <= 1e-9);
 }
 
-static void test_volume_form_gains_out_of_reach_refused(void **state) {
-  (void)state;
+TEST(test_volume_form_gains_out_of_reach_refused) {
   const double rest = box_volume((double[]){-1, -1, -1});
   double gains[3];
   supine_error error = {0};
@@ -275,22 +262,4 @@ static void test_volume_form_gains_out_of_reach_refused(void **state) {
   assert_non_null(strstr(error.message, "-3100 mL is out of reach"));
   assert_int_equal(supine_volume_form_gains(&box_form, box_bend, 0, -10, gains, &error),
                    SUPINE_ERROR_NUMERICAL);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_lung_volume_scalar_equals_surface),
-      cmocka_unit_test(test_lung_volume_vector_equals_surface),
-      cmocka_unit_test(test_scale_random_volumes_reached),
-      cmocka_unit_test(test_scale_cubics_branch_of_rest_only),
-      cmocka_unit_test(test_scale_not_finite_volume_refused),
-      cmocka_unit_test(test_pose_open_surface_says_so),
-      cmocka_unit_test(test_volume_form_gains_every_volume_met_on_the_path),
-      cmocka_unit_test(test_volume_form_gains_at_rest_equal_on_all_axes),
-      cmocka_unit_test(test_volume_bend_slopes_as_stated),
-      cmocka_unit_test(test_volume_bend_values_as_stated),
-      cmocka_unit_test(test_volume_form_gains_straight_path_one_scale),
-      cmocka_unit_test(test_volume_form_gains_out_of_reach_refused),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -67,8 +67,7 @@ static supine_stream_verdict take(const double r[9], double gravity[3]) {
   return verdict;
 }
 
-static void test_postures_as_trackers_give_them(void **state) {
-  (void)state;
+TEST(test_postures_as_trackers_give_them) {
   for (int i = 0; i < LIES; ++i) {
     double r[9];
     double gravity[3];
@@ -80,8 +79,7 @@ static void test_postures_as_trackers_give_them(void **state) {
 }
 
 /* A quaternion of each, in every sign, as another route to the same. */
-static void test_quaternions_as_trackers_give_them(void **state) {
-  (void)state;
+TEST(test_quaternions_as_trackers_give_them) {
   static const struct {
     const char *posture;
     double q[4]; /* W, X, Y, Z, by hand: a turn about a unit axis, cos and sin of half of it */
@@ -111,8 +109,7 @@ static void test_quaternions_as_trackers_give_them(void **state) {
 }
 
 /* A tracker whose world has y up, and a marker whose axes are right, front, head. */
-static void test_setup_turns_world_and_marker(void **state) {
-  (void)state;
+TEST(test_setup_turns_world_and_marker) {
   supine_stream_setup setup = {.down = {0, -1, 0}};
   const double half_turn[4] = {0, 0, 0, 1};
   supine_stream_rotation(half_turn, setup.body);
@@ -136,8 +133,7 @@ static void scaled(const double r[9], double x, double y, double z, double out[9
   }
 }
 
-static void test_rotations_that_are_none(void **state) {
-  (void)state;
+TEST(test_rotations_that_are_none) {
   for (int i = 0; i < LIES; ++i) {
     double r[9];
     double m[9];
@@ -173,8 +169,7 @@ static void test_rotations_that_are_none(void **state) {
   }
 }
 
-static void test_quaternions_and_vectors_that_are_none(void **state) {
-  (void)state;
+TEST(test_quaternions_and_vectors_that_are_none) {
   const supine_stream_setup setup = supine_stream_setup_default();
   const double good[4] = {3, -3, 0, 0};
   const double bad[3][4] = {{0, 0, 0, 0}, {NAN, 0, 0, 0}, {1, INFINITY, 0, 0}};
@@ -194,8 +189,7 @@ static void test_quaternions_and_vectors_that_are_none(void **state) {
 }
 
 /* Behind a steady turn the smoothed direction stays the stated time behind. */
-static void test_smoothing_lags_as_stated(void **state) {
-  (void)state;
+TEST(test_smoothing_lags_as_stated) {
   const double seconds = 0.2;
   const double step = 1e-3;
   const double speed = 0.5; /* rad/s */
@@ -217,16 +211,4 @@ static void test_smoothing_lags_as_stated(void **state) {
   assert_true(fabs(supine_stream_gravity_smooth(still, seconds * log(2.0), seconds, opposite) -
                    M_PI / 2.0) < 1e-9); /* half of the way, in the time of a half */
   assert_true(fabs(opposite[2]) < 1e-9);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_postures_as_trackers_give_them),
-      cmocka_unit_test(test_quaternions_as_trackers_give_them),
-      cmocka_unit_test(test_setup_turns_world_and_marker),
-      cmocka_unit_test(test_rotations_that_are_none),
-      cmocka_unit_test(test_quaternions_and_vectors_that_are_none),
-      cmocka_unit_test(test_smoothing_lags_as_stated),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

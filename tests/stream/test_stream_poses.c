@@ -18,8 +18,7 @@ static const char *file_of(const char *text) {
   return path;
 }
 
-static void test_poses_come_back_as_they_were(void **state) {
-  (void)state;
+TEST(test_poses_come_back_as_they_were) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/kept.csv", folder);
   FILE *file = fopen(path, "w");
@@ -51,8 +50,7 @@ static void test_poses_come_back_as_they_were(void **state) {
   supine_stream_poses_free(&poses);
 }
 
-static void test_files_that_are_no_poses(void **state) {
-  (void)state;
+TEST(test_files_that_are_no_poses) {
   static const struct {
     const char *text, *says;
   } bad[] = {
@@ -77,8 +75,7 @@ static void test_files_that_are_no_poses(void **state) {
                    SUPINE_ERROR_READ);
 }
 
-static void test_latencies_are_counted(void **state) {
-  (void)state;
+TEST(test_latencies_are_counted) {
   supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
   assert_true(supine_stream_latency_share(latency, 0.5) == 0.0);
   for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us: middles of bins */
@@ -102,8 +99,7 @@ static void expect_volume(const supine_stream_volume *volume, const supine_basis
   assert_true(at.volume.ml == wanted.ml);
 }
 
-static void test_volumes_in_words(void **state) {
-  (void)state;
+TEST(test_volumes_in_words) {
   fixture *made = fixture_create(200, 4, 2, 2, false, true, 10.0, 5);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(made, &size);
@@ -166,12 +162,4 @@ static int remove_folder(void **state) {
   return 0;
 }
 
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_poses_come_back_as_they_were),
-      cmocka_unit_test(test_files_that_are_no_poses),
-      cmocka_unit_test(test_latencies_are_counted),
-      cmocka_unit_test(test_volumes_in_words),
-  };
-  return cmocka_run_group_tests(tests, make_folder, remove_folder);
-}
+TEST_GROUP(make_folder, remove_folder)

@@ -286,8 +286,7 @@ static void expect_weights(const stage *s, const double gravity[3], double above
 
 static const double poses[4][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.6, 0, -0.8}};
 
-static void test_weights_answer_each_pose(void **state) {
-  (void)state;
+TEST(test_weights_answer_each_pose) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   supine_stream_header header;
@@ -323,8 +322,7 @@ static void test_weights_answer_each_pose(void **state) {
   stage_destroy(s);
 }
 
-static void test_a_bare_number_as_volume_is_refused(void **state) {
-  (void)state;
+TEST(test_a_bare_number_as_volume_is_refused) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   supine_stream_header header;
@@ -339,8 +337,7 @@ static void test_a_bare_number_as_volume_is_refused(void **state) {
   stage_destroy(s);
 }
 
-static void test_volume_above_rest_sends_what_basis_pose_gives(void **state) {
-  (void)state;
+TEST(test_volume_above_rest_sends_what_basis_pose_gives) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   supine_stream_header header;
@@ -371,8 +368,7 @@ static void test_volume_above_rest_sends_what_basis_pose_gives(void **state) {
 }
 
 /* Points of a surface frame, as they must come: triangles with the first, or with all. */
-static void test_surfaces_and_wishes(void **state) {
-  (void)state;
+TEST(test_surfaces_and_wishes) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   const supine_basis_info *info = supine_basis_get_info(s->basis);
@@ -419,8 +415,7 @@ static void test_surfaces_and_wishes(void **state) {
 }
 
 /* Of a thousand poses at once only the newest counts: few frames, and the last is of the last. */
-static void test_newest_pose_wins(void **state) {
-  (void)state;
+TEST(test_newest_pose_wins) {
   enum { BURST = 1000 };
   stage *s = stage_create();
   s->options.rate = 100.0;
@@ -464,8 +459,7 @@ static int keep_rate(int peer, int count, uint64_t stamp) {
 /* One that asks for surfaces and never reads, one that vanishes in the middle of a frame, one that
  * stops in the middle of a message: the honest one is answered every time, and the stuck are lost
  * after the patience that they are given. */
-static void test_stuck_and_vanished_peers_hold_up_nobody(void **state) {
-  (void)state;
+TEST(test_stuck_and_vanished_peers_hold_up_nobody) {
   stage *s = stage_create();
   s->options.patience = 0.5;
   const int port = stage_run(s);
@@ -493,8 +487,7 @@ static void test_stuck_and_vanished_peers_hold_up_nobody(void **state) {
   stage_destroy(s);
 }
 
-static void test_fifty_peers_and_no_more_than_allowed(void **state) {
-  (void)state;
+TEST(test_fifty_peers_and_no_more_than_allowed) {
   enum { MANY = 50 };
   stage *s = stage_create();
   s->options.peers = MANY;
@@ -533,8 +526,7 @@ static void test_fifty_peers_and_no_more_than_allowed(void **state) {
 
 /* Whole messages of every type, each with a few bytes changed: ten thousand. The checksum is put
  * right for half of them, so that what lies behind it is reached. */
-static void test_ten_thousand_mutated_messages(void **state) {
-  (void)state;
+TEST(test_ten_thousand_mutated_messages) {
   enum { COUNT = 10000 };
   static const struct {
     const char *type, *device;
@@ -604,8 +596,7 @@ static void test_ten_thousand_mutated_messages(void **state) {
   stage_destroy(s);
 }
 
-static void test_absurd_sizes(void **state) {
-  (void)state;
+TEST(test_absurd_sizes) {
   stage *s = stage_create();
   const int port = stage_run(s);
   unsigned char bytes[SUPINE_STREAM_HEADER];
@@ -640,8 +631,7 @@ static void test_absurd_sizes(void **state) {
 }
 
 /* A tracker that waits to be connected to, and goes away, and comes back. */
-static void test_connects_and_connects_again(void **state) {
-  (void)state;
+TEST(test_connects_and_connects_again) {
   supine_stream_address here;
   supine_error error;
   int port = 0;
@@ -669,8 +659,7 @@ static void test_connects_and_connects_again(void **state) {
   stage_destroy(s);
 }
 
-static void test_replay_and_record(void **state) {
-  (void)state;
+TEST(test_replay_and_record) {
   enum { COUNT = 30 };
   supine_stream_pose pose[COUNT];
   for (int i = 0; i < COUNT; ++i) {
@@ -716,8 +705,7 @@ static void test_replay_and_record(void **state) {
 
 /* Smoothed, the lungs go on turning after the last pose until they are there; breathing, they never
  * stop. */
-static void test_frames_come_while_the_lungs_move(void **state) {
-  (void)state;
+TEST(test_frames_come_while_the_lungs_move) {
   stage *s = stage_create();
   s->options.smooth = 0.1;
   const int peer = dial(stage_run(s));
@@ -763,8 +751,7 @@ static void test_frames_come_while_the_lungs_move(void **state) {
 
 /* A port alone is this machine's own: 127.0.0.1 and no other address, not even of the loopback;
  * with an address, that one. */
-static void test_listens_on_loopback_unless_told_otherwise(void **state) {
-  (void)state;
+TEST(test_listens_on_loopback_unless_told_otherwise) {
   static const struct {
     const char *listen;
     uint32_t from;
@@ -788,8 +775,7 @@ static void test_listens_on_loopback_unless_told_otherwise(void **state) {
   }
 }
 
-static void test_places_that_cannot_be_listened_on(void **state) {
-  (void)state;
+TEST(test_places_that_cannot_be_listened_on) {
   stage *s = stage_create();
   supine_error error;
   supine_stream_server *server = NULL;
@@ -813,8 +799,7 @@ static void test_places_that_cannot_be_listened_on(void **state) {
 
 /* A socket that takes little at a time gets every byte once and in order, never more than a share
  * of 1 MiB at one go. */
-static void test_a_frame_in_parts_arrives_whole(void **state) {
-  (void)state;
+TEST(test_a_frame_in_parts_arrives_whole) {
   static const size_t sizes[3] = {3001, 1, 2500007};
   const size_t size = sizes[0] + sizes[1] + sizes[2];
   unsigned char *bytes = fixture_allocate(size, 1);
@@ -860,25 +845,4 @@ static void test_a_frame_in_parts_arrives_whole(void **state) {
   }
   free(bytes);
   free(got);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_weights_answer_each_pose),
-      cmocka_unit_test(test_a_bare_number_as_volume_is_refused),
-      cmocka_unit_test(test_volume_above_rest_sends_what_basis_pose_gives),
-      cmocka_unit_test(test_surfaces_and_wishes),
-      cmocka_unit_test(test_newest_pose_wins),
-      cmocka_unit_test(test_a_frame_in_parts_arrives_whole),
-      cmocka_unit_test(test_stuck_and_vanished_peers_hold_up_nobody),
-      cmocka_unit_test(test_fifty_peers_and_no_more_than_allowed),
-      cmocka_unit_test(test_ten_thousand_mutated_messages),
-      cmocka_unit_test(test_absurd_sizes),
-      cmocka_unit_test(test_connects_and_connects_again),
-      cmocka_unit_test(test_replay_and_record),
-      cmocka_unit_test(test_frames_come_while_the_lungs_move),
-      cmocka_unit_test(test_listens_on_loopback_unless_told_otherwise),
-      cmocka_unit_test(test_places_that_cannot_be_listened_on),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -24,8 +24,7 @@ static void fill(unsigned char *bytes, size_t size, uint64_t seed) {
 }
 
 /* Every length, at every alignment of 8, and cut anywhere. */
-static void test_crc_of_every_length_is_the_librarys(void **state) {
-  (void)state;
+TEST(test_crc_of_every_length_is_the_librarys) {
   enum { LONGEST = 3000 };
   unsigned char *bytes = fixture_allocate(LONGEST + 8, 1);
   fill(bytes, LONGEST + 8, 4711);
@@ -43,8 +42,7 @@ static void test_crc_of_every_length_is_the_librarys(void **state) {
   free(bytes);
 }
 
-static void test_crc_of_a_large_message_is_the_librarys(void **state) {
-  (void)state;
+TEST(test_crc_of_a_large_message_is_the_librarys) {
   const size_t size = 6096012; /* 508,001 points */
   unsigned char *bytes = fixture_allocate(size, 1);
   fill(bytes, size, 99);
@@ -52,8 +50,7 @@ static void test_crc_of_a_large_message_is_the_librarys(void **state) {
   free(bytes);
 }
 
-static void test_header_is_the_librarys(void **state) {
-  (void)state;
+TEST(test_header_is_the_librarys) {
   igtl_header theirs = {
       .version = 1, .timestamp = 0x0102030405060708u, .body_size = 48, .crc = 0xF0E1D2C3B4A59687u};
   memcpy(theirs.name, "TRANSFORM", 9);
@@ -98,8 +95,7 @@ static void make_transform(igtl_float32 transform[12]) {
   igtl_transform_convert_byte_order(transform);
 }
 
-static void test_transform_is_read(void **state) {
-  (void)state;
+TEST(test_transform_is_read) {
   igtl_float32 transform[12];
   make_transform(transform);
   unsigned char *body = (unsigned char *)transform;
@@ -127,8 +123,7 @@ static void test_transform_is_read(void **state) {
   assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
 }
 
-static void test_transform_of_version_2_is_read(void **state) {
-  (void)state;
+TEST(test_transform_of_version_2_is_read) {
   igtl_float32 transform[12];
   make_transform(transform);
   /* By hand: an extension of 14 bytes, 2 more than known; one key "a" of value "bc". */
@@ -167,8 +162,7 @@ static void expect_quaternion(const supine_stream_message *m, double w, double x
   }
 }
 
-static void test_qtdata_is_read(void **state) {
-  (void)state;
+TEST(test_qtdata_is_read) {
   igtl_qtdata_element element[3];
   memset(element, 0, sizeof element);
   memcpy(element[0].name, "Probe", 5);
@@ -191,8 +185,7 @@ static void test_qtdata_is_read(void **state) {
   assert_int_equal(read_ok(&header, body, "Nobody").kind, SUPINE_STREAM_NOTHING);
 }
 
-static void test_position_is_read(void **state) {
-  (void)state;
+TEST(test_position_is_read) {
   igtl_position position = {.position = {1, 2, 3}, .quaternion = {0.48f, -0.36f, 0.48f, 0.64f}};
   igtl_position_convert_byte_order(&position);
   unsigned char *body = (unsigned char *)&position;
@@ -227,8 +220,7 @@ static size_t make_array(int type, size_t count, const double *values, unsigned 
   return bytes;
 }
 
-static void test_arrays_and_sensors_are_read(void **state) {
-  (void)state;
+TEST(test_arrays_and_sensors_are_read) {
   unsigned char body[256];
   const double down[4] = {0.25, -0.5, 1.5, 7.0};
   for (int type = IGTL_NDARRAY_STYPE_TYPE_FLOAT32; type <= IGTL_NDARRAY_STYPE_TYPE_FLOAT64;
@@ -258,8 +250,7 @@ static void test_arrays_and_sensors_are_read(void **state) {
   assert_true(m.number[0] == 0.0 && m.number[1] == -9.5 && m.number[2] == 0.0);
 }
 
-static void test_strings_are_read(void **state) {
-  (void)state;
+TEST(test_strings_are_read) {
   igtl_string_header head = {3, 8};
   igtl_string_convert_byte_order(&head);
   unsigned char body[4 + 100] = {0};
@@ -278,8 +269,7 @@ static void test_strings_are_read(void **state) {
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
 
-static void test_points_are_read(void **state) {
-  (void)state;
+TEST(test_points_are_read) {
   igtl_point_element list[3];
   memset(list, 0, sizeof list);
   for (int i = 0; i < 3; ++i) {
@@ -308,8 +298,7 @@ static void test_points_are_read(void **state) {
 }
 
 /* Contents that end before they say: every length of each, checksum right. */
-static void test_every_truncation_is_refused(void **state) {
-  (void)state;
+TEST(test_every_truncation_is_refused) {
   static const struct {
     const char *type, *device;
     size_t whole;
@@ -341,8 +330,7 @@ static void test_every_truncation_is_refused(void **state) {
   }
 }
 
-static void test_headers_that_are_none_are_refused(void **state) {
-  (void)state;
+TEST(test_headers_that_are_none_are_refused) {
   supine_stream_header good = {.version = 1};
   strcpy(good.type, "TRANSFORM");
   unsigned char bytes[SUPINE_STREAM_HEADER];
@@ -441,14 +429,12 @@ static void expect_weights_frame(sample s) {
   sample_destroy(&s);
 }
 
-static void test_weights_are_the_librarys_ndarray(void **state) {
-  (void)state;
+TEST(test_weights_are_the_librarys_ndarray) {
   expect_weights_frame(sample_create());
 }
 
 /* The most modes and lungs that a basis may have. */
-static void test_weights_of_the_largest_basis_are_whole(void **state) {
-  (void)state;
+TEST(test_weights_of_the_largest_basis_are_whole) {
   expect_weights_frame(sample_open(fixture_create(16 * SUPINE_LUNGS_MAX, SUPINE_MODES_MAX, 15,
                                                   SUPINE_LUNGS_MAX, false, false, 20.0, 23)));
 }
@@ -484,8 +470,7 @@ static unsigned char *make_polydata(const sample *s, bool triangles, double sign
   return body;
 }
 
-static void test_attribute_is_the_librarys(void **state) {
-  (void)state;
+TEST(test_attribute_is_the_librarys) {
   igtl_polydata_info surface;
   igtl_polydata_init_info(&surface);
   surface.header.npoints = 2;
@@ -507,8 +492,7 @@ static void test_attribute_is_the_librarys(void **state) {
   assert_memory_equal(ours, theirs, size);
 }
 
-static void test_surface_is_the_librarys_polydata(void **state) {
-  (void)state;
+TEST(test_surface_is_the_librarys_polydata) {
   sample s = sample_create();
   supine_error error;
   for (int ras = 0; ras < 2; ++ras) {
@@ -606,8 +590,7 @@ static void expect_strips(const uint32_t *corner, size_t count, size_t vertices)
 
 /* Of a grid rolled into a tube, of triangles at random (edges that three share, corners that
  * coincide, triangles twice), of a fan, and of none. */
-static void test_strips_hold_each_triangle_once(void **state) {
-  (void)state;
+TEST(test_strips_hold_each_triangle_once) {
   enum { AROUND = 37, ALONG = 53, COUNT = 2 * AROUND * ALONG };
   uint32_t *corner = fixture_allocate(3 * (size_t)COUNT, sizeof *corner);
   for (uint32_t i = 0; i < AROUND * ALONG; ++i) {
@@ -633,27 +616,4 @@ static void test_strips_hold_each_triangle_once(void **state) {
   }
   expect_strips(corner, COUNT, COUNT + 2);
   free(corner);
-}
-
-int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_crc_of_every_length_is_the_librarys),
-      cmocka_unit_test(test_crc_of_a_large_message_is_the_librarys),
-      cmocka_unit_test(test_header_is_the_librarys),
-      cmocka_unit_test(test_transform_is_read),
-      cmocka_unit_test(test_transform_of_version_2_is_read),
-      cmocka_unit_test(test_qtdata_is_read),
-      cmocka_unit_test(test_position_is_read),
-      cmocka_unit_test(test_arrays_and_sensors_are_read),
-      cmocka_unit_test(test_strings_are_read),
-      cmocka_unit_test(test_points_are_read),
-      cmocka_unit_test(test_attribute_is_the_librarys),
-      cmocka_unit_test(test_every_truncation_is_refused),
-      cmocka_unit_test(test_headers_that_are_none_are_refused),
-      cmocka_unit_test(test_weights_are_the_librarys_ndarray),
-      cmocka_unit_test(test_weights_of_the_largest_basis_are_whole),
-      cmocka_unit_test(test_strips_hold_each_triangle_once),
-      cmocka_unit_test(test_surface_is_the_librarys_polydata),
-  };
-  return cmocka_run_group_tests(tests, NULL, NULL);
 }
