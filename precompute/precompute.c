@@ -58,18 +58,13 @@ static void pipeline_free(pipeline *p) {
   supine_accuracy_error_table_free(&p->table);
 }
 
-/* Part of the whole progress, 0 to 1, that one stage takes. */
-typedef struct stage {
-  const supine_precompute_options *options;
-  double begin, end;
-} stage;
-
-static bool stage_progress(void *context, double fraction) {
-  const stage *part = context;
-  const supine_precompute_options *options = part->options;
-  return options->progress == NULL ||
-         options->progress(options->progress_context,
-                           part->begin + fraction * (part->end - part->begin));
+/* Report progress, 0 to 1; fail if the caller asks to stop. */
+static supine_status report_progress(const supine_precompute_options *options, double fraction,
+                                     supine_error *error) {
+  return options->progress == NULL || options->progress(options->progress_context, fraction)
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
+                                "interrupted: nothing was written");
 }
 
 static supine_status find_directions(pipeline *p, supine_error *error) {
@@ -91,12 +86,10 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
 static supine_status project(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
   const supine_model *model = &options->model;
-  stage part = {options, 0.0, 0.8};
-  if (!stage_progress(&part, 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
-  }
-  return supine_projection_create(p->lungs, model, options->band, stage_progress, &part,
-                                  &p->projection, error);
+  const supine_status status = report_progress(options, 0.0, error);
+  return status == SUPINE_OK
+             ? supine_projection_create(p->lungs, model, options->band, &p->projection, error)
+             : status;
 }
 
 static supine_status compress(pipeline *p, supine_error *error) {
@@ -296,11 +289,8 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
                                         .resting = p->reference.known ? p->resting[0] : NULL};
-  stage part = {p->options, 0.9, 1.0};
-  if (!stage_progress(&part, 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
-  }
-  return supine_writer_basis_write(path, &content, error);
+  const supine_status status = report_progress(p->options, 0.9, error);
+  return status == SUPINE_OK ? supine_writer_basis_write(path, &content, error) : status;
 }
 
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
@@ -311,8 +301,8 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
     p.reference = *options->reference;
   }
   supine_status (*const steps[])(pipeline *, supine_error *) = {
-      find_directions, project, compress, anchor,     find_forms,      find_rest,
-      hold_out,        measure, tabulate, drop_modes, find_turned_over};
+      project,  find_directions, compress, anchor,     find_forms,      find_rest,
+      hold_out, measure,         tabulate, drop_modes, find_turned_over};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < sizeof steps / sizeof *steps && status == SUPINE_OK; ++i) {
     status = steps[i](&p, error);

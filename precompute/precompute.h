@@ -10,6 +10,9 @@
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/projection.h"
 
+/** Report progress from 0 to 1; return false to stop the work. */
+typedef bool supine_progress_function(void *context, double fraction);
+
 /** Options of a basis. */
 typedef struct supine_precompute_options {
   supine_model model;

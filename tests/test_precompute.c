@@ -546,8 +546,7 @@ TEST(test_turned_over_looks_at_either_end_of_an_axis) {
   supine_volume_forms forms = {0};
   assert_int_equal(supine_physics_directions(&lungs, &model.direction, directions, NULL),
                    SUPINE_OK);
-  assert_int_equal(supine_projection_create(&lungs, &model, 3, NULL, NULL, &projection, NULL),
-                   SUPINE_OK);
+  assert_int_equal(supine_projection_create(&lungs, &model, 3, &projection, NULL), SUPINE_OK);
   assert_int_equal(supine_projection_compress_harmonics(&projection, &field, NULL), SUPINE_OK);
   assert_int_equal(supine_projection_compression_volume_forms(&field, &lungs, model.share,
                                                               directions, &forms, NULL),

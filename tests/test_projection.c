@@ -72,8 +72,7 @@ TEST(test_projection_grid_is_fine_enough_for_the_kinks) {
     const size_t terms = supine_sh_count(bands[b]);
     supine_projection made;
     supine_sh_grid *grid = NULL;
-    assert_int_equal(supine_projection_create(*state, &model, bands[b], NULL, NULL, &made, NULL),
-                     SUPINE_OK);
+    assert_int_equal(supine_projection_create(*state, &model, bands[b], &made, NULL), SUPINE_OK);
     assert_int_equal(supine_sh_grid_create(LATITUDES, LONGITUDES, &grid), SUPINE_OK);
     double *fine = calloc(made.rank * terms, sizeof *fine);
     double *g = malloc(3 * LATITUDES * LONGITUDES * sizeof *g);
@@ -117,7 +116,7 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
   double g[3 * COUNT];
   double missed = 0.0;
   double all = 0.0;
-  assert_int_equal(supine_projection_create(lungs, model, 3, NULL, NULL, &made, NULL), SUPINE_OK);
+  assert_int_equal(supine_projection_create(lungs, model, 3, &made, NULL), SUPINE_OK);
   supine_accuracy_held_out_directions(COUNT, g);
   double *weights = weights_at(lungs, model, made.span, COUNT, g);
   for (size_t d = 0; d < COUNT; ++d) {
@@ -172,16 +171,16 @@ TEST(test_projection_impossible_softening_refused) {
   assert_int_equal(supine_phantom_create(20000, 6000.0, &mesh, NULL), SUPINE_OK);
   assert_int_equal(supine_lungs_create(&mesh, 1, NULL, &lungs, NULL), SUPINE_OK);
   model.force.soften = 1.0;
-  assert_int_equal(supine_projection_create(&lungs, &model, 5, NULL, NULL, &made, &error),
+  assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "--soften needs a reach"));
   model = supine_physics_model(SUPINE_LAW_DEEP);
   model.force.soften = 18.0;
-  assert_int_equal(supine_projection_create(&lungs, &model, 5, NULL, NULL, &made, &error),
+  assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_non_null(strstr(error.message, "at most 12"));
   model.force = (supine_force_law){0};
-  assert_int_equal(supine_projection_create(&lungs, &model, 5, NULL, NULL, &made, &error),
+  assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_NUMERICAL);
   supine_lungs_free(&lungs);
   supine_mesh_free(&mesh);
@@ -255,15 +254,13 @@ TEST(test_modes_equal_dense_decomposition) {
   }
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_projection projection;
-  assert_int_equal(supine_projection_create(lungs, &model, 5, NULL, NULL, &projection, NULL),
-                   SUPINE_OK);
+  assert_int_equal(supine_projection_create(lungs, &model, 5, &projection, NULL), SUPINE_OK);
   check_modes(&projection, weight, 3);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);
   model.force.soften = 1.0;
   model.reach = 10.0;
-  assert_int_equal(supine_projection_create(lungs, &model, 5, NULL, NULL, &projection, NULL),
-                   SUPINE_OK);
+  assert_int_equal(supine_projection_create(lungs, &model, 5, &projection, NULL), SUPINE_OK);
   check_modes(&projection, weight, 7);
   check_modes(&projection, weight, 16);
   supine_projection_free(&projection);

@@ -22,15 +22,16 @@
 
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
-/* Number of right-hand sides that are solved together; it bounds the work space. */
-enum { TOGETHER = 8 };
+/* TOGETHER: number of right-hand sides that are solved together; it bounds the work space. LARGE:
+ * vertices of a part above which only one part has a factor at a time, to save memory. */
+enum { TOGETHER = 8, LARGE = 100000 };
 
 /* Largest relative residual of a solve; double precision reaches about 1e-16 (R / h)^2, h the
  * length of a link. */
 static const double residual_limit = 1e-8;
 
 /* A part of the mesh that no edge links to the rest, such as one lung. Each part is solved in its
- * own thread. */
+ * own thread, unless it is large. */
 typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and their number */
   size_t edge, edge_count;
@@ -46,7 +47,7 @@ struct supine_equilibrium {
   double reach;    /* mm */
   double *area;    /* [N] area of a vertex over the mean; NULL: the paper's springs */
   double *link;    /* [edges] with a reach: w / 2; without: D(mass, spring) in mm */
-  double *lesions; /* [N] factors on the normalised stiffness */
+  double *lesions; /* [N] factors on the normalised stiffness; NULL: 1 */
   double *give;    /* [N] S of the matrix: a = 1/E; with a reach: 1 */
   double *load;    /* [N] right-hand side per unit force: 1; with a reach: area / E */
   size_t part_count;
@@ -233,16 +234,17 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
   made->topology = topology;
   made->area = reach > 0.0 ? malloc(n * sizeof *made->area) : NULL;
   made->link = malloc((topology->edge_count + 1) * sizeof *made->link);
-  made->lesions = malloc(n * sizeof *made->lesions);
+  made->lesions = lesions != NULL ? malloc(n * sizeof *made->lesions) : NULL;
   made->give = malloc(n * sizeof *made->give);
   made->load = malloc(n * sizeof *made->load);
-  if (made->link == NULL || made->lesions == NULL || made->give == NULL || made->load == NULL ||
-      (reach > 0.0 && made->area == NULL) || !create_matrices(made)) {
+  if (made->link == NULL || made->give == NULL || made->load == NULL ||
+      (lesions != NULL && made->lesions == NULL) || (reach > 0.0 && made->area == NULL) ||
+      !create_matrices(made)) {
     supine_physics_equilibrium_destroy(made);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
   }
-  for (size_t i = 0; i < n; ++i) {
-    made->lesions[i] = lesions != NULL ? lesions[i] : 1.0;
+  if (lesions != NULL) {
+    memcpy(made->lesions, lesions, n * sizeof *lesions);
   }
   *equilibrium = made;
   return supine_physics_equilibrium_set_shape(made, mesh, reach, NULL, error);
@@ -283,7 +285,7 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
   const supine_status status =
       supine_physics_stiffness_normalise(eq->vertex_count, stiffness, eq->load, error);
   for (size_t i = 0; status == SUPINE_OK && i < eq->vertex_count; ++i) {
-    const double a = 1.0 / (eq->load[i] * eq->lesions[i]);
+    const double a = 1.0 / (eq->load[i] * (eq->lesions != NULL ? eq->lesions[i] : 1.0));
     eq->give[i] = eq->area != NULL ? 1.0 : a;
     eq->load[i] = eq->area != NULL ? eq->area[i] * a : 1.0;
   }
@@ -385,10 +387,15 @@ static void solve_parts(void *context, size_t begin, size_t end, size_t thread) 
   solve *s = context;
   (void)thread;
   for (size_t k = begin; k < end; ++k) {
-    s->status[k] = factorise(&s->eq->parts[k]);
+    part *p = &s->eq->parts[k];
+    s->status[k] = factorise(p);
     for (size_t r = 0; r < s->count && s->status[k] == SUPINE_OK; r += TOGETHER) {
       const size_t left = s->count - r;
       s->status[k] = solve_columns(s, k, r, left < TOGETHER ? left : TOGETHER);
+    }
+    if (p->vertex_count > LARGE) {
+      cholmod.free_factor(&p->factor, &p->common);
+      p->factorised = false;
     }
   }
 }
@@ -397,7 +404,8 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
                                                const double *force, double *catch_,
                                                double *residual, supine_error *error) {
   solve s = {equilibrium, count, force, catch_, {SUPINE_OK, SUPINE_OK}, {0.0, 0.0}};
-  supine_parallel_for(equilibrium->part_count, 1, 0, solve_parts, &s);
+  const size_t threads = equilibrium->parts[0].vertex_count > LARGE ? 1 : 0;
+  supine_parallel_for(equilibrium->part_count, 1, threads, solve_parts, &s);
   const double largest = s.residual[0] >= s.residual[1] ? s.residual[0] : s.residual[1];
   if (residual != NULL) {
     *residual = largest;

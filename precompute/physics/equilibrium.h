@@ -74,10 +74,11 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
                                                        const double *stiffness,
                                                        supine_error *error);
 
-/** Solve for the catch F of `count` applied forces. The first solve factorises the matrix
- * and allocates about 30 N log2 N bytes for it.
+/** Solve for the catch F of `count` applied forces. The first solve factorises the matrix and
+ * allocates about 40 N log2 N bytes for it, which are kept for the next solve; a lung of more than
+ * 100000 vertices is factorised by each solve, so give it all forces at once.
  * @param force     [N, count] f on the masses (nothing is applied to springs)
- * @param catch_    [N, count] F, written
+ * @param catch_    [N, count] F, written; may be `force`
  * @param residual  the largest |b - A t| / |b| of any force, with b = area a f with a reach, b = f
  *                  without; NULL: not wanted
  * @retval SUPINE_ERROR_MEMORY

@@ -9,8 +9,7 @@
 
 enum {
   LATITUDES_PER_BAND = 8, /* of the grid; it has twice as many longitudes */
-  LATITUDES_MIN = 32,
-  AT_ONCE = 16 /* forces in one solve */
+  LATITUDES_MIN = 32
 };
 
 void supine_projection_free(supine_projection *projection) {
@@ -91,49 +90,30 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
 
 /* --- columns --------------------------------------------------------------------------------- */
 
-/* Solve for the span's directions, some at a time, into columns [N, R]. */
+/* Solve for the span's directions into columns [N, R]. */
 static supine_status solve(const supine_lungs *lungs, const supine_model *model,
-                           supine_progress_function *progress, void *context,
                            supine_projection *made, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   const size_t rank = made->rank;
   double range[2 * SUPINE_SPAN_MAX];
+  const supine_gravities gravities = {rank, made->span->directions, range, range + rank};
   supine_equilibrium *equilibrium = NULL;
-  double *force = malloc(n * AT_ONCE * sizeof *force);
-  double *caught = malloc(n * AT_ONCE * sizeof *caught);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (force == NULL || caught == NULL ||
-      supine_physics_height_range(lungs, model->force.pair, rank, made->span->directions, range,
+  if (supine_physics_height_range(lungs, model->force.pair, rank, made->span->directions, range,
                                   range + rank) != SUPINE_OK) {
-    (void)supine_error_set(error, status, "no memory to solve %zu vertices", n);
-    goto cleanup;
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory to solve %zu vertices", n);
   }
-  status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
-  for (size_t first = 0; first < rank && status == SUPINE_OK; first += AT_ONCE) {
-    const size_t count = rank - first < AT_ONCE ? rank - first : AT_ONCE;
-    const supine_gravities gravities = {count, made->span->directions + 3 * first, range + first,
-                                        range + rank + first};
-    if (progress != NULL && !progress(context, (double)first / (double)rank)) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
-      break;
-    }
-    supine_physics_force(lungs, &model->force, &gravities, n, NULL, force);
-    status = supine_physics_equilibrium_solve(equilibrium, count, force, caught, NULL, error);
-    for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
-      memcpy(made->columns + i * rank + first, caught + i * count, count * sizeof *caught);
-    }
+  supine_status status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
+  if (status == SUPINE_OK) {
+    supine_physics_force(lungs, &model->force, &gravities, n, NULL, made->columns);
+    status = supine_physics_equilibrium_solve(equilibrium, rank, made->columns, made->columns, NULL,
+                                              error);
   }
-cleanup:
-  free(force);
-  free(caught);
   supine_physics_equilibrium_destroy(equilibrium);
   return status;
 }
 
 supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
-                                       size_t band, supine_progress_function *progress,
-                                       void *context, supine_projection *projection,
+                                       size_t band, supine_projection *projection,
                                        supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   supine_projection made = {.vertex_count = n, .band = band};
@@ -159,7 +139,7 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
             : transform(lungs, &model->force, band, made.span, made.functions, error);
   }
   if (status == SUPINE_OK) {
-    status = solve(lungs, model, progress, context, &made, error);
+    status = solve(lungs, model, &made, error);
   }
   if (status == SUPINE_OK) {
     *projection = made;

@@ -26,20 +26,14 @@ typedef struct supine_projection {
 
 void supine_projection_free(supine_projection *projection);
 
-/** Report progress from 0 to 1; return false to stop the work. */
-typedef bool supine_progress_function(void *context, double fraction);
-
 /** Project the field. The span's weights have kinks where another vertex becomes the lowest or
  * highest; a grid eight times finer than the band keeps them from aliasing. The caller frees the
  * projection with supine_projection_free.
- * @param progress  NULL: not wanted
- * @retval SUPINE_ERROR_INTERRUPTED  progress returned false
  * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach, a band above
  *                                   SUPINE_SH_BAND_MAX, bad stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
-                                       size_t band, supine_progress_function *progress,
-                                       void *context, supine_projection *projection,
+                                       size_t band, supine_projection *projection,
                                        supine_error *error);
 
 /** A field compressed to K functions of orientation:
