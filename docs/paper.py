@@ -111,6 +111,6 @@ lungs of {best['vertices']:,} vertices.
 | V, the same number of operations or fewer | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} a vertex | the best functions of orientation instead of the first |
 | V, with stiffness that follows gravity | `--reach 10 --soften 1` | {percent(soft_first)} with the first 16 harmonics, {percent(soft_best)} with {soft_best['modes']} modes | |
 | V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement; the transfer matrix is applied once, to the best modes |
-| V, a breath of 500 mL over 5 s in steps of 1.5 mL, 15 ms a frame | `supine breathe --course flow`, `supine_step` | three additions a vertex a step (`test_pv_breath`) | |
+| V, a breath of 500 mL over 5 s in steps of 1.5 mL, 15 ms a frame | `supine breathe --course flow`, `supine_step` | three additions a vertex a step (`test_deform`) | |
 | VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | |
 """.rstrip())

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the frames of a breath: VTP over time, a series of VTP files, or safetensors. */
+/* Write the frames of a breath: VTP over time, or safetensors. */
 #ifndef SUPINE_BREATH_OUTPUT_H
 #define SUPINE_BREATH_OUTPUT_H
 
@@ -7,7 +7,7 @@
 
 #include "program/breath/breath_frames.h"
 
-#define SUPINE_BREATH_ENDINGS ".vtp, .pvd or .safetensors"
+#define SUPINE_BREATH_ENDINGS ".vtp or .safetensors"
 
 typedef struct breath_output breath_output;
 
@@ -24,12 +24,11 @@ typedef struct breath_content {
 /* Begin an output:
  *
  *     NAME.vtp           one file over time, the triangles once
- *     NAME.pvd           an index with times in s, and a folder NAME with a VTP file per frame
  *     NAME.safetensors   positions F32 [T, N, 3], triangles U32 [M, 3], time F64 [T],
  *                        volume F64 [T, G], gravity F64 [T, 3]
  *
- * A folder must be new or empty. VTP files have positions and displacements rounded to 1/256 mm,
- * normals, each vertex's lung, and as field data time, gravity and volumes.
+ * A VTP file has positions and displacements rounded to 1/256 mm, normals, each vertex's lung, and
+ * as field data gravity and volumes.
  * @param path  must outlive the output
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_command_breath_output_open(const char *path, const breath_content *content,
@@ -42,7 +41,7 @@ supine_status supine_command_breath_output_add(breath_output *output, const floa
 /* Complete the output. */
 supine_status supine_command_breath_output_commit(breath_output *output, supine_error *error);
 
-/* Release the output, and remove its files where it was not completed. NULL is legal. */
+/* Release the output, and remove its file where it was not completed. NULL is legal. */
 void supine_command_breath_output_close(breath_output *output);
 
 #endif

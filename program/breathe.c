@@ -6,6 +6,7 @@
 
 #include <gsl/gsl_statistics.h>
 
+#include "sh/base/clock.h"
 #include "sh/base/text.h"
 
 #include "program/breath/breath_frames.h"
@@ -13,7 +14,6 @@
 #include "program/breath_output.h"
 #include "program/drawing.h"
 #include "program/options/basis_input.h"
-#include "program/options/orientation.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "breathe";
@@ -29,7 +29,7 @@ typedef struct request {
   const char *path;
   bool allow_folds, as_scanned;
   supine_from from;
-  double fps, seconds, step; /* 0: not given */
+  double fps, seconds; /* 0: not given */
 } request;
 
 static supine_status read_turn(const char *text, void *field, supine_error *error) {
@@ -41,10 +41,9 @@ static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as sup
 
 static const supine_option table[] = {
     {"output", 'o', "OUT",
-     "NAME.vtp: one file for ParaView, which counts its time in frames; NAME.pvd: time in seconds, "
-     "with a VTP file per frame in the folder NAME, which must be new or empty. Both have "
-     "positions rounded to 1/256 mm, normals, lungs, gravity and volumes. NAME.safetensors: "
-     "positions [T,N,3], triangles [M,3], time [T], volume [T,G] and gravity [T,3]",
+     "NAME.vtp: one file for ParaView, which counts its time in frames; positions are rounded to "
+     "1/256 mm, with normals, lungs, gravity and volumes. NAME.safetensors: positions [T,N,3], "
+     "triangles [M,3], time [T] in s, volume [T,G] in mL and gravity [T,3]",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = SUPINE_BREATH_ENDINGS},
     {"turn", 0, "FROM:TO:SECONDS",
@@ -69,10 +68,6 @@ static const supine_option table[] = {
      "pressure over time: cosine (default) or ramp; flow: constant flow in and out, whatever "
      "the pressure",
      SUPINE_FILLS(request, breath.course), .choices = courses, .more = true},
-    {"step", 0, "ML",
-     "breath of Santhanam 2008 instead: constant flow of this volume per frame, in and out; "
-     "1.5 inhales 500 mL in 5 s at 66.66 frames a second",
-     SUPINE_FILLS(request, step), SUPINE_ABOVE_ZERO, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
     {"fps", 0, "N", "frames per second; the default is one every 15 ms", SUPINE_FILLS(request, fps),
@@ -88,11 +83,6 @@ static const supine_option table[] = {
 static supine_status complete(request *wanted, size_t *count, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
   supine_pv_breath *breath = &wanted->breath;
-  if (wanted->step > 0.0) { /* the flow is this volume per frame, in and out */
-    breath->course = SUPINE_PV_CONSTANT_FLOW;
-    breath->inhale_fraction = 0.5;
-    breath->rate = 60.0 * wanted->fps * wanted->step / (2.0 * breath->tidal);
-  }
   if (wanted->as_scanned && supine_text_ends_in_any_case(wanted->path, ".safetensors")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--as-scanned is for VTP files only (tensors are in LPS and mm): leave "
@@ -136,22 +126,22 @@ static void report(const request *wanted, const breath_frames *frames, double *s
   (void)printf("%s: %zu frames, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
                wanted->path, frames->count, frames->time[frames->count - 1], wanted->fps, least,
                peak);
-  if (frames->fixed) {
-    (void)printf("one posture: three additions per vertex for %zu of the frames\n",
-                 frames->stepped);
-  }
   (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, of %.0f ms\n",
                1e3 * gsl_stats_median(seconds, 1, frames->count),
                1e3 * gsl_stats_max(seconds, 1, frames->count), 1e3 * budget);
 }
 
 /* Compute and write all frames. */
-static supine_status play_frames(breath_frames *frames, breath_output *output, float *xyz,
+static supine_status play_frames(const breath_frames *frames, breath_output *output, float *xyz,
                                  double *seconds, supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
   for (size_t t = 0; t < frames->count && status == SUPINE_OK; ++t) {
-    seconds[t] = supine_breath_frames_next(frames, xyz);
+    supine_pose pose;
+    const double start = supine_clock_seconds();
+    (void)supine_breath_frames_pose(frames, t, &pose, NULL); /* it succeeded in _create */
+    supine_deform(frames->basis, &pose, xyz);
+    seconds[t] = supine_clock_seconds() - start;
     status = supine_command_breath_output_add(output, xyz, error);
     if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)frames->count)) {
       status =
@@ -175,9 +165,7 @@ static supine_status check_ends(const request *wanted, const breath_frames *fram
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     supine_pose pose;
-    const supine_state state =
-        supine_breath_state(frames->basis, frames->gravity + 3 * ends[i], frames->above[ends[i]]);
-    status = supine_basis_pose(frames->basis, &state, &pose, error);
+    status = supine_breath_frames_pose(frames, ends[i], &pose, error);
     if (status == SUPINE_OK) {
       status = supine_options_pose_check(frames->basis, name, wanted->allow_folds, &pose, error);
     }
@@ -287,12 +275,14 @@ const supine_command supine_command_breathe = {
     .about =
         "Computes breathing lungs from a basis file, in one posture or during a turn, and "
         "writes the surface of each frame. The volume follows the pressure-volume relation and is "
-        "exact in each frame. The time per frame is printed; a smooth display allows 15 ms.",
+        "exact in each frame. The computing time of a frame is printed; a smooth display allows 15 "
+        "ms.",
     .options = table,
-    .notes = "Examples:\n"
-             "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
-             "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
-             "  supine breathe lungs.safetensors --posture supine --step 1.5 -o paper.safetensors",
+    .notes =
+        "Examples:\n"
+        "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
+        "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
+        "  supine breathe lungs.safetensors --posture supine --course flow -o flow.safetensors",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .begin = begin,

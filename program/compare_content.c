@@ -11,7 +11,7 @@
 
 #include "program/compare_content.h"
 #include "program/inside.h"
-#include "program/options/expected_output.h"
+#include "program/options/basis_input.h"
 
 /* Displacements of all names in all postures. */
 typedef struct comparison {

@@ -5,7 +5,6 @@
 
 #include <supine/runtime.h>
 
-#include "program/options/orientation.h"
 #include "program/options/state_options.h"
 
 /* Print the mean displacement of each named structure between every two postures, as a table or as

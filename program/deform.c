@@ -13,8 +13,6 @@
 
 #include "program/deform_content.h"
 #include "program/options/basis_input.h"
-#include "program/options/expected_output.h"
-#include "program/options/orientation.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "deform";

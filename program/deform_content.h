@@ -8,7 +8,7 @@
 
 #include "mesh/io/image.h"
 
-#include "program/options/expected_output.h"
+#include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
 typedef struct supine_deform_content {

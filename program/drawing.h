@@ -8,7 +8,6 @@
 
 #include "program/breath/turn.h"
 #include "program/inside.h"
-#include "program/options/orientation.h"
 #include "program/options/state_options.h"
 #include "program/render/render.h"
 

@@ -14,7 +14,6 @@
 #include <supine/runtime.h>
 
 #include "program/options/basis_input.h"
-#include "program/options/expected_output.h"
 
 /* Compute the share of the squared displacement in each band, [band + 1]; 0 where the surface has
  * no area. */

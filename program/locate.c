@@ -13,8 +13,6 @@
 #include "program/located.h"
 #include "program/observed.h"
 #include "program/options/basis_input.h"
-#include "program/options/expected_output.h"
-#include "program/options/orientation.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "locate";
@@ -167,8 +165,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_command_names names = {0};
   supine_command_observed observed = {0};
   supine_status status = SUPINE_OK;
-  if (wanted->orientation.given || wanted->orientation.tilt != 0.0) {
-    wanted->orientation.given = true;
+  if (wanted->orientation.given) {
     status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
   }
   if (status == SUPINE_OK) {

@@ -199,7 +199,7 @@ const supine_command supine_command_pv = {
         "\n"
         "Examples:\n"
         "  supine pv fit patient.csv -o patient.pv.csv\n"
-        "  supine breathe lungs.safetensors --posture supine --pv patient.pv.csv -o breath.pvd\n"
+        "  supine breathe lungs.safetensors --posture supine --pv patient.pv.csv -o breath.vtp\n"
         "  supine pv show patient.pv.csv --step 0.5 > curve.csv",
     .operands_least = 1,
     .operands_most = 2,

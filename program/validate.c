@@ -219,7 +219,7 @@ static supine_status set_states(const request *wanted, supine_command_subject *s
   double gravity[3] = {0.0, 1.0, 0.0};
   s->from = wanted->from;
   s->count = wanted->count > 0 ? wanted->count : 1;
-  if (wanted->orientation.given || wanted->orientation.tilt != 0.0) {
+  if (wanted->orientation.given) {
     const supine_status status = supine_options_gravity(&wanted->orientation, gravity, error);
     if (status != SUPINE_OK) {
       return status;

@@ -6,7 +6,6 @@
 #include "precompute/patient/krige.h"
 #include "precompute/patient/validate.h"
 #include "precompute/source.h"
-#include "program/options/orientation.h"
 #include "program/options/state_options.h"
 
 enum { SUPINE_COMMAND_STATES_MAX = 8 };

@@ -52,8 +52,8 @@ refused lungs.safetensors .html compare input.html
 refused lungs.safetensors .png render input.png --posture prone
 refused lungs.safetensors .html export input.html
 refused lungs.safetensors .glb export input.glb
-refused lungs.safetensors .pvd breathe input.pvd --posture prone
-refused lungs.pv .pvd breathe lungs.safetensors --posture prone --pv input.pvd
+refused lungs.safetensors .vtp breathe input.vtp --posture prone
+refused lungs.pv .vtp breathe lungs.safetensors --posture prone --pv input.vtp
 refused samples.csv .csv pv fit input.csv
 refused points.csv .safetensors embed lungs.safetensors input.safetensors
 refused points.csv .json fit --landmarks input.json
@@ -155,32 +155,5 @@ writer turn.webp render lungs.safetensors --turn supine:left:0.1s
 writer inside.safetensors embed lungs.safetensors lungs.ply
 writer moved.csv deform points.safetensors --posture prone
 writer errors.png validate lungs.safetensors --state prone:lungs.ply
-
-# A series: the signals that ask the program to end leave nothing of it.
-began=$(date +%s%N)
-mkdir out && "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null || fail "breathe"
-took=$((($(date +%s%N) - began) / 1000000))
-count=$(ls out/frames | wc -l)
-rm -rf out
-for signal in TERM INT HUP; do
-  done_whole=0
-  for i in $(seq "$kills"); do
-    moment=$(awk -v seed="$i$took" -v took="$took" 'BEGIN { srand(seed); for (k = 0; k < 9; ++k) rand(); printf "%.4f", rand() * took / 1000 }')
-    mkdir out
-    timeout -s $signal "$moment" "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >/dev/null 2>&1
-    case "$(ls -A out | tr '\n' ' ')" in
-    "") ;;
-    "frames frames.pvd ")
-      done_whole=$((done_whole + 1))
-      [ "$(ls out/frames | wc -l)" -eq "$count" ] || fail "breathe: SIG$signal at $moment s left part of a series"
-      ;;
-    *) fail "breathe: SIG$signal at $moment s left $(ls -A out)" ;;
-    esac
-    rm -rf out
-  done
-  echo "breathe's series: $kills times SIG$signal within $took ms: $done_whole whole, the others nothing"
-done
-(mkdir out; ulimit -f 8; "$supine" breathe lungs.safetensors --posture prone -o out/frames.pvd >said 2>&1)
-[ -z "$(ls -A out)" ] && grep -q 'File too large' said || fail "breathe: too large: $(cat said), $(ls -A out)"
 
 [ $failures -eq 0 ] || { echo "$failures failures"; exit 1; }

@@ -1,10 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open a basis and copy its surface, for the commands that read one. */
+/* Open a basis, copy its surface, and compute its expected errors. */
 #ifndef SUPINE_BASIS_INPUT_H
 #define SUPINE_BASIS_INPUT_H
 
-#include "mesh/mesh.h"
+#include <stdio.h>
+
+#include <supine/locate.h>
 #include <supine/runtime.h>
+
+#include "mesh/mesh.h"
 
 #include "program/options/command.h"
 
@@ -26,5 +30,29 @@ double *supine_options_basis_positions(const supine_basis *basis, const supine_p
 /* Copy the reference surface into a mesh; release it with supine_mesh_free.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
+
+#define SUPINE_EXPECTED_MEANING                                                                    \
+  "3-D RMS; half of all points lie within 0.9 times this distance, 95 % within 1.8 times"
+#define SUPINE_EXPECTED_SUPPORT                                                                    \
+  "It was measured on full breaths in one posture; for a change of posture it is an "              \
+  "extrapolation."
+
+/* Expected errors. Zero-initialise, and release with supine_options_expected_free. */
+typedef struct supine_expected {
+  float *sigma;        /* [N] mm; NULL: unknown */
+  double rms, largest; /* RMS and maximum over the vertices, mm */
+  bool turned;         /* the two states differ in posture */
+} supine_expected;
+
+/* Compute the expected errors of a displacement from one state to another. They are unknown for
+ * fields of another simulator and for open surfaces: `expected` is unchanged.
+ * @retval those of supine_basis_pose, SUPINE_ERROR_MEMORY */
+supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
+                                           const supine_state *from, supine_expected *expected,
+                                           supine_error *error);
+void supine_options_expected_free(supine_expected *expected);
+
+/* Print their RMS and maximum in one line; nothing where they are unknown. */
+void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

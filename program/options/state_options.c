@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options --volume and --from, and the poses computed from them. */
+/* Options --posture, --gravity, --volume and --from, and the poses computed from them. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,6 +12,93 @@ static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
 /* Share of turned-over triangles above which the surface is implausible. */
 static const double folded_limit = 0.01;
+
+supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error) {
+  supine_state state;
+  const supine_status status = supine_state_parse_posture(text, &state, error);
+  if (status == SUPINE_OK) {
+    memcpy(gravity, state.gravity, sizeof state.gravity);
+  }
+  return status;
+}
+
+static supine_status read_posture(const char *text, void *field, supine_error *error) {
+  return supine_options_posture(text, field, error);
+}
+
+/* Read X,Y,Z as the posture X:Y:Z. */
+static supine_status read_gravity(const char *text, void *field, supine_error *error) {
+  char posture[128];
+  double numbers[3];
+  if (!supine_options_parse_numbers(text, 3, numbers) || strlen(text) >= sizeof posture) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  (void)snprintf(posture, sizeof posture, "%s", text);
+  for (char *comma = posture; (comma = strchr(comma, ',')) != NULL;) {
+    *comma = ':';
+  }
+  return supine_options_posture(posture, field, error);
+}
+
+#define GRAVITY                                                                                    \
+  SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),         \
+      .rivals = "gravity"
+
+static const char *const postures[] = {"supine",  "prone",    "left", "right",
+                                       "upright", "inverted", NULL};
+
+const supine_option supine_options_orientation[] = {
+    {"posture", 0, "POSTURE",
+     "supine, prone, left or right (left or right lateral decubitus), upright, inverted (head "
+     "down), or a DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. "
+     "+DEGREES turns gravity from the back towards the head: supine+15 is Trendelenburg",
+     GRAVITY, .read = read_posture, .choices = postures},
+    {"gravity", 0, "X,Y,Z",
+     "instead of a posture, the direction of gravity in body axes: x to the left, y to the back, z "
+     "to the head; supine is 0,1,0",
+     GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},
+    {.name = NULL}};
+
+supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
+                                     supine_error *error) {
+  memcpy(gravity, orientation->gravity, sizeof orientation->gravity);
+  return orientation->given
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "the posture is missing: give --posture or --gravity");
+}
+
+supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,
+                                                supine_error *error) {
+  supine_status status = SUPINE_OK;
+  list->count = 0;
+  for (const char *at = text; status == SUPINE_OK;) {
+    const size_t length = strcspn(at, ",");
+    if (list->count == SUPINE_POSTURE_LIST_MAX) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "more than %d postures: name fewer",
+                              SUPINE_POSTURE_LIST_MAX);
+    }
+    supine_posture_item *item = &list->item[list->count++];
+    if (length == 0 || length >= sizeof item->name) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "no posture '%.*s': give supine, prone, left, right, upright or "
+                              "inverted, or a gravity X:Y:Z",
+                              (int)length, at);
+    }
+    memcpy(item->name, at, length);
+    item->name[length] = '\0';
+    status = supine_options_posture(item->name, item->gravity, error);
+    if (at[length] == '\0') {
+      break;
+    }
+    at += length + 1;
+  }
+  return status;
+}
+
+const char *supine_options_posture_label(const char *name) {
+  return strcmp(name, "left") == 0 ? "left side" : strcmp(name, "right") == 0 ? "right side" : name;
+}
 
 supine_status supine_options_read_volume(const char *text, void *field, supine_error *error) {
   return supine_state_parse_volume(text, field, error);

@@ -7,8 +7,7 @@
 
 #include <supine/compare.h>
 
-#include "program/options/expected_output.h"
-#include "program/options/orientation.h"
+#include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
 enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };

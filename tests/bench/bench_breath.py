@@ -21,8 +21,7 @@ with tempfile.TemporaryDirectory() as folder:
     run("precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
     plain = 334 * (28 * n + 16 * m)
     print(f"{n} vertices, {m} triangles: {plain / 1e6:.1f} MB without compression")
-    for name in ("breath.vtp", "breath.pvd", "breath.safetensors"):
+    for name in ("breath.vtp", "breath.safetensors"):
         run("breathe", "lungs.safetensors", "--posture", "supine", "-o", name)
-        inside = name[:-4] if name.endswith(".pvd") else None
-        size = sum(entry.stat().st_size for entry in os.scandir(inside)) if inside else os.path.getsize(name)
+        size = os.path.getsize(name)
         print(f"{name}: {size / 1e6:.1f} MB, {size / plain:.3f}, {size / 334 / n:.1f} bytes a vertex and frame")

@@ -69,7 +69,6 @@ compare lungs.safetensors --postures supine,prone --json
 compare lungs.safetensors --postures supine,prone --csv out/a.csv
 compare lungs.safetensors --postures supine,prone -o out/a.html
 compare points.safetensors --postures supine,prone
-breathe lungs.safetensors --posture prone --fps 1 -o out/a.pvd
 breathe lungs.safetensors --posture prone --fps 1 -o out/a.vtp
 breathe lungs.safetensors --turn supine:left:1s --fps 2 --pv patient.pv.csv -o out/a.safetensors
 render lungs.safetensors --posture supine --size 300x200 -o out/a.png
