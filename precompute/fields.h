@@ -21,17 +21,16 @@ typedef struct supine_fields {
   double *displacement;   /**< [M, N, 3] mm */
 } supine_fields;
 
-/** Read a list (CSV with the columns gx,gy,gz,file: deformed surfaces of the same topology, named
- * relative to the list) or a safetensors file with gravity [M, 3] and displacement [M, N, 3], F32
- * or F64, in the order of the reference surface's vertices.
+/** Read a safetensors file with gravity [M, 3] and displacement [M, N, 3], F32 or F64, in the order
+ * of the reference surface's vertices.
  *
- * @param lungs    the reference surface; deformed surfaces are joined and grouped as it was
- * @param options  axes and units of the deformed surfaces, or of the displacements in safetensors
+ * @param lungs    the reference surface
+ * @param options  axes and unit of the displacements
  * @param fields   release with supine_fields_free
- * @retval SUPINE_ERROR_READ    a file is missing
- * @retval SUPINE_ERROR_FORMAT  a malformed list or file, a direction that is zero or not finite, a
- *         displacement that is not finite, two equal directions (line or row named)
- * @retval SUPINE_ERROR_MESH    a surface of another topology
+ * @retval SUPINE_ERROR_READ    the file is missing
+ * @retval SUPINE_ERROR_FORMAT  malformed; fewer than two directions, one that is zero or not
+ * finite, or two equal ones; a displacement that is not finite
+ * @retval SUPINE_ERROR_MESH    displacements of another number of vertices
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_mesh_load_options *options, supine_fields *fields,

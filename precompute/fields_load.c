@@ -1,18 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the fields of another simulator from a list of deformed surfaces, or from one safetensors
- * file.
- */
+/* Read the fields of another simulator from a safetensors file. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-#include "precompute/fields.h"
-#include "sh/base/parallel.h"
 #include <supine/safetensors.h>
 
-#include "sh/base/csv.h"
-#include "sh/base/output.h"
-#include "sh/base/text.h"
+#include "precompute/fields.h"
 #include "sh/base/vec3.h"
 
 /* Largest distance between unit vectors that count as the same direction. */
@@ -37,180 +30,28 @@ static supine_status allocate(size_t count, supine_fields *fields, supine_error 
                                 fields->vertex_count);
 }
 
-/* One line of the list. */
-typedef struct listed {
-  double gravity[3];
-  size_t line;
-  char *path; /* of the surface */
-} listed;
-
-/* Normalise direction `at`, and check that no earlier one is the same. Messages name the line of
- * the list, or if `list` is NULL, the row of the tensor. */
+/* Normalise direction `at`, and check that no earlier one is the same. */
 static supine_status check_direction(const supine_fields *fields, size_t at, const char *path,
-                                     const listed *list, supine_error *error) {
-  const char *unit = list != NULL ? "line" : "row";
+                                     supine_error *error) {
   double *g = fields->directions + 3 * at;
   const double length = supine_length(g);
   if (!(length > 0.0) || !isfinite(length)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %s %zu: gravity %g,%g,%g has no direction: give a vector that is "
+                            "%s: row %zu: gravity %g,%g,%g has no direction: give a vector that is "
                             "finite and not 0",
-                            path, unit, list != NULL ? list[at].line : at, g[0], g[1], g[2]);
+                            path, at, g[0], g[1], g[2]);
   }
   for (size_t k = 0; k < 3; ++k) {
     g[k] /= length;
   }
   for (size_t other = 0; other < at; ++other) {
-    const double *h = fields->directions + 3 * other;
-    if (supine_distance(g, h) < same_direction) {
+    if (supine_distance(g, fields->directions + 3 * other) < same_direction) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: %s %zu and %zu have the same direction: keep one of them", path,
-                              unit, list != NULL ? list[other].line : other,
-                              list != NULL ? list[at].line : at);
+                              "%s: rows %zu and %zu have the same direction: keep one of them",
+                              path, other, at);
     }
   }
   return SUPINE_OK;
-}
-
-/* Find the displacement of one deformed surface from the reference surface. */
-static supine_status take_surface(const char *path, const supine_lungs *rest,
-                                  const supine_mesh_load_options *options, double *displacement,
-                                  supine_error *error) {
-  const size_t n = rest->mesh.vertex_count;
-  supine_mesh mesh = {0};
-  supine_lungs deformed = {0};
-  supine_status status = supine_mesh_load(path, options, &mesh, NULL, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  if (mesh.vertex_count != n || mesh.triangle_count != rest->mesh.triangle_count) {
-    status = supine_error_set(
-        error, SUPINE_ERROR_MESH,
-        "%s: %zu vertices and %zu triangles, where the reference surface has %zu "
-        "and %zu: it must be the same surface, deformed",
-        path, mesh.vertex_count, mesh.triangle_count, n, rest->mesh.triangle_count);
-    goto cleanup;
-  }
-  status = supine_lungs_create(&mesh, 1, &rest->midline, &deformed, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  for (size_t t = 0; t < rest->mesh.triangle_count; ++t) {
-    if (memcmp(deformed.mesh.triangles + 3 * t, rest->mesh.triangles + 3 * t,
-               3 * sizeof(uint32_t)) != 0) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_MESH,
-                           "%s: triangle %zu joins other vertices than the reference surface's: "
-                           "it must be the same surface, deformed",
-                           path, t);
-      goto cleanup;
-    }
-  }
-  for (size_t i = 0; i < 3 * n; ++i) {
-    displacement[i] = deformed.mesh.vertices[i] - rest->mesh.vertices[i];
-  }
-cleanup:
-  supine_lungs_free(&deformed);
-  supine_mesh_free(&mesh);
-  return status;
-}
-
-typedef struct surface_work {
-  const listed *list;
-  const supine_lungs *rest;
-  const supine_mesh_load_options *options;
-  supine_fields *fields;
-  supine_error *errors; /* [M] */
-} surface_work;
-
-static void take_range(void *context, size_t begin, size_t end, size_t thread) {
-  (void)thread;
-  const surface_work *work = context;
-  for (size_t i = begin; i < end; ++i) {
-    work->errors[i].status = take_surface(
-        work->list[i].path, work->rest, work->options,
-        work->fields->displacement + 3 * i * work->fields->vertex_count, &work->errors[i]);
-  }
-}
-
-/* Load the surfaces of a list. Uses all cores. */
-static supine_status load_surfaces(const char *path, const listed *list, size_t count,
-                                   const supine_lungs *rest,
-                                   const supine_mesh_load_options *options, supine_fields *fields,
-                                   supine_error *error) {
-  supine_error *errors = calloc(count + 1, sizeof *errors);
-  supine_status status = errors == NULL
-                             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory", path)
-                             : allocate(count, fields, error);
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    memcpy(fields->directions + 3 * i, list[i].gravity, sizeof list[i].gravity);
-    status = check_direction(fields, i, path, list, error);
-  }
-  if (status == SUPINE_OK) {
-    surface_work work = {list, rest, options, fields, errors};
-    supine_parallel_for(count, 1, 0, take_range, &work);
-  }
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    if (errors[i].status != SUPINE_OK) {
-      status = supine_error_set(error, errors[i].status, "%s:%zu: %s", path, list[i].line,
-                                errors[i].message);
-    }
-  }
-  free(errors);
-  return status;
-}
-
-/* Append one row to the list. */
-static supine_status take_row(const supine_csv *csv, listed **list, size_t *count,
-                              supine_error *error) {
-  static const char *const names[] = {"gx", "gy", "gz"};
-  listed *grown = realloc(*list, (*count + 1) * sizeof *grown);
-  if (grown == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory", csv->path);
-  }
-  *list = grown;
-  listed *row = &grown[*count];
-  *row = (listed){.line = csv->line};
-  supine_status status = SUPINE_OK;
-  for (size_t k = 0; k < 3 && status == SUPINE_OK; ++k) {
-    status = supine_csv_number(csv, k, names[k], &row->gravity[k], error);
-  }
-  if (status == SUPINE_OK) {
-    row->path = supine_path_beside(csv->path, supine_csv_text(csv, 3));
-    *count += row->path != NULL;
-  }
-  return status == SUPINE_OK && row->path == NULL
-             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory", csv->path)
-             : status;
-}
-
-static supine_status load_list(const char *path, const supine_lungs *rest,
-                               const supine_mesh_load_options *options, supine_fields *fields,
-                               supine_error *error) {
-  static const char *const columns[] = {"gx", "gy", "gz", "file"};
-  supine_csv csv;
-  listed *list = NULL;
-  size_t count = 0;
-  bool more = true;
-  supine_status status = supine_csv_open(path, columns, 4, 4, &csv, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  while ((status = supine_csv_next(&csv, &more, error)) == SUPINE_OK && more) {
-    status = take_row(&csv, &list, &count, error);
-    if (status != SUPINE_OK) {
-      break;
-    }
-  }
-  supine_csv_close(&csv);
-  if (status == SUPINE_OK) {
-    status = load_surfaces(path, list, count, rest, options, fields, error);
-  }
-  for (size_t i = 0; i < count; ++i) {
-    free(list[i].path);
-  }
-  free(list);
-  return status;
 }
 
 /* Read an element of an F32 or F64 tensor. */
@@ -252,7 +93,7 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
     for (size_t k = 0; k < 3; ++k) {
       fields->directions[3 * d + k] = element(gravity, 3 * d + k);
     }
-    status = check_direction(fields, d, path, NULL, error);
+    status = check_direction(fields, d, path, error);
     for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
       double *u = fields->displacement + 3 * (n * d + i);
       for (size_t k = 0; k < 3; ++k) {
@@ -273,18 +114,13 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_mesh_load_options *options, supine_fields *fields,
                                  supine_error *error) {
   supine_fields made = {.vertex_count = lungs->mesh.vertex_count};
-  supine_status status = SUPINE_OK;
-  if (supine_text_ends_in(path, ".safetensors")) {
-    supine_safetensors *file = NULL;
-    status = supine_safetensors_open(path, &file, error);
-    if (status == SUPINE_OK) {
-      status = take_tensors(path, supine_safetensors_find(file, "gravity"),
-                            supine_safetensors_find(file, "displacement"), options, &made, error);
-    }
-    supine_safetensors_close(file);
-  } else {
-    status = load_list(path, lungs, options, &made, error);
+  supine_safetensors *file = NULL;
+  supine_status status = supine_safetensors_open(path, &file, error);
+  if (status == SUPINE_OK) {
+    status = take_tensors(path, supine_safetensors_find(file, "gravity"),
+                          supine_safetensors_find(file, "displacement"), options, &made, error);
   }
+  supine_safetensors_close(file);
   if (status == SUPINE_OK && made.direction_count < 2) {
     status = supine_error_set(
         error, SUPINE_ERROR_FORMAT,

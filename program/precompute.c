@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/csv.h"
-#include "sh/base/output.h"
 #include <supine/sh.h>
 
 #include "precompute/patient/patient_file.h"
@@ -53,11 +51,10 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
     {.help = "Instead of the built-in physics, displacements from another simulator:",
      .more = true},
-    {"fields", 0, "LIST",
-     "CSV with the columns gx,gy,gz,file: directions of gravity and the surface deformed in "
-     "each; or a safetensors file with gravity [M,3] and displacement [M,N,3]. MESH is the "
-     "reference surface. Without --band, cross-validation chooses the band among those that "
-     "the directions determine",
+    {"fields", 0, "FILE",
+     "safetensors file with gravity [M,3] and displacement [M,N,3], in mm: M directions of gravity "
+     "and the displacement of each vertex in each. MESH is the reference surface. Without --band, "
+     "cross-validation chooses the band among those that the directions determine",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
@@ -124,24 +121,6 @@ static void report_fit(const char *path, const supine_fields *fields,
                100.0 * fit->accuracy.relative_rms, 100.0 * fit->accuracy.relative_p95,
                100.0 * fit->accuracy.relative_max, fit->accuracy.rms_mm, fit->accuracy.p95_mm,
                fit->accuracy.max_mm);
-}
-
-/* Check that the output is none of the surfaces that a list of fields names. */
-static supine_status check_fields(const char *list, const char *output, supine_error *error) {
-  static const char *const columns[] = {"gx", "gy", "gz", "file"};
-  supine_csv csv;
-  bool more = true;
-  supine_status status = SUPINE_OK;
-  if (supine_csv_open(list, columns, 4, 4, &csv, NULL) != SUPINE_OK) {
-    return SUPINE_OK; /* not a list: loading reports the fault */
-  }
-  while (status == SUPINE_OK && supine_csv_next(&csv, &more, NULL) == SUPINE_OK && more) {
-    char *path = supine_path_beside(list, supine_csv_text(&csv, 3));
-    status = path != NULL ? supine_options_check_output(output, path, error) : SUPINE_ERROR_MEMORY;
-    free(path);
-  }
-  supine_csv_close(&csv);
-  return status;
 }
 
 static supine_status compress_fields(const supine_lungs *lungs, const request *wanted,
@@ -243,9 +222,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "%s: this is the name of a mesh: give a name that ends in .safetensors",
                             wanted->path);
   }
-  supine_status status = fields ? check_fields(wanted->fields, wanted->path, error)
-                         : wanted->patient != NULL ? check_patient(&wanted->model.choice, error)
-                                                   : SUPINE_OK;
+  supine_status status =
+      !fields && wanted->patient != NULL ? check_patient(&wanted->model.choice, error) : SUPINE_OK;
   if (status == SUPINE_OK && wanted->patient != NULL) {
     status = take_patient(wanted, &record, &text, error);
   }

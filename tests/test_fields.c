@@ -345,67 +345,6 @@ static void expect_failure(const char *name, supine_status status, const char *w
   assert_null(fields.directions);
 }
 
-static void save_deformed(const char *name, double shift) {
-  supine_mesh mesh = lungs.mesh;
-  double *moved = malloc(3 * mesh.vertex_count * sizeof *moved);
-  for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
-    moved[i] = lungs.mesh.vertices[i] + shift * (double)(i % 5);
-  }
-  mesh.vertices = moved;
-  assert_int_equal(supine_mesh_save(in_folder(name), &mesh, NULL, NULL), SUPINE_OK);
-  free(moved);
-}
-
-TEST(test_load_list_of_surfaces_gives_displacements) {
-  save_deformed("a.ply", 0.5);
-  save_deformed("b.ply", -0.25);
-  test_write(in_folder("list.csv"), "# two fields\ngx,gy,gz,file\n0,2,0,a.ply\n0,0,-1,b.ply\n");
-  supine_fields fields = {0};
-  supine_error error;
-  if (supine_fields_load(in_folder("list.csv"), &lungs, NULL, &fields, &error) != SUPINE_OK) {
-    fail_msg("%s", error.message);
-  }
-  assert_int_equal(fields.direction_count, 2);
-  assert_close(fields.directions[1], 1.0, 0.0);              /* normalised */
-  for (size_t i = 0; i < 3 * lungs.mesh.vertex_count; ++i) { /* PLY keeps floats */
-    assert_close(fields.displacement[i], 0.5 * (double)(i % 5), 5e-5);
-    assert_close(fields.displacement[3 * lungs.mesh.vertex_count + i], -0.25 * (double)(i % 5),
-                 5e-5);
-  }
-  supine_fields_free(&fields);
-}
-
-TEST(test_load_bad_lists_name_line_and_remedy) {
-  save_deformed("a.ply", 0.5);
-  supine_mesh other = helper_lump(3, 50.0, 3);
-  assert_int_equal(supine_mesh_save(in_folder("other.ply"), &other, NULL, NULL), SUPINE_OK);
-  supine_mesh_free(&other);
-  supine_mesh turned = lungs.mesh;
-  turned.triangles = malloc(3 * turned.triangle_count * sizeof(uint32_t));
-  memcpy(turned.triangles, lungs.mesh.triangles, 3 * turned.triangle_count * sizeof(uint32_t));
-  memcpy(turned.triangles, lungs.mesh.triangles + 3, 3 * sizeof(uint32_t));
-  memcpy(turned.triangles + 3, lungs.mesh.triangles, 3 * sizeof(uint32_t));
-  assert_int_equal(supine_mesh_save(in_folder("turned.ply"), &turned, NULL, NULL), SUPINE_OK);
-  free(turned.triangles);
-  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,missing.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_READ, "missing.ply");
-  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,other.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_MESH, "bad.csv:3");
-  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,1,turned.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_MESH, "triangle 0 joins other vertices");
-  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n1,0,0,a.ply\n0,3,0,a.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "line 2 and 4 have the same direction");
-  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,nan,0,a.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "bad.csv:3");
-  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n0,0,0,a.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "no direction");
-  test_write(in_folder("bad.csv"), "gx,gy,file\n0,1,a.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "gz");
-  test_write(in_folder("bad.csv"), "gx,gy,gz,file\n0,1,0,a.ply\n");
-  expect_failure("bad.csv", SUPINE_ERROR_FORMAT, "at least two");
-  expect_failure("nothing.csv", SUPINE_ERROR_READ, "nothing.csv");
-}
-
 TEST(test_load_tensors_checked) {
   const size_t n = lungs.mesh.vertex_count;
   double gravity[6] = {0, 1, 0, 0, 0, -2};
@@ -437,6 +376,26 @@ TEST(test_load_tensors_checked) {
   expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "where the reference surface has");
   assert_int_equal(supine_writer_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
+  expect_failure("nothing.safetensors", SUPINE_ERROR_READ, "nothing.safetensors");
+  displacement[3 * n + 4] = 0.0F;
+  static const struct {
+    double gravity[3];
+    const char *words;
+  } bad[] = {{{0, 3, 0}, "rows 0 and 1 have the same direction"},
+             {{0, 0, 0}, "row 1: gravity 0,0,0 has no direction"},
+             {{0, NAN, 0}, "has no direction"}};
+  tensors[1].shape[1] = n;
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    memcpy(gravity + 3, bad[i].gravity, sizeof bad[i].gravity);
+    assert_int_equal(
+        supine_writer_safetensors_write(in_folder("fields.safetensors"), tensors, 2, NULL, 0, NULL),
+        SUPINE_OK);
+    expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, bad[i].words);
+  }
+  tensors[0].shape[0] = tensors[1].shape[0] = 1;
+  path = in_folder("fields.safetensors");
+  assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
+  expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "at least two");
   free(displacement);
 }
 

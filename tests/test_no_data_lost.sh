@@ -64,12 +64,6 @@ printf 'seconds,w,x,y,z\n0,1,0,0,0\n' >poses.csv && cp poses.csv poses.before
 cp lungs.safetensors same.csv
 "$supine" compare same.csv --csv same.csv >/dev/null 2>&1
 cmp -s lungs.safetensors same.csv || fail "compare --csv replaced its basis"
-"$supine" phantom --vertices 700 -o rest.ply >/dev/null
-cp lungs.ply field.safetensors
-printf 'gx,gy,gz,file\n0,1,0,lungs.ply\n0,-1,0,field.safetensors\n' >fields.csv
-"$supine" precompute rest.ply --fields fields.csv -o field.safetensors >said 2>&1
-grep -q 'is also an input' said || fail "a field of --fields as output: $(cat said)"
-cmp -s lungs.ply field.safetensors || fail "a field of --fields was replaced"
 "$supine" precompute lungs.ply -o basis.stl >said 2>&1
 [ $? -eq 1 ] && [ ! -e basis.stl ] || fail "a basis named .stl: $(cat said)"
 
