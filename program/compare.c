@@ -133,21 +133,19 @@ const supine_command supine_command_compare = {
     name,
     "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
-    .about =
-        "Reports how far the lungs move from supine at rest to each posture and between every "
-        "two, how much each lung holds, and which heights ventilate in a breath; then finds "
-        "the two directions of gravity that differ most, and the one farthest from supine. For "
-        "structures inside ('supine embed'), reports how far and where each named part moves "
-        "between every two postures.",
+    .about = "Reports how far the lungs move from supine at rest to each posture and between every "
+             "two, how much each lung holds, and which heights ventilate in a breath; then finds "
+             "the direction of gravity farthest from supine. For "
+             "structures inside ('supine embed'), reports how far and where each named part moves "
+             "between every two postures.",
     .options = table,
     .notes =
         "Averages are over the surface's area; 95 % of the area moves no farther than the number "
         "under '95 %'. Ventilation by height: the lungs before a breath are cut into ten slabs of "
-        "equal thickness across gravity. What the tissue of a slab gains is the volume that its "
-        "part of the surface sweeps, plus what crosses its lower cut, less what crosses its upper "
-        "one; the motion of a cut is a plane fitted to that of its outline. The slabs' gains sum "
-        "to the "
-        "volume asked for; gain over volume is the regional expansion. Constant, odd and even are "
+        "equal thickness across gravity. What the tissue of a slab gains is the volume "
+        "that its part of the surface and its two cuts enclose after the breath, less that before; "
+        "a cut follows its outline. The slabs' gains sum to the volume asked for; gain over volume "
+        "is the regional expansion. Constant, odd and even are "
         "shares of the squared displacement over all directions: odd parts change sign with "
         "gravity, "
         "so that without an even part prone is the exact reverse of supine about their mean.\n"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Comparing orientations: the Gram matrices against every vertex, the search, slabs by height. */
+/* Comparing orientations: the Gram matrices against every vertex, slabs by height. */
 #include <float.h>
 
 #include "test.h"
@@ -324,88 +324,6 @@ TEST(test_create_surface_without_area_is_refused) {
   fixture_destroy(f);
 }
 
-static double rms_of_directions(const made *m, const double a[3], const double b[3]) {
-  supine_pose pose[2];
-  const double *g[2] = {a, b};
-  for (int side = 0; side < 2; ++side) {
-    const supine_state state = {.gravity = {g[side][0], g[side][1], g[side][2]}};
-    assert_int_equal(supine_compare_pose(m->compare, &state, 0, &pose[side], NULL), SUPINE_OK);
-  }
-  return supine_compare_rms(m->compare, &pose[0], &pose[1]);
-}
-
-/* A basis of fields, whose default state is the fields as they are. */
-static made make_fields(size_t vertices, size_t modes, size_t band, size_t lungs) {
-  fixture *f = fixture_create(vertices, modes, band, lungs, false, false, 5, 41);
-  f->fields = true;
-  size_t size = 0;
-  made m = {.f = f, .bytes = fixture_bytes(f, &size)};
-  assert_int_equal(supine_basis_open_memory(m.bytes, size, &m.basis, NULL), SUPINE_OK);
-  assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
-  return m;
-}
-
-TEST(test_search_finds_what_no_random_direction_beats) {
-  const supine_state supine = {.gravity = {0, 1, 0}};
-  made m = make_fields(601, 9, 3, 2);
-  supine_extremes found;
-  assert_int_equal(supine_compare_search(m.compare, &supine, 0, 1000, &found, NULL), SUPINE_OK);
-  assert_int_equal(found.directions, 1000);
-  assert_near(found.pair_rms, rms_of_directions(&m, found.pair[0], found.pair[1]), 1e-9);
-  assert_near(found.farthest_rms, rms_of_directions(&m, supine.gravity, found.farthest), 1e-9);
-  uint64_t random = 3;
-  for (int repeat = 0; repeat < 20000; ++repeat) {
-    double a[3];
-    double b[3];
-    random_direction(&random, a);
-    random_direction(&random, b);
-    assert_true(rms_of_directions(&m, a, b) <= found.pair_rms);
-    assert_true(rms_of_directions(&m, a, supine.gravity) <= found.farthest_rms);
-  }
-  unmake(&m);
-}
-
-/* One mode, Y(1,0): the displacement follows g_z, so that up and down differ most. */
-TEST(test_search_one_axis_finds_its_poles) {
-  fixture *f = fixture_create(203, 1, 1, 1, false, false, 5, 41);
-  f->fields = true;
-  memset(f->mode, 0, 4 * sizeof *f->mode);
-  f->mode[2] = 1;
-  size_t size = 0;
-  unsigned char *bytes = fixture_bytes(f, &size);
-  made m = {.f = f, .bytes = bytes};
-  assert_int_equal(supine_basis_open_memory(bytes, size, &m.basis, NULL), SUPINE_OK);
-  assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
-  const supine_state tilted = {.gravity = {0, 3, 1}}; /* any length; its pole is the far one, -z */
-  supine_extremes found;
-  assert_int_equal(supine_compare_search(m.compare, &tilted, 0, 500, &found, NULL), SUPINE_OK);
-  assert_near(fabs(found.pair[0][2]), 1, 1e-10);
-  assert_near(found.pair[0][2], -found.pair[1][2], 1e-10);
-  assert_near(found.farthest[2], -1, 1e-10);
-  unmake(&m);
-}
-
-TEST(test_search_bad_arguments_are_refused) {
-  made m = make(203, 4, 2, 1, false, false);
-  supine_extremes found;
-  supine_error error;
-  supine_state from = {.gravity = {0, 1, 0}};
-  assert_int_equal(supine_compare_search(m.compare, &from, 5, 1, &found, &error),
-                   SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_compare_search(m.compare, &from, 5, 16385, &found, &error),
-                   SUPINE_ERROR_ARGUMENT);
-  from.volume = (supine_volume){SUPINE_VOLUME_SCAN, 100};
-  assert_int_equal(supine_compare_search(m.compare, &from, 0, 100, &found, &error),
-                   SUPINE_ERROR_OPEN_SURFACE);
-  from.gravity[1] = NAN;
-  assert_int_equal(supine_compare_search(m.compare, &from, 5, 100, &found, &error),
-                   SUPINE_ERROR_ARGUMENT);
-  from.gravity[1] = 0;
-  assert_int_equal(supine_compare_search(m.compare, &from, 5, 100, &found, &error),
-                   SUPINE_ERROR_ARGUMENT);
-  unmake(&m);
-}
-
 /* x + M x + shift for every vertex. */
 static float *moved(const fixture *f, const double matrix[3][3], const double shift[3]) {
   float *xyz = malloc(3 * f->vertices * sizeof *xyz);
@@ -482,40 +400,37 @@ TEST(test_slabs_of_bipyramid_follow_the_cube) {
   fixture_destroy(f);
 }
 
-/* Every displacement that is linear in position gains trace(M) of a slab's volume, to first order
- * in M (here 1e-3); positions are floats. */
-static void check_linear(const double matrix[3][3], const double shift[3], double tolerance) {
+/* A displacement that is linear in position multiplies the volume of every slab by det(1 + M). */
+TEST(test_slabs_linear_displacement_gains_its_determinant) {
+  static const double matrices[][3][3] = {
+      {{0}},                                        /* a translation */
+      {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* an expansion */
+      {{-0.2, -0.6, 0}, {0.6, -0.2, 0}, {0, 0, 0}}, /* a rotation */
+      {{0.04, 0.08, -0.3}, {0.02, -0.06, 0.05}, {-0.09, 0.01, 0.07}}};
+  static const double shift[3] = {1.7, -2.9, 3.3};
   made m = make(902, 4, 2, 2, false, true);
-  float *xyz = moved(m.f, matrix, shift);
-  const double trace = matrix[0][0] + matrix[1][1] + matrix[2][2];
   uint64_t random = 121;
-  for (int repeat = 0; repeat < 20; ++repeat) {
-    supine_slab slabs[2 * SLABS];
-    double g[3];
-    random_direction(&random, g);
-    assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
-    for (size_t s = 0; s < 2 * SLABS; ++s) {
-      assert_near(slabs[s].gain, trace * slabs[s].volume, tolerance);
+  for (size_t i = 0; i < sizeof matrices / sizeof *matrices; ++i) {
+    float *xyz = moved(m.f, matrices[i], shift);
+    double a[3][3];
+    for (size_t k = 0; k < 9; ++k) {
+      a[k / 3][k % 3] = matrices[i][k / 3][k % 3] + (k % 4 == 0);
     }
+    const double determinant = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
+                               a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+                               a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
+    for (int repeat = 0; repeat < 10; ++repeat) {
+      supine_slab slabs[2 * SLABS];
+      double g[3];
+      random_direction(&random, g);
+      assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
+      for (size_t s = 0; s < 2 * SLABS; ++s) { /* mL, of slabs of about 100: float positions */
+        assert_near(slabs[s].gain, (determinant - 1) * slabs[s].volume, 1e-3);
+      }
+    }
+    free(xyz);
   }
-  free(xyz);
   unmake(&m);
-}
-
-TEST(test_slabs_translation_gains_nothing) {
-  const double still[3][3] = {{0}};
-  const double shift[3] = {1.7, -2.9, 3.3};
-  check_linear(still, shift, 1e-3); /* mL, of slabs of about 100: float positions */
-}
-
-TEST(test_slabs_linear_displacement_gains_its_trace) {
-  const double none[3] = {0, 0, 0};
-  const double swelling[3][3] = {{1e-3, 0, 0}, {0, 1e-3, 0}, {0, 0, 1e-3}};
-  const double turning[3][3] = {{0, -7e-4, 3e-4}, {7e-4, 0, -9e-4}, {-3e-4, 9e-4, 0}};
-  const double any[3][3] = {{4e-4, 8e-4, -3e-4}, {2e-4, -6e-4, 5e-4}, {-9e-4, 1e-4, 7e-4}};
-  check_linear(swelling, none, 3e-3);
-  check_linear(turning, none, 3e-3);
-  check_linear(any, none, 3e-3);
 }
 
 TEST(test_slabs_of_any_state_sum_to_the_exact_volume) {

@@ -120,14 +120,12 @@ TEST(test_compare_json_holds_what_it_says) {
     check_posture(json_array_get(postures, i));
   }
   const double farthest = number(sphere, "farthest_from_supine", "rms_mm");
-  const double most = number(sphere, "differ_most", "rms_mm");
   for (size_t i = 0; i < 6; ++i) {
     const json_t *pair = json_array_get(pairs, i);
     const double rms = number(pair, "distance_mm", "rms");
     check_statistics(pair, "distance_mm");
-    assert_true(rms <= most * (1 + 1e-6));
     assert_true(strcmp(json_string_value(json_object_get(pair, "a")), "supine") != 0 ||
-                rms <= farthest * (1 + 1e-6));
+                rms <= farthest * (1 + 1e-3)); /* sampled 4.5 degrees apart */
   }
   assert_true(fabs(number(root, "energy", "constant") + number(root, "energy", "odd") +
                    number(root, "energy", "even") - 1) < 1e-8);
@@ -139,8 +137,8 @@ TEST(test_compare_json_holds_what_it_says) {
 
 TEST(test_compare_table_names_every_posture) {
   EXPECT(0, "Between postures", "compare lungs.safetensors");
-  static const char *const words[] = {"supine",    "prone",     "left",        "right",    "500 mL",
-                                      "lowermost", "uppermost", "differ most", "farthest", "odd"};
+  static const char *const words[] = {"supine",    "prone",     "left",     "right", "500 mL",
+                                      "lowermost", "uppermost", "farthest", "odd"};
   for (size_t i = 0; i < sizeof words / sizeof *words; ++i) {
     assert_non_null(strstr(printed, words[i]));
   }
@@ -160,9 +158,9 @@ TEST(test_compare_csv_has_six_fields_a_row) {
     ++rows;
   }
   /* A heading; for each posture gravity, 4 statistics and the expected error, 2 lungs twice, 4
-   * numbers of 10 slabs; 3 pairs; 3 energies; 3 directions found and their 3 distances; directions,
+   * numbers of 10 slabs; 3 pairs; 3 energies; the farthest direction and its distance; directions,
    * area, vertices. */
-  assert_int_equal(rows, 1 + 3 * (3 + 5 + 4 + 40) + 3 * 5 + 3 + (9 + 3) + 3);
+  assert_int_equal(rows, 1 + 3 * (3 + 5 + 4 + 40) + 3 * 5 + 3 + (3 + 1) + 3);
   free(text);
 }
 

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compare postures of a basis, pair by pair and over all directions of gravity. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "program/report/comparison.h"
+#include "sh/base/vec3.h"
 
 /* Compute how a breath from the comparison's volume is distributed over lungs and slabs. */
 static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
@@ -110,8 +112,37 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
   return status;
 }
 
+double supine_report_from_supine(const supine_comparison *c, const double gravity[3]) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const double *direction[2] = {supine, gravity};
+  supine_pose pose[2];
+  for (int side = 0; side < 2; ++side) {
+    supine_state state = c->state;
+    memcpy(state.gravity, direction[side], sizeof state.gravity);
+    if (supine_compare_pose(c->compare, &state, c->rms, &pose[side], NULL) != SUPINE_OK) {
+      return NAN;
+    }
+  }
+  return supine_compare_rms(c->compare, &pose[1], &pose[0]);
+}
+
+/* Find the direction of gravity farthest from supine among some that cover the sphere evenly, 4.5
+ * degrees apart. */
+static void find_farthest(supine_comparison *c) {
+  enum { DIRECTIONS = 2048 };
+  for (size_t i = 0; i < DIRECTIONS; ++i) {
+    double g[3];
+    supine_spiral((double)i, DIRECTIONS, 0.0, g);
+    const double rms = supine_report_from_supine(c, g);
+    c->directions += isnan(rms) ? 0 : 1;
+    if (rms > c->farthest_rms) {
+      c->farthest_rms = rms;
+      memcpy(c->farthest, g, sizeof g);
+    }
+  }
+}
+
 supine_status supine_report_find(supine_comparison *c, supine_error *error) {
-  supine_state supine = c->state; /* the search measures distances from it */
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   const size_t count = c->postures.count;
   supine_status status = SUPINE_ERROR_MEMORY;
@@ -125,8 +156,6 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
     (void)supine_error_set(error, status, "out of memory");
     goto cleanup;
   }
-  supine.gravity[0] = supine.gravity[2] = 0.0;
-  supine.gravity[1] = 1.0;
   status = supine_options_reference(c->basis, &c->from, true, &c->reference, error);
   if (status == SUPINE_OK) {
     status = supine_compare_create(c->basis, &c->compare, error);
@@ -157,8 +186,7 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
     status = find_energy(c, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_compare_search(c->compare, &supine, c->rms, SUPINE_COMPARISON_DIRECTIONS,
-                                   &c->extremes, error);
+    find_farthest(c);
   }
 cleanup:
   free(distance);

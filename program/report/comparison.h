@@ -10,7 +10,7 @@
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
-enum { SUPINE_COMPARISON_SLABS = 10, SUPINE_COMPARISON_DIRECTIONS = 2048 };
+enum { SUPINE_COMPARISON_SLABS = 10 };
 
 /* Results for one posture at the volume of the comparison. */
 typedef struct supine_compared_posture {
@@ -39,7 +39,9 @@ typedef struct supine_comparison {
   supine_distance_statistics *pair; /* [count, count] distances, mm: symmetric, diagonal 0 */
   double *pair_error;               /* [count, count] their expected errors, mm RMS: likewise */
   double constant, odd, even;       /* shares of energy, 0 to 1: l = 0, odd l, even l > 0 */
-  supine_extremes extremes;         /* over all directions; `farthest` is the one from supine */
+  size_t directions;                /* sampled directions of gravity that reach the volume */
+  double farthest[3],
+      farthest_rms; /* of these, the one farthest from supine; its RMS distance, mm */
 } supine_comparison;
 
 /* Compute all members after `postures`. Call supine_report_free in the end, also after failure. */
@@ -50,6 +52,10 @@ void supine_report_free(supine_comparison *comparison);
 
 /* Print the volume of all postures: "at rest", "at rest + 300 mL" or "5 mm RMS displacement". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
+
+/* Return the RMS distance of a direction of gravity from supine, mm; NaN if the lungs cannot reach
+ * the volume of the comparison. */
+double supine_report_from_supine(const supine_comparison *comparison, const double gravity[3]);
 
 /* Return whether expected errors are known. */
 bool supine_report_has_errors(const supine_comparison *comparison);

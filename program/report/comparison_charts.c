@@ -81,22 +81,6 @@ json_t *supine_report_profiles(const supine_comparison *c) {
                    profile(c, "share of the volume gained, %", true, share));
 }
 
-/* Return the RMS distance of a direction of gravity from supine, mm; NaN if the volume cannot be
- * reached. */
-static double from_supine(const supine_comparison *c, const double g[3]) {
-  static const double supine[3] = {0.0, 1.0, 0.0};
-  const double *direction[2] = {supine, g};
-  supine_pose pose[2];
-  for (int side = 0; side < 2; ++side) {
-    supine_state state = c->state;
-    memcpy(state.gravity, direction[side], sizeof state.gravity);
-    if (supine_compare_pose(c->compare, &state, c->rms, &pose[side], NULL) != SUPINE_OK) {
-      return NAN;
-    }
-  }
-  return supine_compare_rms(c->compare, &pose[1], &pose[0]);
-}
-
 /* Size and place of the map in map.html: cells, and SVG units. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
@@ -117,15 +101,14 @@ static json_t *map_cells(const supine_comparison *c) {
       const double roll = 2.0 * pi * ((column + 0.5) / COLUMNS - 0.5);
       const double tilt = pi * (0.5 - (row + 0.5) / ROWS);
       const double g[3] = {cos(tilt) * sin(roll), cos(tilt) * cos(roll), sin(tilt)};
-      const double rms = from_supine(c, g);
+      const double rms = supine_report_from_supine(c, g);
       if (!isnan(rms)) {
         (void)json_array_append_new(
-            cells,
-            json_pack("{s:o, s:i, s:i}", "hex",
-                      supine_report_hex(
-                          SUPINE_COLOURS_DIFFERENCE,
-                          c->extremes.farthest_rms > 0.0 ? rms / c->extremes.farthest_rms : 0.0),
-                      "x", MAP_LEFT + column * CELL, "y", MAP_TOP + row * CELL));
+            cells, json_pack("{s:o, s:i, s:i}", "hex",
+                             supine_report_hex(
+                                 SUPINE_COLOURS_DIFFERENCE,
+                                 c->farthest_rms > 0.0 ? fmin(1.0, rms / c->farthest_rms) : 0.0),
+                             "x", MAP_LEFT + column * CELL, "y", MAP_TOP + row * CELL));
       }
     }
   }

@@ -49,18 +49,6 @@ static void posture_rows(const supine_comparison *c, size_t i, FILE *file) {
   }
 }
 
-/* Print a direction that the search found, and its RMS distance from another. */
-static void extreme(FILE *file, const char *quantity, const char *part, const double g[3],
-                    const char *other, double rms) {
-  static const char *const axes[] = {"left", "posterior", "head"};
-  for (int axis = 0; axis < 3; ++axis) {
-    char name[32];
-    (void)snprintf(name, sizeof name, "%s%s", part, axes[axis]);
-    row(file, quantity, "all", other, name, g[axis] + 0.0, "1");
-  }
-  row(file, quantity, "all", other, "rms", rms, "mm");
-}
-
 /* Print the number of vertices with the path of the basis, quoted by RFC 4180. */
 static void vertices_row(const supine_comparison *c, FILE *file) {
   (void)fputs("vertices,rest,,\"", file);
@@ -95,11 +83,11 @@ void supine_report_csv(const supine_comparison *c, FILE *file) {
   row(file, "energy", "all", "", "constant", c->constant, "1");
   row(file, "energy", "all", "", "odd", c->odd, "1");
   row(file, "energy", "all", "", "even", c->even, "1");
-  const supine_extremes *e = &c->extremes;
-  extreme(file, "differ most", "a ", e->pair[0], "", e->pair_rms);
-  extreme(file, "differ most", "b ", e->pair[1], "", e->pair_rms);
-  extreme(file, "farthest", "", e->farthest, "supine", e->farthest_rms);
-  row(file, "directions", "all", "", "", (double)e->directions, "1");
+  row(file, "farthest", "all", "supine", "left", c->farthest[0] + 0.0, "1");
+  row(file, "farthest", "all", "supine", "posterior", c->farthest[1] + 0.0, "1");
+  row(file, "farthest", "all", "supine", "head", c->farthest[2] + 0.0, "1");
+  row(file, "farthest", "all", "supine", "rms", c->farthest_rms, "mm");
+  row(file, "directions", "all", "", "", (double)c->directions, "1");
   row(file, "area", "rest", "", "", supine_compare_area(c->compare), "mm2");
   vertices_row(c, file);
   if (c->rms > 0.0) {

@@ -113,7 +113,6 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
 
 /* Return the data of the report's header, of its section on all directions, and its provenance. */
 static json_t *facts(const supine_comparison *c) {
-  const supine_extremes *e = &c->extremes;
   const char *slash = strrchr(c->path, '/');
   char name[PATH_MAX] = "";
   supine_text_add(name, sizeof name, "%s", slash != NULL ? slash + 1 : c->path);
@@ -122,16 +121,14 @@ static json_t *facts(const supine_comparison *c) {
   supine_report_volume(c, volume, sizeof volume);
   json_t *list = provenance(c, file);
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
-      "file", file, "provenance", list, "date", date(), "count",
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o, s:o, s:o, s:o}", "file", file,
+      "provenance", list, "date", date(), "count",
       json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
       volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
       json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
-      "directions", (json_int_t)e->directions, "most_a", supine_report_direction(e->pair[0]),
-      "most_b", supine_report_direction(e->pair[1]), "most_rms", json_sprintf("%.2f", e->pair_rms),
-      "farthest", supine_report_direction(e->farthest), "farthest_rms",
-      json_sprintf("%.2f", e->farthest_rms), "constant", percent(c->constant), "odd",
-      percent(c->odd), "even", percent(c->even));
+      "directions", (json_int_t)c->directions, "farthest", supine_report_direction(c->farthest),
+      "farthest_rms", json_sprintf("%.2f", c->farthest_rms), "constant", percent(c->constant),
+      "odd", percent(c->odd), "even", percent(c->even));
 }
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
@@ -142,8 +139,8 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   (void)json_object_set_new(data, "surface", json_string(c->reference.name));
   (void)json_object_set_new(data, "map", supine_report_map(c));
   (void)json_object_set_new(data, "map_bar",
-                            supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->extremes.farthest_rms,
-                                              false, "RMS distance from supine, mm"));
+                            supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->farthest_rms, false,
+                                              "RMS distance from supine, mm"));
   if (c->postures.count > 1) {
     (void)json_object_set_new(data, "pair", farthest_pair(c));
     (void)json_object_set_new(data, "outlined",

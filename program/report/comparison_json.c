@@ -80,7 +80,6 @@ static json_t *pairs(const supine_comparison *c) {
 }
 
 bool supine_report_json(const supine_comparison *c, FILE *file) {
-  const supine_extremes *e = &c->extremes;
   char volume[160];
   char file_name[PATH_MAX] = "";
   supine_text_add(file_name, sizeof file_name, "%s", c->path);
@@ -88,14 +87,13 @@ bool supine_report_json(const supine_comparison *c, FILE *file) {
   supine_report_volume(c, volume, sizeof volume);
   json_t *root =
       json_pack("{s:s, s:s, s:s, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
-                "s:{s:I, s:{s:o, s:o, s:f}, s:{s:o, s:f}}}",
+                "s:{s:I, s:{s:o, s:f}}}",
                 "file", file_name, "volume", volume, "displacement_from", c->reference.name,
                 "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
                 supine_compare_area(c->compare), "postures", postures(c), "pairs", pairs(c),
                 "energy", "constant", c->constant, "odd", c->odd, "even", c->even, "sphere",
-                "directions", (json_int_t)e->directions, "differ_most", "a", direction(e->pair[0]),
-                "b", direction(e->pair[1]), "rms_mm", e->pair_rms, "farthest_from_supine",
-                "gravity", direction(e->farthest), "rms_mm", e->farthest_rms);
+                "directions", (json_int_t)c->directions, "farthest_from_supine", "gravity",
+                direction(c->farthest), "rms_mm", c->farthest_rms);
   const bool good =
       root != NULL && json_dumpf(root, file, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
   (void)fputc('\n', file);

@@ -4,160 +4,109 @@
 #include <stdint.h>
 #include <string.h>
 
+#include <supine/compare.h>
+
+#include "runtime/internal.h"
 #include "sh/base/vec3.h"
 
-#include "runtime/compare/compare_internal.h"
+enum { BEFORE, AFTER, TIMES };
 
-/* Sums over the part of a lung's surface above a cut. Levels t increase along gravity g, so that
- * "above" a cut is at smaller t. u is the displacement and N the area vector of a piece, mm. */
-typedef struct part {
-  double sweep;     /* sum of u.N: the volume that the part sweeps */
-  double volume;    /* sum of t (g.N) */
-  double area;      /* sum of g.N: minus the area of the cut that closes the part */
-  double moment[2]; /* sum of (x, y) (g.N): minus the moments of the cut */
-} part;
+/* A point of the surface. Levels t increase along gravity, so that "above" a cut is at smaller t.
+ */
+typedef struct corner {
+  double at[TIMES][3]; /* positions before and after the breath, mm */
+  double level;        /* t before the breath, mm */
+} corner;
 
-/* Sums along the outline of a cut, weighted by length, to fit a plane to u.g by least squares. */
+/* A triangle, or the part of one between two levels, which has at most five corners. */
+typedef struct polygon {
+  size_t count;
+  corner corner[6];
+} polygon;
+
+/* Sums over the outline of a cut, whose edges p to q are in the order of the part above it. */
 typedef struct outline {
-  double length, x, y, xx, xy, yy, u, xu, yu;
+  double length;           /* before the breath, mm */
+  double middle[TIMES][3]; /* edges' middles times lengths, mm^2 */
+  double area[TIMES][3];   /* p x q, mm^2 */
 } outline;
 
-/* A triangle in axes (x, y, t) with t along gravity, mm. */
-typedef struct triangle {
-  double at[3][3];   /* corners before the breath: x, y, t */
-  double u[3][3];    /* displacements of the corners */
-  double normal[3];  /* area vector before the breath, mm^2 */
-  double average[3]; /* area vector, averaged over the motion, mm^2 */
-} triangle;
-
-/* The slabs, and the sums of one lung at the levels between them. */
+/* The slabs, and the cuts of one lung at the levels between them. */
 typedef struct cutter {
   const float *from;                  /* [N, 3] positions before the breath */
-  double axis[3][3];                  /* axes x, y and gravity */
+  double down[3];                     /* unit vector along gravity */
   size_t count;                       /* number of slabs */
   double level[SUPINE_SLABS_MAX + 1]; /* t at which slab i begins, mm; the last: where all end */
-  part above[SUPINE_SLABS_MAX + 1];   /* parts above each level of the triangles that it cuts */
-  outline line[SUPINE_SLABS_MAX + 1]; /* outline of the cut at each level */
+  outline cut[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-static void add_cross(const double *a, const double *b, double factor, double *sum) {
-  double product[3];
-  supine_cross(a, b, product);
-  for (int i = 0; i < 3; ++i) {
-    sum[i] += factor * product[i];
+/* Positions count from the first vertex, for precision. */
+static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
+  corner out;
+  for (size_t i = 0; i < 3; ++i) {
+    out.at[BEFORE][i] = (double)c->from[3 * vertex + i] - (double)c->from[i];
+    out.at[AFTER][i] = (double)xyz[3 * vertex + i] - (double)c->from[i];
   }
+  out.level = supine_dot(c->down, out.at[BEFORE]);
+  return out;
 }
 
-/* Choose orthonormal axes with the third along gravity; false if it has no direction. */
-static bool make_axes(const double gravity[3], double axis[3][3]) {
-  double *g = axis[2];
-  if (!supine_normalise(gravity, g)) {
-    return false;
+/* Add the volume between the origin and a polygon, mL: before the breath and gained. */
+static void add_polygon(const polygon *p, supine_slab *slab) {
+  double volume[TIMES] = {0};
+  for (size_t i = 1; i + 1 < p->count; ++i) {
+    for (int time = 0; time < TIMES; ++time) {
+      double cross[3];
+      supine_cross(p->corner[i].at[time], p->corner[i + 1].at[time], cross);
+      volume[time] += 1e-3 / 6 * supine_dot(p->corner[0].at[time], cross);
+    }
   }
-  double seed[3] = {0, 0, 0};
-  seed[fabs(g[0]) < 0.6 ? 0 : 1] = 1;
-  supine_cross(g, seed, axis[0]);
-  const double across = supine_length(axis[0]);
-  for (int i = 0; i < 3; ++i) {
-    axis[0][i] /= across;
-  }
-  supine_cross(g, axis[0], axis[1]);
-  return true;
+  slab->volume += volume[BEFORE];
+  slab->gain += volume[AFTER] - volume[BEFORE];
 }
 
-static void place(const cutter *c, const float *point, const float *origin, double *out) {
-  const double p[3] = {(double)point[0] - (double)origin[0], (double)point[1] - (double)origin[1],
-                       (double)point[2] - (double)origin[2]};
-  for (int i = 0; i < 3; ++i) {
-    out[i] = supine_dot(c->axis[i], p);
+/* Find the point at a level on the edge from a to b. */
+static corner cross_level(const corner *a, const corner *b, double level) {
+  corner out = {.level = level};
+  const double share = (level - a->level) / (b->level - a->level);
+  for (int k = 0; k < 3 * TIMES; ++k) {
+    const double from = a->at[k / 3][k % 3];
+    out.at[k / 3][k % 3] = from + share * (b->at[k / 3][k % 3] - from);
   }
+  return out;
 }
 
-static void read_triangle(const cutter *c, const float *xyz, const uint32_t *corner, triangle *t) {
-  for (int v = 0; v < 3; ++v) {
-    const float *rest = c->from + 3 * (size_t)corner[v];
-    place(c, rest, c->from, t->at[v]);
-    place(c, xyz + 3 * (size_t)corner[v], rest, t->u[v]);
-  }
-  double e[2][3];
-  double f[2][3];
-  for (int v = 0; v < 2; ++v) {
+static void add_edge(const corner *p, const corner *q, outline *cut) {
+  const double length = supine_distance(p->at[BEFORE], q->at[BEFORE]);
+  cut->length += length;
+  for (int time = 0; time < TIMES; ++time) {
+    double cross[3];
+    supine_cross(p->at[time], q->at[time], cross);
     for (int i = 0; i < 3; ++i) {
-      e[v][i] = t->at[v + 1][i] - t->at[0][i];
-      f[v][i] = t->u[v + 1][i] - t->u[0][i];
+      cut->middle[time][i] += length * (p->at[time][i] + q->at[time][i]) / 2;
+      cut->area[time][i] += cross[i];
     }
   }
-  /* 1/2 integral over 0 <= s <= 1 of (e + s f) x (e' + s f') */
-  memset(t->normal, 0, sizeof t->normal);
-  add_cross(e[0], e[1], 0.5, t->normal);
-  memcpy(t->average, t->normal, sizeof t->normal);
-  add_cross(e[0], f[1], 0.25, t->average);
-  add_cross(f[0], e[1], 0.25, t->average);
-  add_cross(f[0], f[1], 1.0 / 6, t->average);
 }
 
-/* Add a piece of a triangle to the sums. `m` are the integrals of the barycentric coordinates over
- * the piece, divided by the area of the triangle. */
-static void add_piece(const triangle *t, const double m[3], part *sum) {
-  for (int v = 0; v < 3; ++v) {
-    const double down = m[v] * t->normal[2];
-    sum->sweep += m[v] * supine_dot(t->u[v], t->average);
-    sum->volume += down * t->at[v][2];
-    sum->area += down;
-    sum->moment[0] += down * t->at[v][0];
-    sum->moment[1] += down * t->at[v][1];
-  }
-}
-
-static void add_segment(const double p[3], const double q[3], double u, outline *line) {
-  const double x = (p[0] + q[0]) / 2;
-  const double y = (p[1] + q[1]) / 2;
-  const double length = sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]));
-  line->length += length;
-  line->x += length * x;
-  line->y += length * y;
-  line->xx += length * x * x;
-  line->xy += length * x * y;
-  line->yy += length * y * y;
-  line->u += length * u;
-  line->xu += length * x * u;
-  line->yu += length * y * u;
-}
-
-/* Cut a triangle at a level between its corners; add the piece above the level to `sum`, and the
- * cut edge to `line`. */
-static void cut(const triangle *t, double level, part *sum, outline *line) {
-  int lone = 0; /* the corner that is alone on its side */
-  int before = 0;
-  for (int v = 0; v < 3; ++v) {
-    before += t->at[v][2] < level;
-  }
-  while ((t->at[lone][2] < level) != (before == 1)) {
-    ++lone;
-  }
-  const int other[2] = {(lone + 1) % 3, (lone + 2) % 3};
-  double share[2];
-  double end[2][3];
-  double down = 0;
-  for (int i = 0; i < 2; ++i) {
-    const double *a = t->at[lone];
-    const double *b = t->at[other[i]];
-    share[i] = (level - a[2]) / (b[2] - a[2]);
-    for (int k = 0; k < 3; ++k) {
-      end[i][k] = a[k] + share[i] * (b[k] - a[k]);
+/* Split a polygon at a level between its corners, and add the cut edge to `cut`.
+ * @param below  written; may not be `p` */
+static void split(const polygon *p, double level, polygon *above, polygon *below, outline *cut) {
+  corner end[2] = {{.level = level}, {.level = level}}; /* where the outline goes down, and up */
+  above->count = below->count = 0;
+  for (size_t i = 0; i < p->count; ++i) {
+    const corner *a = &p->corner[i];
+    const corner *b = &p->corner[(i + 1) % p->count];
+    polygon *side = a->level < level ? above : below;
+    side->corner[side->count++] = *a;
+    if ((a->level < level) != (b->level < level)) {
+      const corner point = cross_level(a, b, level);
+      end[a->level < level ? 0 : 1] = point;
+      above->corner[above->count++] = point;
+      below->corner[below->count++] = point;
     }
-    down += t->u[lone][2] + share[i] * (t->u[other[i]][2] - t->u[lone][2]);
   }
-  const double area = share[0] * share[1];
-  double m[3];
-  m[lone] = area * (1 - (share[0] + share[1]) / 3);
-  m[other[0]] = area * share[0] / 3;
-  m[other[1]] = area * share[1] / 3;
-  for (int v = 0; v < 3 && before == 2; ++v) {
-    m[v] = 1.0 / 3 - m[v];
-  }
-  add_piece(t, m, sum);
-  add_segment(end[0], end[1], down / 2, line);
+  add_edge(&end[0], &end[1], cut);
 }
 
 /* Find the slab that holds level t. */
@@ -169,86 +118,51 @@ static size_t slab_of(const cutter *c, double t) {
   return slab;
 }
 
-static void add_triangle(cutter *c, const triangle *t, part *whole) {
-  static const double full[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
-  size_t first = c->count;
-  size_t last = 0;
-  for (int v = 0; v < 3; ++v) {
-    const size_t slab = slab_of(c, t->at[v][2]);
-    first = slab < first ? slab : first;
-    last = slab > last ? slab : last;
+static void add_triangle(cutter *c, const polygon *triangle, supine_slab *slabs) {
+  const corner *v = triangle->corner;
+  const size_t last = slab_of(c, fmax(v[0].level, fmax(v[1].level, v[2].level)));
+  polygon rest = *triangle;
+  for (size_t slab = slab_of(c, fmin(v[0].level, fmin(v[1].level, v[2].level))); slab < last;
+       ++slab) {
+    polygon above;
+    polygon below;
+    split(&rest, c->level[slab + 1], &above, &below, &c->cut[slab + 1]);
+    add_polygon(&above, &slabs[slab]);
+    rest = below;
   }
-  for (size_t level = first + 1; level <= last; ++level) {
-    cut(t, c->level[level], &c->above[level], &c->line[level]);
-  }
-  add_piece(t, full, &whole[last + 1]);
+  add_polygon(&rest, &slabs[last]);
 }
 
-/* Compute the flux of u.g through a cut: its area times the mean of u.g over it. The mean is
- * approximated by a plane fitted to u.g along the outline, evaluated at the centroid of the cut. */
-static double cut_flux(const part *before, const outline *line) {
-  const double area = -before->area;
-  if (!(line->length > 0) || area == 0) {
-    return 0;
+/* Close the slabs above and below a cut by the fan of triangles from the mean of its outline. */
+static void close_cut(const outline *cut, supine_slab *above, supine_slab *below) {
+  double volume[TIMES]; /* between the origin and the fan, mL */
+  for (int time = 0; time < TIMES && cut->length > 0; ++time) {
+    volume[time] = 1e-3 / 6 * supine_dot(cut->middle[time], cut->area[time]) / cut->length;
   }
-  const double x = line->x / line->length;
-  const double y = line->y / line->length;
-  const double u = line->u / line->length;
-  const double xx = line->xx / line->length - x * x;
-  const double xy = line->xy / line->length - x * y;
-  const double yy = line->yy / line->length - y * y;
-  const double xu = line->xu / line->length - x * u;
-  const double yu = line->yu / line->length - y * u;
-  const double determinant = xx * yy - xy * xy;
-  if (!(determinant > 1e-6 * (xx + yy) * (xx + yy))) {
-    return area * u; /* too thin to fit a plane to */
+  if (cut->length > 0) {
+    above->volume -= volume[BEFORE];
+    above->gain -= volume[AFTER] - volume[BEFORE];
+    below->volume += volume[BEFORE];
+    below->gain += volume[AFTER] - volume[BEFORE];
   }
-  const double slope_x = (xu * yy - yu * xy) / determinant;
-  const double slope_y = (yu * xx - xu * xy) / determinant;
-  return area * u + slope_x * (-before->moment[0] - area * x) +
-         slope_y * (-before->moment[1] - area * y);
 }
 
 static void cut_lung(cutter *c, const supine_basis *basis, size_t lung, const float *xyz,
                      supine_slab *slabs) {
-  part whole[SUPINE_SLABS_MAX + 1]; /* [slab + 1]: triangles whose lowest corner is in the slab */
-  memset(whole, 0, sizeof whole);
-  memset(c->above, 0, sizeof c->above);
-  memset(c->line, 0, sizeof c->line);
+  memset(c->cut, 0, sizeof c->cut);
+  memset(slabs, 0, c->count * sizeof *slabs);
   for (size_t i = 0; i < basis->info.triangle_count; ++i) {
-    const uint32_t *corner = basis->info.triangles + 3 * i;
-    if (corner[0] >= basis->lung_begin[lung] && corner[0] < basis->lung_begin[lung + 1]) {
-      triangle t;
-      read_triangle(c, xyz, corner, &t);
-      add_triangle(c, &t, whole);
+    const uint32_t *vertex = basis->info.triangles + 3 * i;
+    if (vertex[0] >= basis->lung_begin[lung] && vertex[0] < basis->lung_begin[lung + 1]) {
+      polygon triangle = {.count = 3};
+      for (size_t v = 0; v < 3; ++v) {
+        triangle.corner[v] = read_corner(c, xyz, vertex[v]);
+      }
+      add_triangle(c, &triangle, slabs);
     }
   }
-  part so_far = {0};
-  double flux = 0; /* through the cut above the slab */
-  part above = {0};
-  for (size_t slab = 0; slab < c->count; ++slab) {
-    const part *add = &whole[slab + 1];
-    so_far.sweep += add->sweep;
-    so_far.volume += add->volume;
-    so_far.area += add->area;
-    so_far.moment[0] += add->moment[0];
-    so_far.moment[1] += add->moment[1];
-    part here = so_far;
-    const part *cuts = &c->above[slab + 1];
-    double next = 0;
-    if (slab + 1 < c->count) {
-      here.sweep += cuts->sweep;
-      here.volume += cuts->volume;
-      here.area += cuts->area;
-      here.moment[0] += cuts->moment[0];
-      here.moment[1] += cuts->moment[1];
-      next = cut_flux(&here, &c->line[slab + 1]);
-      here.volume -= c->level[slab + 1] * here.area; /* closed by the cut */
-    }
-    slabs[slab].volume = 1e-3 * (here.volume - above.volume);
-    slabs[slab].gain = 1e-3 * (here.sweep - above.sweep + next - flux);
-    above = here;
-    flux = next;
+  for (size_t slab = 0; slab + 1 < c->count; ++slab) {
+    close_cut(&c->cut[slab + 1], &slabs[slab], &slabs[slab + 1]);
   }
 }
 
@@ -256,7 +170,7 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
                                    const float *from, const float *xyz, size_t count,
                                    supine_slab *slabs, supine_error *error) {
   cutter c = {.from = from != NULL ? from : basis->info.vertices, .count = count};
-  if (count == 0 || count > SUPINE_SLABS_MAX || !make_axes(gravity, c.axis)) {
+  if (count == 0 || count > SUPINE_SLABS_MAX || !supine_normalise(gravity, c.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%zu slabs: give 1 to %d; or gravity has no direction", count,
                             (int)SUPINE_SLABS_MAX);
@@ -268,10 +182,9 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
   double lowest = -INFINITY;
   double highest = INFINITY;
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
-    double at[3];
-    place(&c, c.from + 3 * i, c.from, at);
-    highest = fmin(highest, at[2]);
-    lowest = fmax(lowest, at[2]);
+    const double level = read_corner(&c, xyz, i).level;
+    highest = fmin(highest, level);
+    lowest = fmax(lowest, level);
   }
   for (size_t i = 0; i <= count; ++i) {
     c.level[i] = highest + (lowest - highest) * (double)i / (double)count;

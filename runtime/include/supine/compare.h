@@ -84,34 +84,6 @@ SUPINE_API void supine_compare_statistics(const supine_compare *compare, const f
  * @param energy  [L + 1], written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
-/** The directions of gravity that differ most, at one volume. */
-typedef struct supine_extremes {
-  size_t directions;   /**< sampled directions in which the lungs reach the volume */
-  double pair[2][3];   /**< the two directions that differ most, unit */
-  double pair_rms;     /**< RMS distance between them, mm */
-  double farthest[3];  /**< the direction that differs most from the given one, unit */
-  double farthest_rms; /**< RMS distance between these two, mm */
-} supine_extremes;
-
-/** Search the sphere for the directions that differ most. Compare the directions of a golden-angle
- * spiral and `from` with each other, then move the best ones along the sphere while that increases
- * the distance, in steps that are halved from the spacing of the spiral down to 1e-6 rad. A maximum
- * narrower than the spacing, 3.5 / sqrt(directions) rad, can be missed. Directions in which the
- * lungs cannot reach the volume are left out.
- *
- * @param from        the posture to compare with, and the volume for all directions
- * @param rms         mm, see supine_compare_pose
- * @param directions  number of directions in the spiral, 2 to 16384; 2048 are 4.5 degrees apart
- *
- * Cost: 3 G K directions^2 / 2 multiplications, and 6 G K directions doubles of memory.
- * @retval SUPINE_ERROR_ARGUMENT   directions out of range, or `from` is zero or not finite
- * @retval SUPINE_ERROR_NUMERICAL  `from`, or all but one, cannot reach the volume
- * @retval SUPINE_ERROR_OPEN_SURFACE, SUPINE_ERROR_MEMORY */
-SUPINE_API supine_status supine_compare_search(const supine_compare *compare,
-                                               const supine_state *from, double rms,
-                                               size_t directions, supine_extremes *extremes,
-                                               supine_error *error);
-
 /** The part of one lung between two heights. */
 typedef struct supine_slab {
   double volume; /**< volume before the breath, mL */
@@ -125,15 +97,13 @@ enum { SUPINE_SLABS_MAX = 64 };
  * across gravity, from the highest to the lowest point of all lungs, and find the volume that the
  * tissue in each gains.
  *
- *     gain = the volume swept by the slab's part of the surface
- *            + A mean(u.g) of its lower cut - A mean(u.g) of its upper cut
+ *     gain = volume within the slab's part of the surface and its two cuts after the breath
+ *            - the same before it
  *
- * The swept volume of each triangle is exact, so that the slabs of a lung sum to the volume that it
- * gains. A cut inside the lung has no vertices: its area A is exact; its mean displacement along
- * gravity is estimated by fitting a plane (least squares) to u.g along its outline, and taking the
- * value of that plane at the centroid of the cut. This is exact for translations and, to first
- * order, for displacements that are linear in position: the gains are 0 for a rotation, and
- * gain / volume is the same in all slabs for a uniform expansion.
+ * The part of the surface is exact, so that the slabs of a lung sum to the volume that it gains. A
+ * cut inside the lung has no vertices: after the breath it is the fan of triangles from the mean of
+ * its outline to its outline. This is exact for displacements that are linear in position: the gains
+ * are 0 for a rotation, and gain / volume is the same in all slabs for a uniform expansion.
  *
  * @param gravity  [3], any length but 0
  * @param from     [N, 3] positions before the breath; NULL: the reference surface
