@@ -62,8 +62,8 @@ typedef struct supine_mesh_report {
   bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
 } supine_mesh_report;
 
-/** Read one surface: PLY, STL and VTP directly, other formats through assimp. Polygons are cut
- * into triangles, all nodes of a scene are joined, vertices at the same position are welded in
+/** Read one surface: PLY and VTP directly, OBJ, STL and other formats through assimp. Polygons are
+ * cut into triangles, all nodes of a scene are joined, vertices at the same position are welded in
  * order of first appearance.
  *
  * Counts are checked against the file's size, so truncated or corrupt files are refused. assimp

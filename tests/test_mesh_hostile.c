@@ -297,7 +297,7 @@ TEST(test_stl_and_obj_garbage_format) {
               "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 "
               "0\nendloop\nendfacet\nendsolid\n",
               SUPINE_ERROR_FORMAT, 0);
-  expect_text(state, "a.stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nendsolid\n", SUPINE_ERROR_FORMAT,
+  expect_text(state, "a.stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nendsolid\n", SUPINE_ERROR_MESH,
               0);
   expect_text(state, "a.stl", "short", SUPINE_ERROR_FORMAT, 0);
   expect_text(state, "a.obj", "v 0 0 0\nv 1 zero 0\nv 0 1 0\nf 1 2 3\n", SUPINE_ERROR_FORMAT, 0);

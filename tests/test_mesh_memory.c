@@ -87,8 +87,6 @@ TEST(test_load_each_allocation_failing_memory) {
       {"a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
                 "property float z\nproperty float a\nelement face 1\nproperty list uchar int "
                 "vertex_indices\nend_header\n0 0 0 1\n1 0 0 2\n1 1 0 3\n0 1 0 4\n4 0 1 2 3\n"},
-      {"a.stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 0 0\nvertex 1 1 0\n"
-                "vertex 0 1 0\nendsolid\n"},
       {"a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"}};
   for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
     char path[256];

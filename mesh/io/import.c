@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -63,15 +64,15 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           length == 0 ? "the importer failed" : line);
 }
 
-/* Import the bytes of an OBJ file, or a file by its path. */
-static const struct aiScene *import(const assimp *ai, const mesh_file *file, bool obj) {
+/* Import the bytes of a file in the format `kind`, or, if that is NULL, the file itself. */
+static const struct aiScene *import(const assimp *ai, const mesh_file *file, const char *kind) {
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Without this, importers add a surface to files that hold only a skeleton. */
   ai->SetImportPropertyInteger(properties, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
   const struct aiScene *scene =
-      obj ? ai->ImportFileFromMemoryWithProperties((const char *)file->bytes, (unsigned)file->size,
-                                                   0, "obj", properties)
-          : ai->ImportFileExWithProperties(file->path, 0, NULL, properties);
+      kind != NULL ? ai->ImportFileFromMemoryWithProperties(
+                         (const char *)file->bytes, (unsigned)file->size, 0, kind, properties)
+                   : ai->ImportFileExWithProperties(file->path, 0, NULL, properties);
   ai->ReleasePropertyStore(properties);
   return scene;
 }
@@ -148,13 +149,14 @@ static void confine(size_t bytes) {
   (void)freopen("/dev/null", "w", stderr);
 }
 
-static _Noreturn void be_child(const mesh_file *file, bool obj, size_t bytes, FILE *stream) {
+static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t bytes,
+                               FILE *stream) {
   outcome result = {.error = {SUPINE_OK, ""}};
   gathering out = {.error = &result.error};
   out.faces = (mesh_faces){.path = file->path, .mesh = &out.mesh};
   confine(bytes);
   if (SUPINE_LIBRARY_LOAD(SUPINE_ASSIMP, FUNCTIONS, &out.ai, &result.error) == SUPINE_OK) {
-    out.scene = import(&out.ai, file, obj);
+    out.scene = import(&out.ai, file, kind);
     struct aiMatrix4x4 identity;
     out.ai.IdentityMatrix4(&identity);
     if (out.scene == NULL) {
@@ -202,7 +204,7 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
                           path);
 }
 
-static supine_status import_file(const mesh_file *file, bool obj, supine_mesh *mesh,
+static supine_status import_file(const mesh_file *file, const char *kind, supine_mesh *mesh,
                                  size_t *dropped, supine_error *error) {
   struct stat about = {0};
   const int descriptor = memfd_create("mesh", MFD_CLOEXEC);
@@ -216,7 +218,7 @@ static supine_status import_file(const mesh_file *file, bool obj, supine_mesh *m
   (void)stat(file->path, &about);
   const pid_t child = fork();
   if (child == 0) {
-    be_child(file, obj, (size_t)about.st_size, stream);
+    be_child(file, kind, (size_t)about.st_size, stream);
   }
   while (child > 0 && waitpid(child, NULL, 0) < 0 && errno == EINTR) {
   }
@@ -227,33 +229,64 @@ static supine_status import_file(const mesh_file *file, bool obj, supine_mesh *m
 
 supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                  supine_error *error) {
-  return import_file(file, false, mesh, dropped, error);
+  return import_file(file, NULL, mesh, dropped, error);
 }
 
-/* Check that coordinates are numbers, and turn lines that name a file of materials into comments,
- * because a surface needs no colours. */
-supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
-                                   supine_error *error) {
+/* Check that every line beginning with `keyword` has three numbers, as assimp accepts others;
+ * return the number of a bad line, or 0. Turn lines that name a file of materials into comments,
+ * because a surface needs no colours. `last` is set to the first word of the last line. */
+static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
-  mesh_text word;
-  if (!supine_mesh_guard_text(file, error)) {
-    return SUPINE_ERROR_FORMAT;
-  }
   for (size_t number = 1; supine_mesh_text_line(&text, &line); ++number) {
+    mesh_text word;
     double position[3];
     if (!supine_mesh_text_word(&line, &word)) {
       continue;
     }
+    *last = word;
     if (supine_mesh_text_is(word, "mtllib")) {
       file->bytes[word.at - file->bytes] = '#';
-    } else if (supine_mesh_text_is(word, "v") && !supine_mesh_text_position(&line, position)) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: line %zu: a vertex needs three numbers; save the mesh again",
-                              file->path, number);
+    } else if (supine_mesh_text_is(word, keyword) && !supine_mesh_text_position(&line, position)) {
+      return number;
     }
   }
-  return import_file(file, true, mesh, dropped, error);
+  return 0;
+}
+
+static supine_status bad_line(const mesh_file *file, size_t number, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                          "%s: line %zu: a vertex needs three numbers; save the mesh again",
+                          file->path, number);
+}
+
+supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error) {
+  mesh_text last;
+  if (!supine_mesh_guard_text(file, error)) {
+    return SUPINE_ERROR_FORMAT;
+  }
+  const size_t bad = check_lines(file, "v", &last);
+  return bad > 0 ? bad_line(file, bad, error) : import_file(file, "obj", mesh, dropped, error);
+}
+
+/* Text has no NUL byte; some binary files begin with "solid" too. */
+supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                   supine_error *error) {
+  mesh_text last = {0};
+  if (memchr(file->bytes, '\0', file->size) == NULL) {
+    const size_t bad = check_lines(file, "vertex", &last);
+    if (bad > 0) {
+      return bad_line(file, bad, error);
+    }
+    if (!supine_mesh_text_is(last, "endsolid")) {
+      return supine_error_set(
+          error, SUPINE_ERROR_FORMAT,
+          "%s: the STL text does not end with endsolid: it is truncated; save it again",
+          file->path);
+    }
+  }
+  return import_file(file, "stl", mesh, dropped, error);
 }
 
 bool supine_mesh_import_knows(const char *ending) {

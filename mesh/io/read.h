@@ -86,7 +86,7 @@ typedef struct mesh_faces {
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 
-/* ---- ply.c, stl.c, vtp_read.c, import.c: one function for each format. ---- */
+/* ---- ply.c, vtp_read.c, import.c: one function for each format. ---- */
 
 /** Read a surface in the file's units and axes, not welded, in single precision. The caller frees
  * `mesh`, also after a failure. `dropped` is set to the number of faces that are points or lines.
