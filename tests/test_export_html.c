@@ -5,6 +5,7 @@
 #include <base64.h>
 #include <export.h>
 #include <meshoptimizer.h>
+#include <packed.h>
 
 #include "export_helpers.h"
 
@@ -118,7 +119,7 @@ static double number_of(const char *page, const char *name) {
 }
 
 /* Positions and coefficients, for directions of unit length, are within half a count. */
-static void check_motion(const char *page, const export_source *s) {
+static void check_motion(const char *page, const export_source *s, const uint32_t *order) {
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->mode_count;
   const double place_unit = number_of(page, "placeUnit");
@@ -130,15 +131,16 @@ static void check_motion(const char *page, const export_source *s) {
   meshopt_decodeFilterOct(directions, n, 4 * sizeof *directions);
   assert_true(place_unit > 0 && place_unit <= 0.005 && unit > 0 && unit <= 0.005);
   for (size_t i = 0; i < n; ++i) {
-    const float *d = s->direction + 3 * i;
+    const size_t v = order[i];
+    const float *d = s->direction + 3 * v;
     const double length = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
-    assert_true(fabs(places[4 * i] * place_unit + middle - (double)s->vertices[3 * i]) <=
+    assert_true(fabs(places[4 * i] * place_unit + middle - (double)s->vertices[3 * v]) <=
                 0.5001 * place_unit);
     for (size_t axis = 0; axis < 3; ++axis) {
       assert_true(fabs(directions[4 * i + axis] / 32767.0 - (double)d[axis] / length) < 1e-4);
     }
     for (size_t k = 0; k < modes; ++k) {
-      const double c = (double)s->coefficients[i * modes + k] * length;
+      const double c = (double)s->coefficients[v * modes + k] * length;
       assert_true(fabs(counts[i * modes + k] * unit - c) <= 0.5001 * unit);
     }
   }
@@ -172,8 +174,11 @@ TEST(test_page_carries_the_basis) {
   char *page = read_page();
   export_source s = {0};
   assert_int_equal(supine_export_source_open(basis, &s, NULL), SUPINE_OK);
-  check_motion(page, &s);
-  check_corners(page, s.triangles, 3 * s.info->triangle_count);
+  export_order order;
+  assert_int_equal(supine_export_order_make(&s, true, &order, NULL), SUPINE_OK);
+  check_motion(page, &s, order.vertex);
+  check_corners(page, order.corners, 3 * s.info->triangle_count);
+  supine_export_order_free(&order);
   check_tensor(page, "modes", s.modes, 6 * 16 * sizeof(double));
   check_tensor(page, "volume_linear", s.info->volume_linear, 2 * 6 * sizeof(double));
   check_tensor(page, "volume_quadratic", s.info->volume_quadratic, 2 * 36 * sizeof(double));

@@ -69,9 +69,10 @@ typedef struct export_parts {
 
 /** How to write glTF. */
 typedef struct export_glb_options {
-  bool plain;   /**< float32 throughout; else positions as 16-bit counts of 0.02 mm (more for lungs
-                   beyond 650 mm) and normals as bytes (KHR_mesh_quantization), compressed
-                   (EXT_meshopt_compression) */
+  bool plain;   /**< float32 throughout, vertices in the basis' order; else positions as 16-bit
+                   counts of 0.045 mm (more for lungs beyond 1.4 m), within 0.1 mm of the library's,
+                   and normals as bytes (KHR_mesh_quantization), all in an order that compresses
+                   well (EXT_meshopt_compression) */
   bool animate; /**< add an animation of breathing while the patient turns, and one of breathing in
                    each of the four lying postures */
   export_breath breath;
@@ -85,7 +86,7 @@ typedef struct export_glb_options {
  *     position_i = base_i + sum over j of weight_j target_ij     0 <= weight_j <= 1
  *
  * The file's `extras` say how each lung's weights follow from gravity and volume. Targets of the
- * lungs hold normals too. Vertices keep the basis' order; their colour shows the largest
+ * lungs hold normals too. The colour of a vertex shows its largest
  * displacement from supine over the lying postures, at rest. The content of a lung is a separate
  * mesh with the same weights, in which each part is a primitive with a material of its name; points
  * are balls of radius 4 mm. The node "patient" lies on a table and rotates about the centre of the

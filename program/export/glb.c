@@ -10,7 +10,8 @@
 #include "program/render/render.h"
 #include "sh/base/output.h"
 
-static const double step_mm = 0.02; /* smallest unit of quantized positions */
+static const double step_mm = 0.045; /* smallest unit of quantized positions: they differ by up to
+                                    twice as much from the library's */
 
 /* Compute the largest displacement of each vertex from supine over the lying postures, at rest, mm;
  * return the largest of all. `xyz` and `supine_xyz` are workspace, [N, 3]. */
@@ -53,30 +54,34 @@ static supine_status add_lungs(glb *g, json_int_t *nodes, double *end, supine_er
   static const double white[3] = {1, 1, 1};
   const export_source *s = g->source;
   const size_t n = s->info->vertex_count;
-  size_t begin[SUPINE_LUNGS_MAX + 1];
+  export_order order = {0};
   float *base = malloc(3 * n * sizeof *base);
   float *xyz = malloc(3 * n * sizeof *xyz);
   float *move = calloc(n, sizeof *move);
   float *added = malloc(3 * n * g->targets.count * sizeof *added);
   uint8_t *colours = malloc(4 * n);
-  uint32_t *corners = supine_export_pack_order(s, begin);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (base == NULL || xyz == NULL || move == NULL || added == NULL || colours == NULL ||
-      corners == NULL) {
-    (void)supine_error_set(error, status, "out of memory");
+  supine_status status = supine_export_order_make(s, !g->options->plain, &order, error);
+  if (status == SUPINE_OK &&
+      (base == NULL || xyz == NULL || move == NULL || added == NULL || colours == NULL)) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  if (status != SUPINE_OK) {
     goto cleanup;
   }
   *end = supine_render_bar_end(find_moves(g, xyz, base, move));
   colour(move, n, *end, colours);
-  status = supine_export_targets_normals(s, &g->options->breath, &g->targets, base, added, error);
+  status =
+      supine_export_targets_normals(s, &g->options->breath, &g->targets,
+                                    g->options->plain ? NULL : order.vertex, base, added, error);
   for (size_t lung = 0; status == SUPINE_OK && lung < s->info->lung_count; ++lung) {
     char name[64];
     (void)snprintf(name, sizeof name, "%s lung", s->info->lung_names[lung]);
     const json_int_t material =
         supine_export_glb_material(g, name, white, g->options->inside != NULL ? 0.3 : 1);
-    const uint32_t *own = corners + begin[lung];
-    const size_t count = begin[lung + 1] - begin[lung];
-    const glb_shape shape = {name, s, lung, base, added, colours, 1, &own, &count, &material};
+    const uint32_t *own = order.corners + order.corner_begin[lung];
+    const size_t count = order.corner_begin[lung + 1] - order.corner_begin[lung];
+    const glb_shape shape = {name,    s, lung, order.vertex, base,     added,
+                             colours, 1, &own, &count,       &material};
     nodes[lung] = supine_export_glb_add(g, &shape);
   }
 cleanup:
@@ -85,7 +90,7 @@ cleanup:
   free(move);
   free(added);
   free(colours);
-  free(corners);
+  supine_export_order_free(&order);
   return status;
 }
 
@@ -195,7 +200,7 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
   }
   if (status == SUPINE_OK) {
     json_t *root = make_root(g, bytes, end, roots);
-    char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(10));
+    char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9));
     status = text == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path)
                           : write_file(path, text, numbers, bytes, total, error);
     free(text); /* jansson's default allocator is malloc */

@@ -8,15 +8,16 @@
 
 #include "program/export/targets.h"
 
-/** Kinds of array. Unless the file is plain, positions are stored as 16-bit integers and normals as
- * bytes, and all kinds but GLB_NUMBERS and GLB_ROTATIONS are compressed. */
+/** Kinds of array. Unless the file is plain, positions and weights are stored as 16-bit integers
+ * and normals as bytes, and those of meshes are compressed. */
 typedef enum glb_kind {
   GLB_CORNERS,  /**< uint32_t: vertex indices of triangles */
   GLB_PLACES,   /**< float [3]: positions or displacements in units of glb.step */
   GLB_NORMALS,  /**< float [3]: unit normals */
   GLB_CHANGES,  /**< float [3]: what a target adds to normals */
   GLB_COLOURS,  /**< uint8_t [4]: RGBA, linear */
-  GLB_NUMBERS,  /**< float: times or weights of animations */
+  GLB_TIMES,    /**< float: times of animations, s */
+  GLB_WEIGHTS,  /**< float: weights of targets in animations, 0 to 1 */
   GLB_ROTATIONS /**< float [4]: quaternions X, Y, Z, W */
 } glb_kind;
 
@@ -38,6 +39,7 @@ typedef struct glb_shape {
   const char *name;
   const export_source *source;
   size_t lung;
+  const uint32_t *order;          /**< [N] index in `source` of each vertex written */
   const float *normals;           /**< [N, 3] */
   const float *added;             /**< [targets, N, 3] what targets add to normals, or NULL */
   const uint8_t *colours;         /**< [N, 4] RGBA, or NULL */
@@ -47,8 +49,13 @@ typedef struct glb_shape {
   const json_int_t *material;     /**< [parts] index of each part's material */
 } glb_shape;
 
-/** Append an array of `count` rows and return its accessor's index. */
-json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, size_t count);
+/** Append an array of `count` rows and return its accessor's index.
+ * @param order  [count] index in `rows` of each row; NULL: as they are */
+json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
+                                 size_t count);
+
+/** Append an accessor of `count` rows that are 0, which takes no space, and return its index. */
+json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 
 /** Append a mesh and a node that shows it; return the node's index. The mesh is in units of
  * glb.step, LPS, from the centre of the lungs; the node converts it to metres, y up.

@@ -7,7 +7,7 @@
 #include "program/export/glb.h"
 
 static const double pi = 3.14159265358979323846;
-enum { RATE = 10, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
+enum { RATE = 6, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
 
 /* Gravity in the body is (sin t, cos t, 0) at roll t. In glTF's axes the patient turns by t about
  * y, the body's long axis, then by -90 degrees about x to lie down. */
@@ -65,16 +65,16 @@ static void add(glb *g, const char *name, double roll, size_t seconds, size_t co
     supine_export_glb_rotation(turned, rotations + 4 * i);
     make_frame(g, count, lungs, turned, at, weights + i * targets, frames);
   }
-  const json_int_t input = supine_export_glb_put(g, GLB_NUMBERS, times, frames);
+  const json_int_t input = supine_export_glb_put(g, GLB_TIMES, times, NULL, frames);
   json_t *samplers = json_pack("[{s:I, s:I}]", "input", input, "output",
-                               supine_export_glb_put(g, GLB_ROTATIONS, rotations, frames));
+                               supine_export_glb_put(g, GLB_ROTATIONS, rotations, NULL, frames));
   json_t *channels =
       json_pack("[{s:i, s:{s:i, s:s}}]", "sampler", 0, "target", "node", 0, "path", "rotation");
   for (size_t i = 0; i < count; ++i) {
     (void)json_array_append_new(
         samplers, json_pack("{s:I, s:I}", "input", input, "output",
-                            supine_export_glb_put(g, GLB_NUMBERS, weights + i * frames * targets,
-                                                  frames * targets)));
+                            supine_export_glb_put(g, GLB_WEIGHTS, weights + i * frames * targets,
+                                                  NULL, frames * targets)));
     (void)json_array_append_new(channels,
                                 json_pack("{s:I, s:{s:I, s:s}}", "sampler", (json_int_t)i + 1,
                                           "target", "node", nodes[i], "path", "weights"));

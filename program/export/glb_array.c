@@ -19,7 +19,7 @@ typedef struct layout {
 } layout;
 
 static layout layout_of(const glb *g, glb_kind kind) {
-  enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_INT = 5125, FLOAT };
+  enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT = 5125, FLOAT };
   enum { VERTICES = 34962, CORNERS };
   const bool plain = g->options->plain;
   switch (kind) {
@@ -27,8 +27,11 @@ static layout layout_of(const glb *g, glb_kind kind) {
     return (layout){"SCALAR", 1, 4, UNSIGNED_INT, 0, CORNERS};
   case GLB_COLOURS:
     return (layout){"VEC4", 4, 4, UNSIGNED_BYTE, 0, VERTICES};
-  case GLB_NUMBERS:
+  case GLB_TIMES:
     return (layout){"SCALAR", 1, 4, FLOAT, 0, 0};
+  case GLB_WEIGHTS:
+    return plain ? (layout){"SCALAR", 1, 4, FLOAT, 0, 0}
+                 : (layout){"SCALAR", 1, 2, UNSIGNED_SHORT, UINT16_MAX, 0};
   case GLB_ROTATIONS:
     return (layout){"VEC4", 4, 16, FLOAT, 0, 0};
   case GLB_PLACES:
@@ -41,22 +44,26 @@ static layout layout_of(const glb *g, glb_kind kind) {
 }
 
 /* Return the rows as they are stored; the caller frees them. Return NULL if out of memory. */
-static unsigned char *store(glb_kind kind, const layout *l, const void *rows, size_t count) {
+static unsigned char *store(glb_kind kind, const layout *l, const void *rows, const uint32_t *order,
+                            size_t count) {
   unsigned char *stored = calloc(count + 1, l->stride);
-  if (stored == NULL || l->limit == 0) {
-    return stored == NULL ? NULL : memcpy(stored, rows, count * l->stride);
-  }
-  const float *values = rows;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; stored != NULL && i < count; ++i) {
     unsigned char *row = stored + i * l->stride;
-    if (kind == GLB_NORMALS) {
-      supine_export_pack_direction(values + 3 * i, l->stride, row);
+    const size_t from = order != NULL ? order[i] : i;
+    const float *values = (const float *)rows + l->columns * from;
+    if (l->limit == 0) {
+      memcpy(row, (const unsigned char *)rows + from * l->stride, l->stride);
       continue;
     }
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const double value = (double)values[3 * i + axis] * (kind == GLB_PLACES ? 1 : l->limit);
-      const int16_t counts = (int16_t)rint(fmax(-l->limit, fmin(l->limit, value)));
-      memcpy(row + axis * l->stride / 4, &counts, l->stride / 4); /* the low byte is first */
+    if (kind == GLB_NORMALS) {
+      supine_export_pack_direction(values, l->stride, row);
+      continue;
+    }
+    for (size_t k = 0; k < l->columns; ++k) {
+      const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
+      const double value = (double)values[k] * (kind == GLB_PLACES ? 1 : l->limit);
+      const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
+      memcpy(row + k * bytes, &counts, bytes); /* the low byte is first */
     }
   }
   return stored;
@@ -70,6 +77,7 @@ static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned
   export_packed packed = {0};
   if (mode == NULL) {
     (void)fwrite(stored, 1, bytes, g->numbers);
+    (void)fwrite("\0\0\0", 1, -bytes % 4, g->numbers);
     return json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", begin, "byteLength",
                      (json_int_t)bytes);
   }
@@ -114,33 +122,44 @@ static void set_bounds(json_t *accessor, const layout *l, const unsigned char *s
   (void)json_object_set_new(accessor, "max", supine_template_numbers(high, l->columns));
 }
 
-json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, size_t count) {
+json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count) {
   const layout l = layout_of(g, kind);
-  const bool number = kind == GLB_NUMBERS || kind == GLB_ROTATIONS;
-  unsigned char *stored = store(kind, &l, rows, count);
+  (void)json_array_append_new(g->accessors,
+                              json_pack("{s:i, s:I, s:s}", "componentType", l.component, "count",
+                                        (json_int_t)count, "type", l.type));
+  const size_t at = json_array_size(g->accessors) - 1;
+  if (kind == GLB_COLOURS || (l.limit != 0 && kind != GLB_PLACES)) {
+    (void)json_object_set_new(json_array_get(g->accessors, at), "normalized", json_true());
+  }
+  return (json_int_t)at;
+}
+
+json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
+                                 size_t count) {
+  const layout l = layout_of(g, kind);
+  unsigned char *stored = store(kind, &l, rows, order, count);
   if (stored == NULL) {
     g->status = SUPINE_ERROR_MEMORY;
     return 0;
   }
   json_t *view = write_rows(g, kind, &l, stored, count,
-                            g->options->plain || number ? NULL
-                            : kind == GLB_CORNERS       ? "TRIANGLES"
-                                                        : "ATTRIBUTES");
+                            g->options->plain || l.target == 0 ? NULL
+                            : kind == GLB_CORNERS              ? "TRIANGLES"
+                                                               : "ATTRIBUTES");
   if (l.target != 0) {
     (void)json_object_set_new(view, "target", json_integer(l.target));
   }
-  if (l.limit != 0) {
+  if (l.limit != 0 && l.target != 0) {
     (void)json_object_set_new(view, "byteStride", json_integer((json_int_t)l.stride));
   }
-  json_t *accessor =
-      json_pack("{s:I, s:i, s:I, s:s, s:b}", "bufferView", (json_int_t)json_array_size(g->views),
-                "componentType", l.component, "count", (json_int_t)count, "type", l.type,
-                "normalized", kind == GLB_COLOURS || (l.limit != 0 && kind != GLB_PLACES));
-  if (kind == GLB_PLACES || kind == GLB_NUMBERS) {
+  const json_int_t at = supine_export_glb_put_zeros(g, kind, count);
+  json_t *accessor = json_array_get(g->accessors, (size_t)at);
+  (void)json_object_set_new(accessor, "bufferView",
+                            json_integer((json_int_t)json_array_size(g->views)));
+  if (kind == GLB_PLACES || kind == GLB_TIMES) {
     set_bounds(accessor, &l, stored, count);
   }
   (void)json_array_append_new(g->views, view);
-  (void)json_array_append_new(g->accessors, accessor);
   free(stored);
-  return (json_int_t)json_array_size(g->accessors) - 1;
+  return at;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Write the extras of a glTF file: formulas and constants from which its reader computes weights.
  */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -15,10 +16,9 @@ static const char frame_text[] =
     "the head, z to the front, and the node 'patient' lays the patient down.";
 static const char weights_text[] =
     "weight[j] = (gain v - offset[j]) / unit[j] with the lung's offset and unit, where v = v[k] = "
-    "sum "
-    "over i of modes[k][i] * Y[i](g) and the gain is s for j = k < K, t for j = K + k. g: unit "
-    "vector "
-    "of gravity in the patient's axes (supine 0,1,0). Y: real spherical harmonics, orthonormal, no "
+    "modeUnit * the sum over i of modes[k][i] * Y[i](g), and the gain is s for j = k < K, t for "
+    "j = K + k. g: unit vector of gravity in the patient's axes (supine 0,1,0). Y: real spherical "
+    "harmonics, orthonormal, no "
     "Condon-Shortley phase, index l*l+l+m, m < 0 the sine terms: Y[0] = 0.28209479, Y[1..3] = "
     "0.48860251 * (y, z, x). The displacement along axis a is that of the modes times A[a] = s + t "
     "* "
@@ -73,14 +73,19 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double largest_move) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
+  const double unit = 1e-7; /* of modes: integers take half the space of printed fractions */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
-    (void)json_array_append_new(modes, supine_template_numbers(s->modes + k * s->terms, s->terms));
+    json_t *row = json_array();
+    for (size_t i = 0; i < s->terms; ++i) {
+      (void)json_array_append_new(row, json_integer(llround(s->modes[k * s->terms + i] / unit)));
+    }
+    (void)json_array_append_new(modes, row);
   }
   json_t *supine =
-      json_pack("{s:s, s:s, s:i, s:o, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
-                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "bend",
-                supine_template_numbers(s->info->bend, 3), "middle",
+      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
+                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit",
+                unit, "bend", supine_template_numbers(s->info->bend, 3), "middle",
                 supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
                 s->info->has_volume ? "breathVolume" : "breathScale",
                 s->info->has_volume ? g->options->breath.volume : g->options->breath.scale,

@@ -23,6 +23,7 @@ typedef struct inside {
   uint32_t *corners;         /* [M, 3], lung by lung, then part by part */
   unsigned char *point;      /* [content's N] 1 for a vertex that is in no triangle, else 0 */
   uint32_t *first;           /* [content's N] index in `vertices` of each vertex, or of its ball */
+  uint32_t *order;           /* [N] 0, 1, 2 ... */
   size_t parts;
   size_t begin[SUPINE_LUNGS_MAX * PARTS_MAX + 1]; /* first corner of each lung and part */
 } inside;
@@ -149,8 +150,9 @@ static bool make(const export_source *content, const export_parts *parts, inside
   in->normals = malloc(3 * m * sizeof *in->normals);
   in->coefficients = malloc(3 * m * content->info->mode_count * sizeof *in->coefficients);
   in->corners = malloc(3 * triangles * sizeof *in->corners);
+  in->order = malloc(m * sizeof *in->order);
   if (m > UINT32_MAX || in->vertices == NULL || in->normals == NULL || in->coefficients == NULL ||
-      in->corners == NULL) {
+      in->corners == NULL || in->order == NULL) {
     return false;
   }
   for (size_t i = 0, at = 0, lung = 0; i <= n; ++i) {
@@ -161,6 +163,9 @@ static bool make(const export_source *content, const export_parts *parts, inside
       in->first[i] = (uint32_t)at;
       at += in->point[i] ? BALL_VERTICES : 1;
     }
+  }
+  for (size_t i = 0; i < m; ++i) {
+    in->order[i] = (uint32_t)i;
   }
   in->info = *content->info;
   in->info.vertex_count = m;
@@ -201,7 +206,7 @@ static void add_shapes(glb *g, const inside *in, size_t *count, json_int_t *node
     }
     char name[80];
     (void)snprintf(name, sizeof name, "inside %s lung", g->source->info->lung_names[lung]);
-    const glb_shape shape = {name, &in->source, lung,    in->normals,  NULL,
+    const glb_shape shape = {name, &in->source, lung,    in->order,    in->normals, NULL,
                              NULL, in->parts,   corners, corner_count, material};
     if (in->lung_begin[lung] < in->lung_begin[lung + 1] && g->status == SUPINE_OK) {
       lungs[*count] = lung;
@@ -224,6 +229,7 @@ void supine_export_glb_inside(glb *g, size_t *count, json_int_t *nodes, size_t *
     free(in->corners);
     free(in->point);
     free(in->first);
+    free(in->order);
   }
   free(in);
 }

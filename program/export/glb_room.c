@@ -35,12 +35,12 @@ static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2]
     }
   }
   const json_int_t material = supine_export_glb_material(g, name, rgb, 1);
-  const json_int_t indices = supine_export_glb_put(g, GLB_CORNERS, corners, at);
+  const json_int_t indices = supine_export_glb_put(g, GLB_CORNERS, corners, NULL, at);
   return supine_export_glb_show(
       g, name,
       json_pack("{s:[{s:{s:I}, s:I, s:I}]}", "primitives", "attributes", "POSITION",
-                supine_export_glb_put(g, GLB_PLACES, places, RINGS * sides), "indices", indices,
-                "material", material));
+                supine_export_glb_put(g, GLB_PLACES, places, NULL, RINGS * sides), "indices",
+                indices, "material", material));
 }
 
 json_t *supine_export_glb_room(glb *g) {

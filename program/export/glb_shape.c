@@ -55,12 +55,12 @@ static void place_base(const glb *g, const glb_shape *shape, const double *rest,
   }
 }
 
-/* Append the positions of target `j` of a shape, or of the base if `j` is the number of targets. */
+/* Append the positions of target `j` of a shape, or of the base if `j` is the number of targets.
+ * `xyz` is workspace, [N, 3]. */
 static json_int_t put_places(glb *g, const glb_shape *shape, size_t j, const double *rest,
                              float *xyz) {
-  const size_t first = shape->source->info->lung_begin[shape->lung];
-  const size_t end = shape->source->info->lung_begin[shape->lung + 1];
-  for (size_t i = first; i < end; ++i) {
+  const size_t *begin = shape->source->info->lung_begin + shape->lung;
+  for (size_t i = begin[0]; i < begin[1]; ++i) {
     double at[3];
     if (j < g->targets.count) {
       place_target(g, shape, j, i, at);
@@ -68,10 +68,24 @@ static json_int_t put_places(glb *g, const glb_shape *shape, size_t j, const dou
       place_base(g, shape, rest, i, at);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
-      xyz[3 * (i - first) + axis] = (float)at[axis];
+      xyz[3 * i + axis] = (float)at[axis];
     }
   }
-  return supine_export_glb_put(g, GLB_PLACES, xyz, end - first);
+  return supine_export_glb_put(g, GLB_PLACES, xyz, shape->order + begin[0], begin[1] - begin[0]);
+}
+
+/* Append what target `j` adds to the normals. */
+static json_int_t put_changes(glb *g, const glb_shape *shape, size_t j) {
+  const supine_basis_info *info = shape->source->info;
+  const size_t *begin = info->lung_begin + shape->lung;
+  const float *added = shape->added + 3 * j * info->vertex_count;
+  for (size_t i = 3 * begin[0]; i < 3 * begin[1]; ++i) {
+    if (added[i] != 0) {
+      return supine_export_glb_put(g, GLB_CHANGES, added, shape->order + begin[0],
+                                   begin[1] - begin[0]);
+    }
+  }
+  return supine_export_glb_put_zeros(g, GLB_CHANGES, begin[1] - begin[0]);
 }
 
 /* Append the triangles of a part, renumbered from the shape's first vertex. */
@@ -83,7 +97,7 @@ static json_int_t put_corners(glb *g, const glb_shape *shape, size_t part) {
     corners[i] = shape->corners[part][i] - (uint32_t)shape->source->info->lung_begin[shape->lung];
   }
   if (corners != NULL) {
-    at = supine_export_glb_put(g, GLB_CORNERS, corners, count);
+    at = supine_export_glb_put(g, GLB_CORNERS, corners, NULL, count);
   } else {
     g->status = SUPINE_ERROR_MEMORY;
   }
@@ -95,7 +109,8 @@ json_int_t supine_export_glb_add(glb *g, const glb_shape *shape) {
   const supine_basis_info *info = shape->source->info;
   const size_t first = info->lung_begin[shape->lung];
   const size_t n = info->lung_begin[shape->lung + 1] - first;
-  float *xyz = malloc(3 * n * sizeof *xyz);
+  const uint32_t *order = shape->order + first;
+  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   json_t *targets = json_array();
   json_t *weights = json_array();
   json_t *primitives = json_array();
@@ -109,10 +124,7 @@ json_int_t supine_export_glb_add(glb *g, const glb_shape *shape) {
   for (size_t j = 0; g->status == SUPINE_OK && j < g->targets.count; ++j) {
     json_t *target = json_pack("{s:I}", "POSITION", put_places(g, shape, j, rest, xyz));
     if (shape->added != NULL) {
-      (void)json_object_set_new(
-          target, "NORMAL",
-          json_integer(supine_export_glb_put(
-              g, GLB_CHANGES, shape->added + 3 * (j * info->vertex_count + first), n)));
+      (void)json_object_set_new(target, "NORMAL", json_integer(put_changes(g, shape, j)));
     }
     (void)json_array_append_new(targets, target);
     (void)json_array_append_new(weights, json_real(rest[j]));
@@ -122,12 +134,12 @@ json_int_t supine_export_glb_add(glb *g, const glb_shape *shape) {
                               json_integer(put_places(g, shape, g->targets.count, rest, xyz)));
     (void)json_object_set_new(
         attributes, "NORMAL",
-        json_integer(supine_export_glb_put(g, GLB_NORMALS, shape->normals + 3 * first, n)));
+        json_integer(supine_export_glb_put(g, GLB_NORMALS, shape->normals, order, n)));
   }
   if (g->status == SUPINE_OK && shape->colours != NULL) {
     (void)json_object_set_new(
         attributes, "COLOR_0",
-        json_integer(supine_export_glb_put(g, GLB_COLOURS, shape->colours + 4 * first, n)));
+        json_integer(supine_export_glb_put(g, GLB_COLOURS, shape->colours, order, n)));
   }
   for (size_t part = 0; g->status == SUPINE_OK && part < shape->parts; ++part) {
     if (shape->corner_count[part] > 0) {

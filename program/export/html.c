@@ -23,8 +23,7 @@ typedef struct page {
   double place_unit;  /* mm per count of a position */
   double unit;        /* mm per count of a coefficient, for directions of unit length */
   double inside_unit; /* mm per count of a coefficient of the content */
-  uint32_t *corners;  /* vertex indices of the triangles, lung by lung */
-  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /* first corner of each lung, and the end */
+  export_order order; /* of the lungs' vertices and triangles */
   supine_status *status;
 } page;
 
@@ -109,7 +108,7 @@ static void write_rows(const page *p, FILE *file, const char *name, const export
   int16_t *rows = calloc(n * stride, sizeof *rows);
   if (rows != NULL) {
     for (size_t i = 0; i < n; ++i) {
-      fill(p, s, i, rows + i * stride);
+      fill(p, s, s == p->source ? p->order.vertex[i] : i, rows + i * stride);
     }
     status = supine_export_pack_rows(rows, n, stride * sizeof *rows, &packed);
   }
@@ -265,7 +264,7 @@ static json_t *describe(const page *p) {
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
       (json_int_t)info->band, "lungBegin", begins(p->source, info->lung_begin), "cornerBegin",
-      begins(p->source, p->corner_begin), "hasVolume", (int)info->has_volume, "hasResting",
+      begins(p->source, p->order.corner_begin), "hasVolume", (int)info->has_volume, "hasResting",
       (int)(p->source->info->has_rest), "colours", colours(), "breathVolume", breath->volume,
       "breathLargest", breath->largest, "breathScale", breath->scale, "metadata", metadata, "title",
       title != NULL ? title : json_string("lungs"), "middle", supine_template_numbers(p->middle, 3),
@@ -287,7 +286,7 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
   write_rows(p, file, "vertices", s, 3, place_row);
   write_rows(p, file, "direction", s, 4, direction_row);
   write_rows(p, file, "coefficients", s, k, coefficient_row);
-  write_corners(p, file, "triangles", s, p->corners);
+  write_corners(p, file, "triangles", s, p->order.corners);
   if (s->info->normal_count > 0) {
     write_rows(p, file, "normals", s, (s->info->normal_count + 2) / 3 * 9, normal_row);
   }
@@ -318,9 +317,10 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
   if (status != SUPINE_OK) {
     return status;
   }
-  p.corners = supine_export_pack_order(source, p.corner_begin);
-  if (p.corners == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the page");
+  status = supine_export_order_make(source, true, &p.order, error);
+  if (status != SUPINE_OK) {
+    supine_export_order_free(&p.order);
+    return status;
   }
   find_units(&p);
   json_t *description = describe(&p);
@@ -332,7 +332,7 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
   free(text);
   json_decref(data);
   json_decref(description);
-  free(p.corners);
+  supine_export_order_free(&p.order);
   return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for the page");
 }
 

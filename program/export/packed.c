@@ -15,7 +15,8 @@
   EACH(meshopt_, encodeIndexBufferBound)                                                           \
   EACH(meshopt_, encodeIndexVersion)                                                               \
   EACH(meshopt_, encodeFilterOct)                                                                  \
-  EACH(meshopt_, optimizeVertexCache)
+  EACH(meshopt_, spatialSortTriangles)                                                             \
+  EACH(meshopt_, optimizeVertexCacheStrip)
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
 supine_status supine_export_pack_begin(supine_error *error) {
@@ -53,22 +54,84 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
   return SUPINE_OK;
 }
 
-uint32_t *supine_export_pack_order(const export_source *source, size_t *begin) {
+/* Sort a lung's triangles from feet to head, then in strips: neighbours along a strip around the
+ * long axis differ least. `from` [corners] and `level` [N, 3] are workspace; level holds (z, 0, 0).
+ */
+static void sort_triangles(uint32_t *corners, size_t count, const float *level, size_t vertices,
+                           uint32_t *from) {
+  memcpy(from, corners, count * sizeof *from);
+  meshopt.spatialSortTriangles(corners, from, count, level, vertices, 3 * sizeof *level);
+  meshopt.optimizeVertexCacheStrip(corners, corners, count, vertices);
+}
+
+/* Number the vertices of a lung by their first corner, those in no triangle last, and its corners
+ * likewise. `place` is workspace, [N]. */
+static void number_vertices(const export_source *source, size_t lung, uint32_t *place,
+                            export_order *order) {
+  const size_t *begin = source->info->lung_begin + lung;
+  uint32_t next = (uint32_t)begin[0];
+  for (size_t v = begin[0]; v < begin[1]; ++v) {
+    place[v] = UINT32_MAX;
+  }
+  for (size_t i = order->corner_begin[lung]; i < order->corner_begin[lung + 1]; ++i) {
+    uint32_t *at = &place[order->corners[i]];
+    if (*at == UINT32_MAX) {
+      order->vertex[next] = order->corners[i];
+      *at = next++;
+    }
+    order->corners[i] = *at;
+  }
+  for (size_t v = begin[0]; v < begin[1]; ++v) {
+    if (place[v] == UINT32_MAX) {
+      order->vertex[next++] = (uint32_t)v;
+    }
+  }
+}
+
+supine_status supine_export_order_make(const export_source *source, bool packed,
+                                       export_order *order, supine_error *error) {
   const supine_basis_info *info = source->info;
-  uint32_t *corners = malloc(3 * info->triangle_count * sizeof *corners + 1);
+  uint32_t *place = malloc(info->vertex_count * sizeof *place);
+  uint32_t *from = malloc(3 * info->triangle_count * sizeof *from + 1);
+  float *level = calloc(3 * info->vertex_count, sizeof *level);
   size_t at = 0;
-  for (size_t lung = 0; corners != NULL && lung < info->lung_count; ++lung) {
-    begin[lung] = at;
+  order->vertex = malloc(info->vertex_count * sizeof *order->vertex);
+  order->corners = malloc(3 * info->triangle_count * sizeof *order->corners + 1);
+  supine_status status = SUPINE_OK;
+  if (place == NULL || from == NULL || level == NULL || order->vertex == NULL ||
+      order->corners == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+    goto cleanup;
+  }
+  for (size_t v = 0; v < info->vertex_count; ++v) {
+    order->vertex[v] = (uint32_t)v;
+    level[3 * v] = source->vertices[3 * v + 2];
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    uint32_t *corners = order->corners + at;
+    order->corner_begin[lung] = at;
     for (size_t t = 0; t < info->triangle_count; ++t) {
       const uint32_t *corner = source->triangles + 3 * t;
       if (corner[0] >= info->lung_begin[lung] && corner[0] < info->lung_begin[lung + 1]) {
-        memcpy(corners + at, corner, 3 * sizeof *corner);
+        memcpy(order->corners + at, corner, 3 * sizeof *corner);
         at += 3;
       }
     }
-    meshopt.optimizeVertexCache(corners + begin[lung], corners + begin[lung], at - begin[lung],
-                                info->vertex_count);
+    order->corner_begin[lung + 1] = at;
+    if (packed) {
+      sort_triangles(corners, at - order->corner_begin[lung], level, info->vertex_count, from);
+      number_vertices(source, lung, place, order);
+    }
   }
-  begin[info->lung_count] = at;
-  return corners;
+cleanup:
+  free(place);
+  free(from);
+  free(level);
+  return status;
+}
+
+void supine_export_order_free(export_order *order) {
+  free(order->vertex);
+  free(order->corners);
+  *order = (export_order){0};
 }

@@ -31,9 +31,19 @@ supine_status supine_export_pack_rows(const void *rows, size_t count, size_t str
 supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, size_t vertices,
                                          export_packed *packed);
 
-/** Return the corners of the triangles lung by lung, in an order that compresses well, or NULL if
- * out of memory. The caller frees them.
- * @param begin  [lungs + 1] first corner of each lung and the end; output */
-uint32_t *supine_export_pack_order(const export_source *source, size_t *begin);
+/** Order in which vertices and triangles are written, lung by lung. */
+typedef struct export_order {
+  uint32_t *vertex;  /**< [N] index in the basis of each vertex written */
+  uint32_t *corners; /**< [M, 3] triangles, as indices of vertices written */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< first corner of each lung, and the end */
+} export_order;
+
+/** Choose an order; release it with supine_export_order_free, also after a failure.
+ * @param packed  order triangles, and vertices by their first triangle, so that they compress well
+ *                (supine_export_pack_begin must have been called); else keep the basis' order
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_export_order_make(const export_source *source, bool packed,
+                                       export_order *order, supine_error *error);
+void supine_export_order_free(export_order *order);
 
 #endif

@@ -155,7 +155,7 @@ static void find_normals(const export_source *source, const export_targets *targ
  * the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* smallest length to divide by; limits what targets add */
+  static const double least = 0.044; /* smallest length to divide by; limits what targets add */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -173,12 +173,42 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
+/* Round what targets add to normals to bytes, and keep the value of the vertex written before where
+ * that is near, because equal rows compress to nearly nothing; correct the base so that the normals
+ * at `weights` stay the same. */
+static void round_changes(const export_source *source, const export_targets *targets,
+                          double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
+                          float *added) {
+  static const float near = 2; /* in steps of a byte */
+  const supine_basis_info *info = source->info;
+  for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
+    lung += i == info->lung_begin[lung + 1];
+    float *b = base + 3 * (size_t)order[i];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t j = 0; j < targets->count; ++j) {
+        float *rows = added + 3 * j * info->vertex_count + axis;
+        const float given = rows[3 * (size_t)order[i]];
+        const float before = i > info->lung_begin[lung] ? rows[3 * (size_t)order[i - 1]] : 2;
+        const float own = rintf(INT8_MAX * fmaxf(-1, fminf(1, given))) / INT8_MAX;
+        const float kept = fabsf(given - before) <= near / INT8_MAX ? before : own;
+        b[axis] += (float)weights[lung][j] * (given - kept);
+        rows[3 * (size_t)order[i]] = kept;
+      }
+    }
+    const float length = hypotf(hypotf(b[0], b[1]), b[2]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      b[axis] /= length;
+    }
+  }
+}
+
 supine_status supine_export_targets_normals(const export_source *source,
                                             const export_breath *breath,
-                                            const export_targets *targets, float *base,
-                                            float *added, supine_error *error) {
+                                            const export_targets *targets, const uint32_t *order,
+                                            float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2;
+  static const double least = 0.044; /* radians, 2.5 degrees */
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);
@@ -202,15 +232,24 @@ supine_status supine_export_targets_normals(const export_source *source,
     find_normals(source, targets, weights, j, step, xyz, d);
     find_normals(source, targets, weights, j, -step, xyz, below);
     for (size_t lung = 0; lung < source->info->lung_count; ++lung) {
-      const float weight = (float)weights[lung][j];
-      for (size_t i = 3 * source->info->lung_begin[lung];
-           i < 3 * source->info->lung_begin[lung + 1]; ++i) {
+      const size_t begin = 3 * source->info->lung_begin[lung];
+      const size_t end = 3 * source->info->lung_begin[lung + 1];
+      double sum = 0;
+      for (size_t i = begin; i < end; ++i) {
         d[i] = (d[i] - below[i]) / (float)(2 * step);
-        base[i] -= weight * d[i];
+        sum += (double)d[i] * (double)d[i];
+      }
+      const bool seen = sum > least * least * (double)(end - begin) / 3;
+      for (size_t i = begin; i < end; ++i) {
+        d[i] = seen ? d[i] : 0;
+        base[i] -= (float)weights[lung][j] * d[i];
       }
     }
   }
   make_unit(source, targets, base, added);
+  if (order != NULL) {
+    round_changes(source, targets, weights, order, base, added);
+  }
 cleanup:
   free(weights);
   free(xyz);

@@ -46,11 +46,14 @@ void supine_export_targets_base(const export_source *source, const export_target
                                 size_t lung, size_t vertex, double xyz[3]);
 
 /** Compute unit normals of the base, [N, 3], and what each target adds to them at weight 1, [count,
- * N, 3], by linearising the surface's normals at supine, at rest.
+ * N, 3], by linearising the surface's normals at supine, at rest; 0 where that is below 2.5
+ * degrees (RMS over a lung).
+ * @param order  [N] order in which vertices are written, to round what targets add so that it
+ *               compresses well; NULL: do not round
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_targets_normals(const export_source *source,
                                             const export_breath *breath,
-                                            const export_targets *targets, float *base,
-                                            float *added, supine_error *error);
+                                            const export_targets *targets, const uint32_t *order,
+                                            float *base, float *added, supine_error *error);
 
 #endif

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A headless Chromium that draws in software, and pages opened in it from disk.
 import { pathToFileURL } from 'node:url';
-import { load, skip } from './support.mjs';
+import { evaluate, inOrder, load, matchPoints, skip } from './support.mjs';
 
 const { chromium } = await load('playwright-core/index.mjs');
 if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
@@ -34,6 +34,18 @@ export async function openLungs(path, options, hash = '#posture=supine&depth=500
   await opened.page.waitForFunction(() => window.supine?.panes().length > 0);
   await opened.page.evaluate(() => { document.getElementById('more').open = true; });
   return opened;
+}
+
+/** What the C evaluator makes of [gravity, mL] pairs, as evaluate() of support.mjs, in the page's order of vertices. */
+export async function evaluateFor(page, basis, pairs) {
+  const order = await orderOf(page, basis);
+  return evaluate(basis, pairs).map(({ scale, xyz }) => ({ scale, xyz: inOrder(xyz, order) }));
+}
+
+/** The index in the basis of each vertex of the page, which orders them so that they compress well. */
+export async function orderOf(page, basis) {
+  const rest = await page.evaluate(() => Array.from(window.supine.positions([0, 1, 0], 0)));
+  return matchPoints(rest, evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, 0.1);
 }
 
 /** Presses a key on the picture, which alone listens to letters and digits. */

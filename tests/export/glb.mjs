@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import {
-  evaluate, folder, largestDistance, load, loadCommon, randomDirections, randomSource, supine,
+  evaluate, folder, inOrder, largestDistance, load, loadCommon, matchPoints, randomDirections, randomSource, supine,
 } from './support.mjs';
 import { harmonics } from './harmonics.mjs';
 
@@ -15,7 +15,7 @@ const { GLTFLoader } = await load('three/examples/jsm/loaders/GLTFLoader.js');
 const { MeshoptDecoder } = await load('three/examples/jsm/libs/meshopt_decoder.module.js');
 
 const PLAIN_MM = 0.001;
-const COUNTS_MM = 0.04; // base and targets are in counts of 0.02 mm
+const COUNTS_MM = 0.1; // base and targets are in counts of 0.045 mm
 const PRINTED_MM = 0.001; // of a table's numbers
 const BREATH = 1000; // mL
 
@@ -73,7 +73,7 @@ function gainsFor(form, bend, rest, mL) {
 /** Each lung's weights and s for a gravity and mL above rest, as the extras say. */
 function weightsFor(extras, lungs, gravity, mL) {
   const [y, y2] = [harmonics(extras.band, gravity), harmonics(2, gravity)];
-  const v = extras.modes.map((row) => dot(row, y));
+  const v = extras.modes.map((row) => extras.modeUnit * dot(row, y));
   const own = lungs.map((lung) => lung.userData.supine);
   const forms = own.map((lung) => volumeForm(lung, v));
   const rests = own.map((lung) => dot(lung.resting ?? [0], y2));
@@ -145,7 +145,9 @@ async function check(basis, words, tolerance) {
   const random = randomSource(77);
   const pairs = randomDirections(10, 20241).map((g, i) => [g, i % 2 ? BREATH * random() : BREATH]);
   const truth = evaluate(basis, [[[0, 1, 0], 0], ...pairs]);
-  let worst = largestDistance(together(lungs, extras), truth[0].xyz); // weights as stored: supine at rest
+  // Weights as stored: supine at rest.
+  const order = words.includes('--plain') ? truth[0].xyz.map((_, i) => i).slice(0, truth[0].xyz.length / 3) : matchPoints(together(lungs, extras), truth[0].xyz, tolerance);
+  let worst = largestDistance(together(lungs, extras), inOrder(truth[0].xyz, [...order]));
   const rest = lungs.flatMap((lung) => normalErrors(lung, extras));
   assert.ok(Math.max(...rest) < 2 && mean(rest) < 0.6, `normals at rest are ${Math.max(...rest)} degrees off, ${mean(rest)} in the mean`);
   const angles = [];
@@ -154,13 +156,14 @@ async function check(basis, words, tolerance) {
     assert.ok(Math.abs(wanted[0].s / truth[i + 1].scale - 1) < 1e-6, `${wanted[0].s}, not ${truth[i + 1].scale}`);
     for (const { weights } of wanted) assert.ok(weights.every((w) => w >= 0 && w <= 1), `weights ${weights}`);
     setWeights(lungs, wanted.map(({ weights }) => weights));
-    worst = Math.max(worst, largestDistance(together(lungs, extras), truth[i + 1].xyz));
+    worst = Math.max(worst, largestDistance(together(lungs, extras), inOrder(truth[i + 1].xyz, [...order])));
     if (mL === BREATH) angles.push(...lungs.flatMap((lung) => normalErrors(lung, extras)));
   });
   console.log(`${words.join(' ')}: ${lungs[0].morphTargetInfluences.length} targets, ${statSync(path).size} bytes, ${worst.toExponential(2)} mm, normals at ${BREATH} mL ${mean(angles).toFixed(2)} degrees mean, ${at95(angles).toFixed(2)} at the 95th percentile`);
   assert.ok(largestDistance(truth[0].xyz, truth[1].xyz) > 100 * tolerance, 'nothing moved, so nothing was tested');
   assert.ok(worst < tolerance, `${words.join(' ')}: ${worst} mm off`);
-  assert.ok(mean(angles) < 1 && at95(angles) < 3, 'normals are off');
+  const least = words.includes('--plain') ? 1 : 1.25; // the others are rounded to bytes and thinned out
+  assert.ok(mean(angles) < least && at95(angles) < 3, 'normals are off');
 }
 
 /** The clips play: each posture has one, with gravity down and the lungs where the library puts them. */
@@ -169,6 +172,7 @@ async function checkAnimations(basis) {
   supine('export', basis, '-o', path, '--animate');
   await validate(path);
   const { gltf, lungs, extras } = await open(path);
+  const order = matchPoints(together(lungs, extras), evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, COUNTS_MM);
   assert.deepEqual(gltf.animations.map((clip) => clip.name), ['turning', 'supine', 'left side', 'prone', 'right side']);
   // All are at the top of a 500 mL breath at 1.5 s; the first lies on the back then, on the belly at 13.5 s.
   for (const [clip, seconds, gravity] of [[0, 1.5, [0, 1, 0]], [0, 13.5, [0, -1, 0]], [1, 1.5, [0, 1, 0]], [2, 1.5, [1, 0, 0]], [3, 1.5, [0, -1, 0]], [4, 1.5, [-1, 0, 0]]]) {
@@ -181,7 +185,7 @@ async function checkAnimations(basis) {
     const box = new three.Box3().setFromObject(gltf.scene.getObjectByName('patient'), true);
     assert.ok(box.getCenter(new three.Vector3()).length() < 0.06, 'the lungs are not about the origin'); // smaller than at full
     assert.ok(box.min.y > new three.Box3().setFromObject(gltf.scene.getObjectByName('table')).max.y, 'the lungs are not above the table');
-    const off = largestDistance(together(lungs, extras), evaluate(basis, [[gravity, 500]])[0].xyz);
+    const off = largestDistance(together(lungs, extras), inOrder(evaluate(basis, [[gravity, 500]])[0].xyz, order));
     assert.ok(off < COUNTS_MM, `${gltf.animations[clip].name} at ${seconds} s: ${off} mm off`);
     mixer.stopAllAction();
   }

@@ -4,8 +4,8 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs as open, picture, press } from './browser.mjs';
-import { evaluate, folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
+import { browser, evaluateFor, openLungs as open, picture, press } from './browser.mjs';
+import { folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.02; // of counts of 16 bits
 
@@ -13,8 +13,7 @@ const TOLERANCE_MM = 0.02; // of counts of 16 bits
 async function checkPositions(page, basis, volume) {
   const random = randomSource(5);
   const pairs = randomDirections(10, 999).map((g) => [g, volume * (0.1 + 0.9 * random())]);
-  const truth = evaluate(basis, pairs);
-  const rest = evaluate(basis, [[[0, 1, 0], 0]])[0].xyz;
+  const [{ xyz: rest }, ...truth] = await evaluateFor(page, basis, [[[0, 1, 0], 0], ...pairs]);
   let worst = 0;
   for (const [i, [g, mL]] of pairs.entries()) {
     const found = await page.evaluate(([gravity, depth]) => Array.from(window.supine.positions(gravity, depth)), [g, mL]);
@@ -127,7 +126,7 @@ supine('export', bases[2], '-o', html, '--scale', '8');
 const { page: opened, complaints: last } = await open(html);
 const [scale, found] = await opened.evaluate(() => [
   window.supine.moment([0, 1, 0], 8).gains[0], Array.from(window.supine.positions([0, 1, 0], 8))]);
-const [moved, rest] = evaluate(bases[2], [[[0, 1, 0], scale], [[0, 1, 0], 0]]);
+const [moved, rest] = await evaluateFor(opened, bases[2], [[[0, 1, 0], scale], [[0, 1, 0], 0]]);
 assert.ok(largestDistance(found, moved.xyz) < TOLERANCE_MM);
 assert.ok(Math.abs(largestDistance(found, rest.xyz) - 8) < TOLERANCE_MM);
 assert.match(await opened.locator('#depth-value').textContent(), /mm/);

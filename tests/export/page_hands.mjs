@@ -5,9 +5,9 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, picture, settled, press } from './browser.mjs';
+import { browser, evaluateFor, openLungs, orderOf, picture, settled, press } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
-import { evaluate, folder, supine } from './support.mjs';
+import { folder, inOrder, supine } from './support.mjs';
 
 const PROBE_MM = 0.06; // of a distance written with one digit
 const state = (page, name) => page.evaluate((key) => window.supine.state[key], name);
@@ -117,7 +117,7 @@ async function checkProbes(page) {
     return [s.probes, [...document.querySelectorAll('#probes li span')].map((e) => e.textContent), document.getElementById('probes-text').textContent, s.probes.map((v) => b.lungNames[b.lungBegin.findLastIndex((begin) => v >= begin)])];
   });
   const depth = await state(page, 'depth');
-  const [now, rest] = evaluate(basis, [[[0, -1, 0], depth], [[0, 1, 0], 0]]);
+  const [now, rest] = await evaluateFor(page, basis, [[[0, -1, 0], depth], [[0, 1, 0], 0]]);
   const at = ({ xyz }, v) => Array.from(xyz.slice(3 * v, 3 * v + 3));
   const apart = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
   probes.forEach((v, i) => {
@@ -183,13 +183,14 @@ async function checkArrow(page) {
 
 /** What the page writes, the program reads: the same direction. */
 async function checkNotation(page) {
+  const order = await orderOf(page, basis);
   for (const gravity of [[0.6, 0, -0.8], [0, 0.9659258, 0.2588190], [0, -0.9396926, 0.3420201], [0, 0, -1]]) {
     const text = await page.evaluate((g) => window.supine.postureText(g), gravity);
     const moved = join(folder, 'moved.obj');
     supine('deform', basis, '--posture', text, '--volume', 'rest+200', '-o', moved);
     const said = [...readFileSync(moved, 'utf8').matchAll(/^v (\S+) (\S+) (\S+)/gm)].flatMap(([, ...v]) => v.map(Number));
     const found = await page.evaluate((g) => Array.from(window.supine.positions(g, 200)), gravity);
-    const worst = said.reduce((most, x, i) => Math.max(most, Math.abs(x - found[i])), 0);
+    const worst = inOrder(Float64Array.from(said), order).reduce((most, x, i) => Math.max(most, Math.abs(x - found[i])), 0);
     assert.ok(worst < 0.05, `${text}: ${worst} mm`); // a degree of gravity moves lungs by more
   }
 }

@@ -5,9 +5,9 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { openLungs, settled } from './browser.mjs';
+import { evaluateFor, openLungs, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
-import { evaluate, folder, randomDirections, supine } from './support.mjs';
+import { folder, randomDirections, supine } from './support.mjs';
 
 const AGREE_MM = 0.051; // half of a tenth, as the page writes, and of a thousandth
 const [points, inside, html, moved, vtp] = ['nodule.csv', 'nodule.safetensors', 'numbers.html', 'nodules.csv', 'surface.vtp'].map((name) => join(folder, name));
@@ -68,7 +68,7 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
 supine('export', basis, '-o', html);
 const { page, complaints } = await openLungs(html);
 const directions = [[0, -1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, -1], [0, 0, 1], ...randomDirections(20, 41)].map((g) => g.map((x) => Number(x.toFixed(2))));
-const places = evaluate(basis, [[[0, 1, 0], 0], ...directions.map((g) => [g, 0])]).map(({ xyz }) => xyz);
+const places = (await evaluateFor(page, basis, [[[0, 1, 0], 0], ...directions.map((g) => [g, 0])])).map(({ xyz }) => xyz);
 const { lungBegin, corners, lungs } = await page.evaluate(() => { const { basis: b } = window.supine; return { lungBegin: b.lungBegin, corners: Array.from(b.corners), lungs: b.lungNames }; });
 /** mL that a lung's triangles enclose. */
 const enclosed = (xyz, lung) => {

@@ -73,6 +73,24 @@ export function evaluate(basis, pairs) {
   });
 }
 
+/** For each of `points`, [N, 3], the index of the point of `others` within `tolerance` mm: a
+ * permutation. Points are sorted into cells of 1 mm; a search visits the 27 cells around one. */
+export function matchPoints(points, others, tolerance) {
+  const cells = new Map();
+  const cellOf = (xyz, i, shift = [0, 0, 0]) => shift.map((s, k) => Math.floor(xyz[3 * i + k]) + s).join();
+  const shifts = [-1, 0, 1].flatMap((x) => [-1, 0, 1].flatMap((y) => [-1, 0, 1].map((z) => [x, y, z])));
+  const apart = (i, j) => Math.hypot(...[0, 1, 2].map((k) => points[3 * i + k] - others[3 * j + k]));
+  assert.equal(points.length, others.length);
+  for (let j = 0; j < others.length / 3; ++j) cells.set(cellOf(others, j), [...(cells.get(cellOf(others, j)) ?? []), j]);
+  const found = Array.from({ length: points.length / 3 }, (_, i) => shifts.flatMap((shift) => cells.get(cellOf(points, i, shift)) ?? []).find((j) => apart(i, j) < tolerance));
+  assert.equal(new Set(found).size, found.length);
+  assert.ok(!found.includes(undefined));
+  return found;
+}
+
+/** Points [N, 3] in another order. */
+export const inOrder = (points, order) => Float64Array.from(order.flatMap((i) => [...points.subarray(3 * i, 3 * i + 3)]));
+
 /** Largest distance between two arrays of points. */
 export function largestDistance(a, b) {
   assert.equal(a.length, b.length);
