@@ -7,10 +7,10 @@
 
 #include "program/options/command.h"
 
-/* The streams whose words are kept; the others' are dropped. */
+/* The streams that are captured; the others are discarded. */
 enum { KEPT_OUT = 1, KEPT_ERR = 2, KEPT_BOTH = 3 };
 
-/* Run "NAME WORDS..."; return the exit code, and what was printed in text [size]. */
+/* Run the command with `words`. Return its exit code, and what it printed in text [size]. */
 static inline int command_run(const supine_command *command, const char *const *words, int kept,
                               char *text, size_t size) {
   char *argv[24] = {strdup(command->name)};
@@ -43,7 +43,7 @@ static inline int command_run(const supine_command *command, const char *const *
   return code;
 }
 
-/* The same with the words as arguments, for a `text` that is an array. */
+/* Run with the words as arguments; `text` must be an array. */
 #define COMMAND_RUN(command, kept, text, ...)                                                      \
   command_run(command, (const char *const[]){__VA_ARGS__, NULL}, kept, text, sizeof(text))
 

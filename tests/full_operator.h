@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* I - A over all nodes, masses and springs, entry by entry from the definitions (3), (8): what the
- * fast solve is compared with. Shares no code with it. */
+/* Build I - A over all nodes (masses and springs) entry by entry from definitions (3) and (8), as
+ * an independent reference for the solver. */
 #ifndef SUPINE_FULL_OPERATOR_H
 #define SUPINE_FULL_OPERATOR_H
 
@@ -19,7 +19,7 @@ typedef struct full_operator {
   double *own;   /* Te[j->j] */
 } full_operator;
 
-/* Te of every pair of linked nodes, for stiffness E [N] as it stands. */
+/* Compute Te of every pair of linked nodes for stiffness E [N], without scaling E. */
 static inline full_operator full_operator_create(const supine_mesh *mesh,
                                                  const supine_topology *topology, const double *e) {
   const size_t n = mesh->vertex_count;
@@ -117,7 +117,7 @@ static inline direct_solver direct_solver_create(const full_operator *op) {
   return d;
 }
 
-/* F of the masses for one applied force. */
+/* Solve for F of the masses under one applied force. */
 static inline void direct_solver_solve(direct_solver *d, const full_operator *op, size_t masses,
                                        const double *force, double *caught) {
   for (size_t j = 0; j < op->node_count; ++j) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Two lumpy lungs whose surface moves as a formula says, as a basis file. */
+/* Write a basis of two lumpy lungs whose surface moves by a formula. */
 #ifndef SUPINE_INSIDE_HELPERS_H
 #define SUPINE_INSIDE_HELPERS_H
 
@@ -14,7 +14,7 @@
 
 enum { HELPER_MODES = 3 };
 
-/* Displacement of mode k at a point, mm: affine, quadratic, and a wave of 60 mm. */
+/* Compute the displacement of a mode at a point, mm: affine, quadratic, or a wave of 60 mm. */
 static inline void helper_motion(int mode, const double p[3], double u[3]) {
   if (mode == 0) {
     u[0] = 0.11 * p[0] - 0.07 * p[1] + 0.013 * p[2] + 2.7;
@@ -31,9 +31,9 @@ static inline void helper_motion(int mode, const double p[3], double u[3]) {
   }
 }
 
-/* Writes the basis, scanned so many mL from its surface in some posture (NULL: as it is); its
- * modes are 0.5 + 0.1 k + 0.3 y, so that every direction but one moves all.
- */
+/* Write the basis of a scan at `scan_volume` mL from the reference in posture `scan_gravity` (NULL:
+ * at the reference). The weight of mode k is 0.5 + 0.1 k + 0.3 y, so that all modes are active in
+ * almost every direction. */
 static inline void helper_write_scanned_basis(const char *path, size_t frequency, size_t lungs,
                                               const char *scan_gravity, const char *scan_volume) {
   supine_mesh mesh[2] = {helper_lump(frequency, 71.3, 3), helper_lump(frequency, -72.9, 4)};
@@ -70,7 +70,7 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
     modes[4 * k] = 0.5 + 0.1 * (double)k;
     modes[4 * k + 1] = 0.3;
   }
-  /* Volumes that grow with the scale alone; inside and surface must have the same. */
+  /* Volume forms of the scale alone; content and surface must get the same. */
   double linear[2 * HELPER_MODES];
   double quadratic[2 * HELPER_MODES * HELPER_MODES] = {0};
   double cubic[2 * HELPER_MODES * HELPER_MODES * HELPER_MODES] = {0};
@@ -112,7 +112,7 @@ static inline void helper_write_basis(const char *path, size_t frequency, size_t
   helper_write_scanned_basis(path, frequency, lungs, NULL, NULL);
 }
 
-/* Opens with the file's own numbers. */
+/* Open with the values of the file unchanged. */
 static inline supine_basis *helper_open(const char *path) {
   const supine_basis_options exact = {.size = sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Label maps made for tests: a phantom voxelised, ellipsoids. */
+/* Synthetic label maps: a voxelised phantom and two ellipsoids. */
 #ifndef SUPINE_LABELS_HELPERS_H
 #define SUPINE_LABELS_HELPERS_H
 
@@ -11,9 +11,10 @@
 #include "mesh/io/image.h"
 #include "mesh/mesh.h"
 
-enum { HELPER_CROSSINGS = 32 }; /* of one row with one lung's surface, at most */
+enum { HELPER_CROSSINGS = 32 }; /* largest number of crossings of a row with one surface */
 
-/* An image of zeros over a mesh's box, voxels of `spacing` mm along LPS, begun off its corner. */
+/* Return an image of zeros over the box of a mesh, with voxels of `spacing` mm along LPS and an
+ * origin off the corner of the box. */
 static inline supine_image helper_image_over(const supine_mesh *mesh, const double spacing[3]) {
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};
   double low[3];
@@ -34,7 +35,7 @@ static inline int helper_compare_doubles(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* Where the line of row (y, z) crosses the triangle; NAN where it does not. */
+/* Return the x at which the line of row (y, z) crosses the triangle; NAN if it does not. */
 static inline double helper_crossing(const double *p, const double *q, const double *r, double y,
                                      double z) {
   const double whole = (q[1] - p[1]) * (r[2] - p[2]) - (r[1] - p[1]) * (q[2] - p[2]);
@@ -43,8 +44,8 @@ static inline double helper_crossing(const double *p, const double *q, const dou
   return v >= 0.0 && w >= 0.0 && v + w <= 1.0 ? p[0] + v * (q[0] - p[0]) + w * (r[0] - p[0]) : NAN;
 }
 
-/* Writes a label into the voxels of an image of bytes, along LPS, whose centres are in the surface
- * of the triangles [begin, end). */
+/* Set the label of all voxels whose centres are inside the surface of triangles begin <= t < end.
+ * The image has bytes, along LPS. */
 static inline void helper_voxelise(const supine_mesh *mesh, size_t begin, size_t end, uint8_t label,
                                    supine_image *image) {
   const size_t rows = image->size[1] * image->size[2];
@@ -86,9 +87,8 @@ static inline void helper_voxelise(const supine_mesh *mesh, size_t begin, size_t
   free(count);
 }
 
-/* Two ellipsoids beside each other, 1 right and 2 left as lungmask writes them, in voxels of
- * `spacing` mm along LPS; the right one is the larger. Wider towards the feet and behind, as lungs
- * are. */
+/* Return two ellipsoids side by side, 1 right and 2 left as lungmask writes them, in voxels of
+ * `spacing` mm along LPS. The right one is larger. Both widen towards the feet and the back. */
 static inline supine_image helper_two_lungs(double spacing) {
   const double size[3] = {280.0, 180.0, 240.0};
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};

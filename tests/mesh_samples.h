@@ -6,7 +6,7 @@
 #include "mesh/mesh.h"
 #include "test.h"
 
-/* Copies arrays into a mesh that supine_mesh_free releases. */
+/* Copy arrays into a mesh; release it by supine_mesh_free. */
 static inline supine_mesh sample_make(size_t vertex_count, const double *vertices,
                                       size_t triangle_count, const uint32_t *triangles) {
   supine_mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count};
@@ -23,14 +23,14 @@ static inline supine_mesh sample_make(size_t vertex_count, const double *vertice
   return mesh;
 }
 
-/* Corner of the first octant, legs of 120 mm: volume 120^3 / 6 = 288000 mm^3. */
+/* Return the corner of the first octant with legs of 120 mm: volume 120^3 / 6 = 288000 mm^3. */
 static inline supine_mesh sample_tetrahedron(void) {
   static const double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
   static const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
   return sample_make(4, vertices, 4, triangles);
 }
 
-/* Box from (-30, 10, -50) with sides 100, 110, 130 mm: volume 1430000 mm^3. */
+/* Return the box from (-30, 10, -50) with sides 100, 110, 130 mm: volume 1430000 mm^3. */
 static inline supine_mesh sample_box(void) {
   static const double vertices[] = {-30, 10, -50, 70, 10, -50, 70, 120, -50, -30, 120, -50,
                                     -30, 10, 80,  70, 10, 80,  70, 120, 80,  -30, 120, 80};
@@ -39,13 +39,13 @@ static inline supine_mesh sample_box(void) {
   return sample_make(8, vertices, 12, triangles);
 }
 
-/* Head of a PLY file in ASCII: vertices' rows "x y z" and faces' rows "3 a b c" follow. */
+/* Header of an ASCII PLY file. Append the vertices' rows "x y z" and the faces' rows "3 a b c". */
 #define SAMPLE_PLY(vertices, faces)                                                                \
   "ply\nformat ascii 1.0\nelement vertex " #vertices                                               \
   "\nproperty float x\nproperty float y\nproperty float z\nelement face " #faces                   \
   "\nproperty list uint int vertex_indices\nend_header\n"
 
-/* `path` = folder/name. */
+/* Set `path` to folder/name and return it. */
 static inline const char *sample_path(void **state, const char *name, char path[256]) {
   (void)snprintf(path, 256, "%s/%s", (const char *)*state, name);
   return path;
@@ -65,7 +65,7 @@ static inline const char *sample_text(void **state, const char *name, const char
   return sample_write(state, name, text, strlen(text), path);
 }
 
-/* Reads a whole file; the caller frees. */
+/* Read a whole file (malloc). */
 static inline unsigned char *sample_read(const char *path, size_t *size) {
   FILE *file = fopen(path, "rb");
   assert_non_null(file);
@@ -79,7 +79,7 @@ static inline unsigned char *sample_read(const char *path, size_t *size) {
   return bytes;
 }
 
-/* Group set-up and tear-down: a folder in *state; tear-down fails where files are left in it. */
+/* Make and remove the folder of a group; removal fails if a test has left a file in it. */
 static inline int sample_folder_create(void **state) {
   static char folder[] = "/tmp/supine-mesh-XXXXXX";
   *state = mkdtemp(folder);

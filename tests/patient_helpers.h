@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The law that tests of a patient's fit know to be true. */
+/* The true law in tests of the patient fit. */
 #ifndef SUPINE_PATIENT_HELPERS_H
 #define SUPINE_PATIENT_HELPERS_H
 
@@ -9,13 +9,12 @@
 
 static const double supine_gravity[3] = {0.0, 1.0, 0.0};
 
-/* Make the true law: c1 to c6, and (18) as it is supine. */
+/* Return the true law: c1 to c6, and (18) in the supine posture. */
 static supine_model truth(void) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = 10.0;
   model.force = (supine_force_law){.base = 0.9, .gain = 0.4, .box = {0.0, -0.2, 0.0}};
-  model.direction =
-      (supine_direction_law){.c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
+  model.direction = (supine_direction_law){.c = {6.0, 2.6, 15.0, 1.0, 26.0, 1.3}};
   return model;
 }
 

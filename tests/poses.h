@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Poses of tests that choose gains themselves: one scale a lung. */
+/* Poses with given weights and one gain for each lung. */
 #ifndef SUPINE_TESTS_POSES_H
 #define SUPINE_TESTS_POSES_H
 
@@ -8,7 +8,7 @@
 #include <supine/runtime.h>
 #include <supine/volume.h>
 
-/* A pose of weights [K] and one gain for each lung [G], in the caller's scope. */
+/* A pose of weights [K] and one gain for each lung [G]; it lives in the caller's scope. */
 #define POSED(of, by, at) posed(of, by, at, &(supine_pose){.weights = {0}})
 
 static inline supine_pose *posed(const supine_basis *basis, const double *weights,
@@ -21,8 +21,8 @@ static inline supine_pose *posed(const supine_basis *basis, const double *weight
   return pose;
 }
 
-/* `count` poses, at most 512, of weights [count, K] and scales [count, G]; until the thread's next
- * call. */
+/* Return `count` poses, at most 512, of weights [count, K] and scales [count, G]. Valid until the
+ * next call by the same thread. */
 static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
                                        const double *weights, const double *scales) {
   static _Thread_local supine_pose poses[512];
@@ -33,7 +33,7 @@ static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
   return poses;
 }
 
-/* Adds the cubic by which a lung's volume grows with its scale, mL beyond the reference. */
+/* Add the coefficients of a lung's volume as a cubic of its scale, mL beyond the reference. */
 static inline void posed_cubic(const supine_basis *basis, size_t lung, const double *weights,
                                double cubic[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -65,7 +65,7 @@ static inline supine_status posed_lung_scale(const supine_basis *basis, size_t l
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
-/* The one scale at which all lungs together hold so much beyond the reference. */
+/* Compute the common scale at which the lungs' total volume is `volume` mL beyond the reference. */
 static inline supine_status posed_scale(const supine_basis *basis, const double *weights,
                                         double volume, double *scale, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -76,7 +76,7 @@ static inline supine_status posed_scale(const supine_basis *basis, const double 
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
-/* What the lungs together hold in a state, mL beyond the reference; the status of its pose. */
+/* Compute the total volume in a state, mL beyond the reference; return the status of its pose. */
 static inline supine_status posed_volume(const supine_basis *basis, const double gravity[3],
                                          supine_volume volume, double *beyond) {
   supine_pose pose;
@@ -98,7 +98,7 @@ static inline supine_status posed_rest(const supine_basis *basis, const double g
   return posed_volume(basis, gravity, (supine_volume){SUPINE_VOLUME_REST, 0.0}, beyond);
 }
 
-/* What the scan held beyond the reference, mL. */
+/* Return the volume of the scan, mL beyond the reference. */
 static inline double posed_scan(const supine_basis *basis) {
   const supine_state scan = supine_basis_scan(basis);
   double beyond;

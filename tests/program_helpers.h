@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the program in a folder of its own, as its users do. */
+/* Run the program in a folder of its own. */
 #ifndef SUPINE_PROGRAM_HELPERS_H
 #define SUPINE_PROGRAM_HELPERS_H
 
@@ -11,10 +11,9 @@
 #include <supine/status.h>
 
 static char folder[] = "/tmp/supine-program-XXXXXX";
-static char printed[65536]; /* by the last run, stdout and stderr together */
+static char printed[65536]; /* by the last run, to stdout and stderr */
 
-/* Run "supine ARGUMENTS" in the folder; return its exit code, or -1 where a signal or the clock
- * ended it. */
+/* Run "supine ARGUMENTS" in the folder; return its exit code, or -1 after a signal or a timeout. */
 SUPINE_PRINTF(1, 2)
 static int run(const char *format, ...) {
   char arguments[2048];
@@ -38,10 +37,10 @@ static void expect(int code, const char *words, int got) {
   }
 }
 
-/* Run, and ask for an exit code and for words in what is printed. */
+/* Run, and assert the exit code and that the output contains `words`. */
 #define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
 
-/* A file of the folder, ended by a NUL (malloc). */
+/* Read a file of the folder and append a NUL (malloc). */
 static char *read_file(const char *name, size_t *size) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -58,7 +57,7 @@ static char *read_file(const char *name, size_t *size) {
   return text;
 }
 
-/* Files in the folder whose name begins so. */
+/* Count the files of the folder whose names begin with `prefix`. */
 static size_t count_files(const char *prefix) {
   size_t count = 0;
   DIR *entries = opendir(folder);

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-# Made bases, and reference evaluations of them.
+# Synthetic bases, and reference evaluations of them.
 add_library(runtime_fixture STATIC runtime_fixture.c)
 target_link_libraries(runtime_fixture
   PRIVATE supine_build PkgConfig::CMOCKA

@@ -21,7 +21,7 @@ double fixture_random(uint64_t *state) {
   return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-/* A bipyramid over a polygon on vertices begin <= i < end, and its triangles. */
+/* Write a bipyramid over a polygon to vertices begin <= i < end, and its triangles. */
 static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_t *state) {
   const size_t corners = end - begin >= 5 ? end - begin - 2 : 0;
   for (size_t i = begin; i < end; ++i) {
@@ -47,7 +47,7 @@ static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_
   }
 }
 
-/* Field k of vertex i, mm. */
+/* Return field k of vertex i, mm. */
 static void field(const fixture *f, size_t i, size_t k, double u[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = f->vector
@@ -61,7 +61,8 @@ static double det(const double *a, const double *b, const double *c) {
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* The forms of one triangle: det of three corners, each rest + s * sum of w_k u_k; mm^3 / 1000. */
+/* Add the volume forms of one triangle: the determinant of three corners, each rest + s * sum of
+ * w_k u_k; mm^3 / 1000. */
 static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
   const size_t K = f->modes;
   double r[3][3];

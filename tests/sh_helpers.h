@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What the harmonic tests share: repeatable random numbers and a comparison that names its values.
- * Include after cmocka.h. */
+/* Repeatable random numbers and a comparison that prints its values. Include after cmocka.h. */
 #ifndef SH_HELPERS_H
 #define SH_HELPERS_H
 
 #include <math.h>
 #include <stdint.h>
 
-/* A failure prints both values, which cmocka 1.1.5's assert_float_equal does in float alone. */
+/* Print both values in double on failure; assert_float_equal of cmocka 1.1.5 prints float. */
 #define assert_close(value, expected, tolerance)                                                   \
   do {                                                                                             \
     const double value_ = (value);                                                                 \
@@ -18,7 +17,8 @@
     }                                                                                              \
   } while (0)
 
-/* Uniform in (-1, 1). Generator: G. Marsaglia, "Xorshift RNGs", J. Stat. Software 8(14), 2003. */
+/* Return a uniform number in (-1, 1). G. Marsaglia, "Xorshift RNGs", J. Stat. Software 8(14), 2003.
+ */
 static inline double random_signed(uint64_t *seed) {
   *seed ^= *seed << 13;
   *seed ^= *seed >> 7;
@@ -26,7 +26,7 @@ static inline double random_signed(uint64_t *seed) {
   return (double)(*seed >> 11) * 0x1p-52 - 1;
 }
 
-/* Uniform over the sphere: height and longitude are uniform (Archimedes). */
+/* Draw a uniform direction: height and longitude are uniform (Archimedes). */
 static inline void random_direction(uint64_t *seed, double direction[3]) {
   const double z = random_signed(seed);
   const double longitude = M_PI * random_signed(seed);
@@ -36,7 +36,7 @@ static inline void random_direction(uint64_t *seed, double direction[3]) {
   direction[2] = z;
 }
 
-/* A rotation matrix from a random unit quaternion. */
+/* Draw a rotation matrix, from a random unit quaternion. */
 static inline void random_rotation(uint64_t *seed, double r[3][3]) {
   double q[4];
   double length = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Status strings, output files and threads: what every folder stands on. */
+/* Status strings, output files and threads. */
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -94,7 +94,7 @@ TEST(test_output_full_or_missing_target_reports_write) {
   assert_non_null(strstr(error.message, "/dev/full"));
 }
 
-/* The call below is that of a file system without nameless files. */
+/* If true, open fails as on a file system without unnamed files. */
 static bool nameless_missing;
 
 int __real_open(const char *path, int flags, ...);
@@ -135,7 +135,7 @@ static void check_modes(void) {
     write_output(path, "new");
     assert_int_equal(mode_of(path), 0666 & ~masks[i]);
     assert_int_equal(chmod(path, 0640), 0);
-    write_output(path, "old"); /* keeps its own */
+    write_output(path, "old"); /* keeps its own mode */
     assert_int_equal(mode_of(path), 0640);
     assert_int_equal(umask(before), masks[i]);
     assert_int_equal(unlink(path), 0);
@@ -162,7 +162,7 @@ static void check_links(void) {
   (void)snprintf(over, sizeof over, "%s/over", folder);
   assert_int_equal(symlink("target", link), 0);
   assert_int_equal(symlink(link, over), 0);
-  for (int i = 0; i < 2; ++i) { /* what it leads to is not there yet; is there */
+  for (int i = 0; i < 2; ++i) { /* first the target of the link is missing, then it exists */
     struct stat status;
     write_output(over, i == 0 ? "first" : "second");
     read_text(target, text, sizeof text);
@@ -174,7 +174,7 @@ static void check_links(void) {
   assert_int_equal(rmdir(folder), 0);
 }
 
-/* Enough for several buffers, so that a write fails before the last and at it. */
+/* Enough for several buffers, so that a write fails before the last one, and at it. */
 static void check_full_disk(void) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   char path[64];
@@ -242,7 +242,7 @@ TEST(test_thread_count_bounded_and_nonsense_ignored) {
   const size_t own = supine_thread_count();
   static const struct {
     const char *text;
-    size_t count; /* 0: as without it */
+    size_t count; /* 0: as if it were unset */
   } cases[] = {{"1", 1},   {"7", 7},          {"255", 255}, {"256", 256}, {"257", 0},
                {"0", 0},   {"-1", 0},         {"2 x", 0},   {"", 0},      {"many", 0},
                {"1e2", 0}, {"4294967297", 0}, {"3.", 0},    {"0x10", 0}};

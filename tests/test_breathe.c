@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine breathe: volumes of every frame, as measured on its surface; what it writes and refuses.
+/* supine breathe: volumes of each frame measured on its surface; files written and refused input.
  */
 #include <dirent.h>
 #include <signal.h>
@@ -23,9 +23,9 @@
 
 static char folder[] = "/tmp/supine-breathe-XXXXXX";
 static char basis[64], breath[64], series[64], open_basis[64];
-static char text[16384]; /* what the command said, stdout and stderr */
+static char text[16384]; /* output of the command, stdout and stderr */
 
-static double left_share = 1.0; /* of the bases made from here on */
+static double left_share = 1.0; /* of the collapsed left lung, in the next bases */
 
 static supine_status make_basis(const supine_lungs *lungs, const char *path) {
   supine_precompute_options options = {
@@ -58,7 +58,7 @@ static int setup(void **state) {
   return good ? 0 : -1;
 }
 
-/* Removes what is in a folder, and counts it. */
+/* Remove the entries of a folder, and count them. */
 static size_t empty(const char *path) {
   size_t count = 0;
   DIR *entries = opendir(path);
@@ -81,7 +81,7 @@ static int teardown(void **state) {
   return rmdir(folder);
 }
 
-/* Entries of the folder whose names begin so. */
+/* Count the entries of the folder whose names begin with `prefix`. */
 static size_t count_names(const char *prefix) {
   size_t count = 0;
   DIR *entries = opendir(folder);
@@ -96,7 +96,8 @@ static size_t count_names(const char *prefix) {
 
 #define RUN(...) COMMAND_RUN(&supine_command_breathe, KEPT_BOTH, text, __VA_ARGS__)
 
-/* Volume, mL, of the triangles whose vertices lie from `begin` to `end`, about the box's centre. */
+/* Compute the volume between the triangles with vertices begin <= i < end and the centre of their
+ * box, mL. */
 static double measure(const float *xyz, const uint32_t *triangles, size_t count, size_t begin,
                       size_t end) {
   const double centre[3] = {0.0, -150.0, -95.0};
@@ -118,8 +119,8 @@ static double measure(const float *xyz, const uint32_t *triangles, size_t count,
   return sum / 6000.0;
 }
 
-/* Largest differences, mL, between the volumes measured on the frames of `breath` and its own, lung
- * by lung, and between their sum and `wanted` [T]. */
+/* Assert that the volumes measured on the frames of `breath` are those it states for each lung, and
+ * that their sums are `wanted` [T], mL. */
 static void check_volumes(const char *basis_path, const double *wanted, size_t frames) {
   supine_safetensors *file = NULL;
   supine_basis *opened = NULL;
@@ -158,7 +159,7 @@ static void check_volumes(const char *basis_path, const double *wanted, size_t f
   supine_basis_close(opened);
 }
 
-/* V(t) of the default breath, as `supine pv` knows it. */
+/* Compute V(t) of the default breath, as `supine pv` prints it. */
 static double *breath_of(const supine_pv_breath *course, double fps, size_t frames) {
   double *time = malloc(frames * sizeof *time);
   double *volume = malloc(frames * sizeof *volume);
@@ -194,9 +195,9 @@ TEST(test_breathe_real_lungs_turning_volumes_exact_in_every_frame) {
   supine_lungs_free(&lungs);
 }
 
-/* A program of one's own, of the installed library alone, breathes as the command does, bit for
- * bit. */
-TEST(test_breathe_library_calls_give_the_command_s_frames) {
+/* A program that uses the installed library alone gets the same frames as the command, bit for bit.
+ */
+TEST(test_breathe_library_calls_same_frames) {
   enum { FRAMES = 21 };
   supine_safetensors *file = NULL;
   supine_basis *opened = NULL;
@@ -214,7 +215,7 @@ TEST(test_breathe_library_calls_give_the_command_s_frames) {
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   assert_non_null(xyz);
   for (size_t t = 0; t < FRAMES; ++t) {
-    supine_state frame = {.volume = {SUPINE_VOLUME_SCAN, 0.0}}; /* the law is the paper's */
+    supine_state frame = {.volume = {SUPINE_VOLUME_SCAN, 0.0}}; /* as the law is the paper's */
     supine_pose pose;
     memcpy(frame.gravity, gravity + 3 * t, sizeof frame.gravity);
     assert_int_equal(supine_breath_evaluate(supine_breath_normal(), &wanted, 1, &time[t],
@@ -334,7 +335,7 @@ TEST(test_breathe_interrupted_leaves_nothing) {
   assert_int_equal(count_names(""), before);
 }
 
-TEST(test_turn_is_even_and_stays_on_the_sphere) {
+TEST(test_posture_turn_any_step_keeps_unit_length_and_speed) {
   static const double turns[][6] = {{0, 1, 0, 1, 0, 0},  {0, 1, 0, 0, -1, 0},
                                     {0, 0, -1, 0, 0, 1}, {1, 0, 0, -1, 0, 0},
                                     {0, 1, 0, 0, 1, 0},  {0.6, 0, -0.8, 0, 0.28, 0.96}};

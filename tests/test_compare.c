@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Comparing orientations: the Gram matrices against every vertex, slabs by height. */
+/* Comparison of orientations: the Gram matrices against sums over all vertices, the search, and
+ * slabs by height. */
 #include <float.h>
 
 #include "test.h"
@@ -19,7 +20,7 @@ static void check_near(double found, double wanted, double tolerance, int line) 
 }
 #define assert_near(found, wanted, tolerance) check_near(found, wanted, tolerance, __LINE__)
 
-/* A made basis, opened, with its comparison. */
+/* A synthetic basis, opened, with its comparison. */
 typedef struct made {
   fixture *f;
   unsigned char *bytes;
@@ -59,7 +60,7 @@ static void random_direction(uint64_t *state, double g[3]) {
   } while (g[0] * g[0] + g[1] * g[1] + g[2] * g[2] < 0.01);
 }
 
-/* Area of each vertex over that of all, by Heron's formula. */
+/* Compute the area of each vertex relative to the sum, by Heron's formula. */
 static double *area_shares(const fixture *f) {
   double *share = calloc(f->vertices, sizeof *share);
   assert_non_null(share);
@@ -104,7 +105,7 @@ static pair random_pair(const made *m, uint64_t *state) {
   return p;
 }
 
-/* Distances of every vertex in double precision, from two deformed surfaces. */
+/* Compute the distances of all vertices between two deformed surfaces, in double precision. */
 static double *direct_distances(const made *m, const pair *p) {
   const size_t n = m->f->vertices;
   double *a = malloc(3 * n * sizeof *a);
@@ -156,7 +157,7 @@ TEST(test_rms_vector_basis_equals_every_vertex) {
   check_rms(true, 9, 2);
 }
 
-TEST(test_rms_to_rest_equals_scale_zero) {
+TEST(test_rms_to_rest_equals_gain_zero) {
   made m = make(501, 7, 3, 2, false, false);
   uint64_t random = 5;
   pair p = random_pair(&m, &random);
@@ -258,7 +259,7 @@ TEST(test_energy_sums_to_mean_square_over_sphere) {
   unmake(&m);
 }
 
-TEST(test_compare_pose_rms_reaches_it) {
+TEST(test_compare_pose_given_rms_reaches_it) {
   made m = make(401, 6, 3, 2, false, true);
   const supine_state asked = {.gravity = {0.3, -0.5, 0.7}};
   supine_pose pose;
@@ -267,9 +268,9 @@ TEST(test_compare_pose_rms_reaches_it) {
   unmake(&m);
 }
 
-/* Beyond the rest of that direction of gravity: constant and linear terms by hand. */
-TEST(test_compare_pose_volume_counts_from_the_posture_s_rest) {
-  static const double resting[9] = {-40, 7, -5, 3}; /* of Y_00, Y_1-1, Y_10, Y_11: y, z, x */
+/* Volumes count from the rest of that direction of gravity: constant and linear terms, by hand. */
+TEST(test_compare_pose_volume_counts_from_rest_of_posture) {
+  static const double resting[9] = {-40, 7, -5, 3}; /* Y_00, then along y, z and x */
   made m = make_resting(401, 6, 3, 2, false, true, resting);
   supine_state asked = {.gravity = {0.6, -0.48, 0.64}, .volume = {SUPINE_VOLUME_REST, 11}};
   const double *g = asked.gravity;
@@ -288,7 +289,7 @@ TEST(test_compare_pose_volume_counts_from_the_posture_s_rest) {
   unmake(&m);
 }
 
-TEST(test_compare_pose_open_or_still_is_refused) {
+TEST(test_compare_pose_open_or_unmoved_surface_refused) {
   made m = make(401, 6, 3, 2, false, false);
   supine_state asked = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_ABSOLUTE, 100}};
   supine_pose pose;
@@ -307,7 +308,7 @@ TEST(test_compare_pose_open_or_still_is_refused) {
   unmake(&m);
 }
 
-TEST(test_create_surface_without_area_is_refused) {
+TEST(test_create_surface_without_area_refused) {
   fixture *f = fixture_create(50, 3, 2, 1, false, false, 3, 9);
   memset(f->vertex, 0, 3 * f->vertices * sizeof *f->vertex);
   size_t size = 0;
@@ -324,7 +325,7 @@ TEST(test_create_surface_without_area_is_refused) {
   fixture_destroy(f);
 }
 
-/* x + M x + shift for every vertex. */
+/* Return x + M x + shift for every vertex. */
 static float *moved(const fixture *f, const double matrix[3][3], const double shift[3]) {
   float *xyz = malloc(3 * f->vertices * sizeof *xyz);
   assert_non_null(xyz);
@@ -341,7 +342,7 @@ static float *moved(const fixture *f, const double matrix[3][3], const double sh
 
 enum { SLABS = 10 };
 
-TEST(test_slabs_at_rest_hold_the_volume_of_the_lung) {
+TEST(test_slabs_reference_sum_to_volume_of_lung) {
   made m = make(902, 4, 2, 2, false, true);
   double *rest = malloc(3 * m.f->vertices * sizeof *rest);
   assert_non_null(rest);
@@ -370,9 +371,9 @@ TEST(test_slabs_at_rest_hold_the_volume_of_the_lung) {
   unmake(&m);
 }
 
-/* A slab of the bipyramid seen along its axis z, of half height h: the part within z of a tip has
- * (z/h)^3 of half the volume. The corners of the ring are moved to one height for this. */
-TEST(test_slabs_of_bipyramid_follow_the_cube) {
+/* Slabs of the bipyramid along its axis z, of half height h: the part within z of a tip has (z/h)^3
+ * of half the volume. The corners of the ring are moved to one height for this. */
+TEST(test_slabs_bipyramid_follow_cube_of_height) {
   fixture *f = fixture_create(602, 3, 2, 1, false, true, 2, 8);
   for (size_t i = 0; i < 600; ++i) {
     f->vertex[3 * i + 2] = 0;
@@ -433,7 +434,7 @@ TEST(test_slabs_linear_displacement_gains_its_determinant) {
   unmake(&m);
 }
 
-TEST(test_slabs_of_any_state_sum_to_the_exact_volume) {
+TEST(test_slabs_any_state_sum_to_exact_volume) {
   made m = make(1203, 7, 3, 2, false, true);
   float *xyz = malloc(3 * m.f->vertices * sizeof *xyz);
   assert_non_null(xyz);
@@ -460,7 +461,7 @@ TEST(test_slabs_of_any_state_sum_to_the_exact_volume) {
   unmake(&m);
 }
 
-TEST(test_slabs_bad_arguments_are_refused) {
+TEST(test_slabs_bad_arguments_refused) {
   made open = make(203, 4, 2, 1, false, false);
   made closed = make(203, 4, 2, 1, false, true);
   const double g[3] = {0, 1, 0};

@@ -8,7 +8,7 @@
 
 #include "tests/poses.h"
 
-/* A made basis in memory, and one opened basis of it. */
+/* A synthetic basis in memory, and a basis opened from it. */
 typedef struct opened {
   fixture *f;
   unsigned char *bytes;
@@ -26,7 +26,7 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* NULL where this processor lacks the code. */
+/* NULL: not available on this processor */
 static supine_basis *open_as(const opened *o, supine_storage storage, supine_simd simd) {
   const supine_basis_options options = {sizeof options, .storage = storage, .simd = simd};
   supine_basis *basis = NULL;
@@ -67,7 +67,7 @@ static double farthest(const float *xyz, const double *exact, size_t begin, size
   return sqrt(top);
 }
 
-/* One basis, every storage and code: within the stated bound of exact arithmetic. */
+/* Evaluate in every storage and code path: within the stated bound of the exact result. */
 static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool vector,
                             uint64_t seed) {
   opened o = made(fixture_create(vertices, modes, 3, lungs, vector, false, 11, seed));
@@ -121,8 +121,8 @@ TEST(test_deform_every_mode_count_within_stated_error) {
   }
 }
 
-/* The bound must say something: over many frames it is reached to within a small factor. */
-TEST(test_basis_error_bound_near_what_happens) {
+/* The bound is not loose: over many frames it is reached up to a small factor. */
+TEST(test_basis_error_many_frames_bound_nearly_reached) {
   opened o = made(fixture_create(3000, 16, 3, 2, false, false, 11, 5));
   double *exact = fixture_allocate(3 * 3000, sizeof *exact);
   float *xyz = fixture_allocate(3 * 3000, sizeof *xyz);
@@ -171,7 +171,7 @@ TEST(test_storage_error_orders_storages) {
   drop(&o);
 }
 
-/* Where the last modes carry little, as they do in lungs. */
+/* With last modes of small amplitude, as in lungs. */
 TEST(test_storage_auto_mixed_where_it_suffices) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < (size_t)500 * 16; ++i) {
@@ -185,8 +185,7 @@ TEST(test_storage_auto_mixed_where_it_suffices) {
   drop(&o);
 }
 
-/* Just below 2^30 products stay finite, and so does every bound; from there on a file is refused.
- */
+/* Just below 2^30, products and bounds stay finite; from 2^30 a file is refused. */
 TEST(test_storage_largest_numbers_have_finite_bounds) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < 3; ++i) {
@@ -207,7 +206,7 @@ TEST(test_storage_largest_numbers_have_finite_bounds) {
   drop(&o);
 }
 
-/* Packed again or at once, what is stated is that storage's own error. */
+/* Packed in one or two steps, the stated error is that of the final storage. */
 static void check_stated_error(const opened *o, const supine_basis *chosen) {
   const supine_basis_info *info = supine_basis_get_info(chosen);
   supine_basis *basis = open_as(o, info->storage, SUPINE_SIMD_AUTO);
@@ -224,7 +223,7 @@ TEST(test_storage_auto_exact_where_int16_errs) {
   check_stated_error(&o, basis);
   supine_basis_close(basis);
   free(o.bytes);
-  f->vertex[0] = 1e6F; /* a vertex a kilometre away makes rest positions coarse */
+  f->vertex[0] = 1e6F; /* a vertex 1 km away makes rest positions coarse */
   o = made(f);
   basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_EXACT);
@@ -248,7 +247,7 @@ TEST(test_open_bad_options_refused) {
   drop(&o);
 }
 
-/* Ranges, alignments and targets of one basis give the bits that the whole gives, and write nothing
+/* Ranges, alignments and instruction sets give the bits of the whole evaluation, and write nothing
  * else. */
 static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_simd simd,
                          int trials) {
@@ -302,7 +301,7 @@ static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_sim
     }
     assert_true((shift == 0 || x[-1] == mark) && z[count] == mark);
   }
-  supine_deform_range(basis, POSED(basis, weights, scales), 5, 5, NULL); /* nothing to do */
+  supine_deform_range(basis, POSED(basis, weights, scales), 5, 5, NULL); /* an empty range */
   free(whole);
   free(part);
   free(split);
@@ -322,7 +321,7 @@ TEST(test_deform_range_past_cache_same_bits) {
   }
 }
 
-TEST(test_displace_range_rest_added_is_deform) {
+TEST(test_displace_range_added_to_reference_equals_deform) {
   for (int vector = 0; vector < 2; ++vector) {
     opened o = made(fixture_create(100, 7, 2, 2, vector != 0, false, 11, 8));
     for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
@@ -349,7 +348,7 @@ TEST(test_displace_range_rest_added_is_deform) {
   }
 }
 
-TEST(test_step_many_steps_reach_the_volume) {
+TEST(test_step_many_steps_reach_volume) {
   opened o = made(fixture_create(100, 7, 2, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   uint64_t random = 5;
@@ -393,7 +392,7 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
         random_frame(basis, &random, weights + j * modes, scales + 2 * j);
       }
       for (size_t i = 0; i < 3 * count * (end - begin); ++i) {
-        xyz[i] = 1e30F; /* nowhere, where nothing is written */
+        xyz[i] = 1e30F; /* a value that no evaluation writes */
       }
       supine_deform_batch(basis, count, posed_batch(basis, count, weights, scales), begin, end,
                           xyz);
@@ -418,8 +417,8 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
 TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 64, 0, 700);
   check_batch(700, 16, false, 1, 3, 691);
-  check_batch(24000, 16, false, 64, 0, 24000); /* past the cache, lines whole */
-  check_batch(23999, 16, false, 64, 1, 23998); /* and shared */
+  check_batch(24000, 16, false, 64, 0, 24000); /* larger than the cache, whole cache lines */
+  check_batch(23999, 16, false, 64, 1, 23998); /* shared cache lines */
   check_batch(90, 16, false, 300, 0, 90);      /* more than one group of weights */
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);
@@ -428,8 +427,8 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(90, 256, true, 3, 1, 90); /* one widened tile outgrows the block */
 }
 
-/* Five modes in two vec4s of each lung: what is there before does not stay. */
-TEST(test_gl_pack_slots_without_a_mode_are_zero) {
+/* Five modes fill two vec4s of each lung; previous content is overwritten. */
+TEST(test_gl_pack_unused_slots_zero) {
   enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO);
@@ -490,9 +489,9 @@ TEST(test_normals_bipyramid_area_weighted) {
       assert_true(fabs((double)normals[3 * i + axis] - s[axis] / length) <= 64 * 0x1p-24);
     }
   }
-  /* Outwards: the upper tip's points up. */
+  /* Normals point outwards: that of the upper tip points up. */
   assert_true(normals[3 * 39 + 2] > 0.9F);
-  /* A surface that has shrunk to a point has none. */
+  /* The normals of a surface shrunk to a point are 0. */
   float point[120] = {0};
   supine_normals(basis, point, normals);
   for (size_t i = 0; i < 120; ++i) {

@@ -10,11 +10,11 @@
 
 enum { VERTICES = 211, MODES = 5, BATCH = 3 };
 
-/* A sum of up to 66 products, and a root, round to less than this. */
+/* Bound of rounding errors of a sum of up to 66 products and a root. */
 static const double rounding = 66 * 0x1p-23;
 
-/* What a mode of the file may be off where it is packed, in the file's units: half a step of 13, 10
- * and 9 bits in the first, second and last third of the modes. */
+/* Error of packed modes in units of the file: half a step of 13, 10 and 9 bits in the first, second
+ * and last third of the modes. */
 static double packed_error(size_t mode, size_t modes) {
   static const double bits[] = {13, 10, 9};
   const double limit = 256.0 / 255 * INT16_MAX;
@@ -58,7 +58,7 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* v of a lung, term by term. */
+/* Compute v of a lung term by term. */
 static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
   const size_t terms = (MODES + 1) * (MODES + 2) / 2;
   for (size_t j = 0; j < f->normals; ++j) {
@@ -77,7 +77,7 @@ static void expected_weights(const fixture *f, size_t lung, const double *w, dou
   }
 }
 
-/* The normal and how far from it another may be, along an axis. */
+/* Compute a normal; return the bound of its error along each axis. */
 static double expected_normal(const fixture *f, size_t i, const double *w, const double *s,
                               double *n) {
   double off = 0;
@@ -131,7 +131,7 @@ static void check_formula(size_t normals, supine_simd simd) {
   drop(&o);
 }
 
-TEST(test_lit_every_code_agrees_with_formula) {
+TEST(test_lit_every_code_path_equals_formula) {
   static const size_t numbers[] = {1, 2, 3, 6, 8, 9, 12, 20, 64};
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
@@ -140,7 +140,7 @@ TEST(test_lit_every_code_agrees_with_formula) {
   }
 }
 
-TEST(test_lit_ranges_are_parts_of_the_whole) {
+TEST(test_lit_range_same_bits_as_whole) {
   for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
     opened o = open_lit(8, (supine_simd)simd);
     float whole[3 * VERTICES];
@@ -154,14 +154,14 @@ TEST(test_lit_ranges_are_parts_of_the_whole) {
                                                  begin, end, NULL, part),
                          SUPINE_OK);
         assert_memory_equal(part, whole + 3 * begin, 3 * (end - begin) * sizeof *part);
-        assert_true(part[3 * (end - begin)] == 12345); /* nothing beyond */
+        assert_true(part[3 * (end - begin)] == 12345); /* nothing is written beyond the range */
       }
     }
     drop(&o);
   }
 }
 
-TEST(test_lit_batch_is_one_after_the_other) {
+TEST(test_lit_batch_equals_single_calls) {
   opened o = open_lit(6, SUPINE_SIMD_AUTO);
   enum { BEGIN = 7, END = VERTICES - 5, COUNT = END - BEGIN };
   float *xyz = fixture_allocate(3 * BATCH * COUNT, sizeof *xyz);
@@ -207,7 +207,7 @@ TEST(test_lit_without_normals_refused) {
   assert_int_equal(supine_deform_lit(basis, POSED(basis, o.weights, o.scales), xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
   supine_basis_close(basis);
-  /* A program from before that option: what lies beyond its options is not read. */
+  /* A program built before this option existed: bytes beyond its options are not read. */
   options.size = offsetof(supine_basis_options, without_normals);
   assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);
   assert_int_equal(supine_basis_get_info(basis)->normal_count, 8);
@@ -216,7 +216,7 @@ TEST(test_lit_without_normals_refused) {
   drop(&o);
 }
 
-/* Opens the fixture as it is; the status. */
+/* Open the fixture unchanged; return the status. */
 static supine_status open_status(const fixture *f) {
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
@@ -234,7 +234,7 @@ TEST(test_open_bad_normals_refused) {
   f->normal_weight[5] = (double)NAN;
   assert_int_equal(open_status(f), SUPINE_ERROR_FORMAT);
   f->normal_weight[5] = 0;
-  f->normals = 3; /* of another shape, in the same room */
+  f->normals = 3; /* another shape of the same size */
   assert_int_equal(open_status(f), SUPINE_OK);
   free(f->normal);
   free(f->normal_weight);

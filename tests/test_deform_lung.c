@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A real lung with the displacement law's field: every storage and code path against double
- * precision, for 1,000 directions. */
+/* A real lung with the displacement law: every storage and code path against double precision, for
+ * 1,000 directions. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -12,7 +12,8 @@
 
 enum { BAND = 3, MODES = 16, DIRECTIONS = 2000 };
 
-/* Vertices and triangles of an OBJ file into a fixture that has room; false where there is none. */
+/* Read vertices and triangles of an OBJ file into a fixture with room for them; return false if the
+ * file is missing. */
 static fixture *read_obj(const char *path) {
   FILE *file = fopen(path, "r");
   if (file == NULL) {
@@ -37,7 +38,7 @@ static fixture *read_obj(const char *path) {
     } else if (line[0] == 'f' && line[1] == ' ' && f->triangles < 2 * vertices) {
       for (size_t j = 0; j < 3; ++j) {
         f->triangle[3 * f->triangles + j] = (uint32_t)(strtoul(text, &text, 10) - 1);
-        text += strcspn(text, " \n"); /* past /texture/normal */
+        text += strcspn(text, " \n"); /* skip /texture/normal */
       }
       ++f->triangles;
     }
@@ -46,7 +47,7 @@ static fixture *read_obj(const char *path) {
   return f;
 }
 
-/* A direction of a nearly even covering of the sphere by DIRECTIONS points. */
+/* Return direction i of a nearly even covering of the sphere by DIRECTIONS points. */
 static void even_direction(size_t q, double g[3]) {
   const double z = 1 - (2 * (double)q + 1) / DIRECTIONS;
   const double turn = 2.399963229728653 * (double)q;
@@ -55,7 +56,7 @@ static void even_direction(size_t q, double g[3]) {
   g[2] = z;
 }
 
-/* Height along gravity, 0 to 1, projected to band 3, and d of (15)-(17). */
+/* Fill the fields: height along gravity, 0 to 1, projected to band 3, times d of (15)-(17). */
 static void make_field(fixture *f) {
   const size_t n = f->vertices;
   double *sums = fixture_allocate(n * MODES, sizeof *sums);
@@ -106,7 +107,7 @@ static void make_field(fixture *f) {
   free(height);
 }
 
-/* The scale at which the lung gains 500 mL, by secants on its own volume. */
+/* Find the scale at which the lung gains 500 mL, by secants on its volume. */
 static double scale_of_500(const fixture *f, const double *weights, double *exact) {
   double scales[2] = {0, 1};
   double volumes[2];
@@ -157,7 +158,7 @@ TEST(test_deform_real_lung_every_path_within_stated_error) {
                                fixture_random(&random)};
     double weights[SUPINE_MODES_MAX];
     assert_int_equal(supine_basis_weights(bases[0][0], gravity, weights), SUPINE_OK);
-    if (trial % 100 == 0) { /* the scale of a volume changes little with the direction */
+    if (trial % 100 == 0) { /* the scale for a volume changes little with direction */
       scale = scale_of_500(f, weights, exact);
     }
     fixture_deform(f, weights, &scale, exact);

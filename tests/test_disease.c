@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lesions and collapse: what they change and what they leave alone. */
+/* Lesions and collapse: changes of the affected and of the other tissue. */
 #include <float.h>
 
 #include "precompute/lungs/disease.h"
@@ -14,9 +14,9 @@
 static const char *const real_names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
 static const double supine[3] = {0.0, 1.0, 0.0};
 
-static supine_model model; /* of the test that runs */
+static supine_model model; /* of the current test */
 
-/* Factors of 1 for lesions to be multiplied into: the model's from here on. */
+/* Return factors of 1 that lesions multiply; the model refers to them from now on. */
 static double *no_lesions(const supine_lungs *lungs) {
   double *factors = malloc(lungs->mesh.vertex_count * sizeof *factors);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -48,7 +48,7 @@ static double distance(const double *p, const double *q) {
   return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
 }
 
-/* The outermost point of the left lung. */
+/* Return the outermost point of the left lung. */
 static const double *side_of(const supine_lungs *lungs) {
   size_t found = 0;
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -57,10 +57,10 @@ static const double *side_of(const supine_lungs *lungs) {
   return lungs->mesh.vertices + 3 * found;
 }
 
-/* Least and greatest ratio of what a lesion makes of displacements to what they were. */
+/* Least and greatest ratio of displacements with a lesion to those without. */
 typedef struct change {
-  double inside[2]; /* nearer than half the radius */
-  double far[2];    /* 50 mm and more from the lesion's edge */
+  double inside[2]; /* within half the radius */
+  double far[2];    /* at least 50 mm from the lesion's edge */
 } change;
 
 static void widen(double range[2], double value) {
@@ -68,7 +68,7 @@ static void widen(double range[2], double value) {
   range[1] = fmax(range[1], value);
 }
 
-/* Both breathe `volume` mL, or at one breath scale where it is 0. */
+/* Compare breaths of `volume` mL with and without the lesion; 0: of one scale. */
 static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
   double *factors = no_lesions(lungs);
@@ -114,7 +114,7 @@ static void check_lesions(const supine_lungs *lungs) {
       assert_true(scaled.inside[1] < 0.9);
       assert_true(breathed.inside[1] < 0.9);
       assert_true(scaled.far[0] > 0.99 && scaled.far[1] < 1.01);
-      /* At one volume all others take what the lesion leaves, in the same proportion. */
+      /* At a given volume all other regions take over what the lesion leaves, in one proportion. */
       assert_close(breathed.far[1] / breathed.far[0], scaled.far[1] / scaled.far[0], 1e-9);
       const supine_lesion small = {{side[0] - 8.0, side[1], side[2]}, 18.0, factors[f]};
       const change by_small = change_by(lungs, &small, 500.0);
@@ -129,7 +129,7 @@ static void check_lesions(const supine_lungs *lungs) {
   model.reach = 0.0;
 }
 
-TEST(test_lesion_real_lungs_lowers_itself_and_leaves_the_rest) {
+TEST(test_lesion_real_lungs_lowers_only_itself) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = {0};
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
@@ -139,8 +139,8 @@ TEST(test_lesion_real_lungs_lowers_itself_and_leaves_the_rest) {
   supine_lungs_free(&lungs);
 }
 
-/* Scaling to geometric mean 1 with the lesion in it would change E everywhere. */
-TEST(test_lesion_large_leaves_the_other_lung_to_rounding) {
+/* Scaling to geometric mean 1 after the lesion would change E everywhere. */
+TEST(test_lesion_large_other_lung_unchanged) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
@@ -160,7 +160,7 @@ TEST(test_lesion_large_leaves_the_other_lung_to_rounding) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lesion_factor_one_changes_no_bit) {
+TEST(test_lesion_factor_one_same_bits) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
@@ -177,7 +177,7 @@ TEST(test_lesion_factor_one_changes_no_bit) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lesion_profile_is_as_documented) {
+TEST(test_lesion_any_distance_has_documented_profile) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   const double *centre = side_of(&lungs);
@@ -185,7 +185,7 @@ TEST(test_lesion_profile_is_as_documented) {
   double *factors = no_lesions(&lungs);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL),
-                   SUPINE_OK); /* multiply */
+                   SUPINE_OK); /* factors of lesions multiply */
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
@@ -207,7 +207,7 @@ TEST(test_lesion_profile_is_as_documented) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lesion_outside_reaches_nothing) {
+TEST(test_lesion_outside_changes_nothing) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
@@ -233,7 +233,7 @@ TEST(test_lesion_bad_numbers_refused) {
                                       {{0, 0, 0}, 10, -3},      {{0, 0, 0}, 10, NAN}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error = {0};
-    double *factors = NULL; /* refused before they are touched */
+    double *factors = NULL; /* refused before the factors are read */
     assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "lesion at"));
@@ -241,7 +241,7 @@ TEST(test_lesion_bad_numbers_refused) {
   supine_lungs_free(&lungs);
 }
 
-/* Volumes of lung j of a surface, mL. */
+/* Return the volume of one lung of a surface, mL. */
 static double volume_of(const supine_lungs *lungs, size_t lung, double *vertices) {
   const supine_mesh part = {lungs->mesh.vertex_count, vertices,
                             lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
@@ -249,7 +249,7 @@ static double volume_of(const supine_lungs *lungs, size_t lung, double *vertices
   return 1e-3 * supine_mesh_volume(&part);
 }
 
-TEST(test_collapse_rest_and_breath_are_its_share_in_every_direction) {
+TEST(test_collapse_any_direction_rest_and_breath_scaled) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   static const double directions[][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.48, -0.6, 0.64}};
   const double share = 0.3;
@@ -290,7 +290,7 @@ TEST(test_collapse_rest_and_breath_are_its_share_in_every_direction) {
 
 /* The fixed point of a collapse is the mean of the vertices in the quarter of the lung's width that
  * is nearest the midline, on either side. */
-TEST(test_collapse_fixed_point_is_the_hilum) {
+TEST(test_collapse_fixed_point_at_hilum) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   const size_t n = lungs.mesh.vertex_count;
@@ -328,7 +328,7 @@ TEST(test_collapse_fixed_point_is_the_hilum) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_collapse_draws_towards_the_midline_within_the_healthy_box) {
+TEST(test_collapse_real_lung_shrinks_towards_midline) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = {0};
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
@@ -348,7 +348,7 @@ TEST(test_collapse_draws_towards_the_midline_within_the_healthy_box) {
     outer[0] = fmin(outer[0], lungs.mesh.vertices[3 * i]);
     outer[1] = fmin(outer[1], rest[3 * i]);
   }
-  assert_true(outer[1] > outer[0] + 20.0); /* room between the lung's side and the chest, mm */
+  assert_true(outer[1] > outer[0] + 20.0); /* mm between lung and chest */
   free(rest);
   supine_lungs_free(&lungs);
 }

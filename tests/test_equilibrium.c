@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equilibrium against the definitions, the paper's iteration and its invariants. */
+/* The equilibrium against its definition, against the paper's iteration, and its invariants. */
 #include <float.h>
 
 #include "precompute/physics/equilibrium.h"
@@ -62,7 +62,7 @@ static double *solve_of(const fixture *f, const double *stiffness, size_t count)
   return out;
 }
 
-/* Scales stiffness to geometric mean 1, as the operator defines it. */
+/* Scale stiffness to geometric mean 1, as the operator defines it. */
 static double *normalised(size_t count, const double *stiffness) {
   double *out = malloc(count * sizeof *out);
   double sum = 0.0;
@@ -75,7 +75,7 @@ static double *normalised(size_t count, const double *stiffness) {
   return out;
 }
 
-/* What the springs catch beside the masses' catch [N, count], as (8) and (12)-(14) have it. */
+/* Compute the springs' catch from the masses' catch [N, count], by (8) and (12)-(14). */
 static double *spring_catch(const fixture *f, const double *masses, size_t count) {
   const size_t edges = f->topology.edge_count;
   double *e = normalised(f->mesh.vertex_count, f->stiffness);
@@ -278,7 +278,7 @@ TEST(test_transfer_columns_superpose_to_solution) {
   free(whole);
 }
 
-/* A shuffled file has links that span it all, and is renumbered inside. */
+/* The links of a shuffled file span the whole numbering; the solver renumbers the vertices. */
 TEST(test_solve_shuffled_vertices_same_answer) {
   supine_mesh mesh = helper_lump(20, -70.0, 5);
   const size_t n = mesh.vertex_count;
@@ -359,7 +359,7 @@ TEST(test_solve_force_not_finite_reports_numerical) {
   assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, out, NULL, &error),
                    SUPINE_ERROR_NUMERICAL);
   assert_non_null(strstr(error.message, "residual"));
-  force[3] = 0.0; /* and no force at all is no error */
+  force[3] = 0.0; /* zero force is not an error */
   assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, out, NULL, &error), SUPINE_OK);
   assert_close(helper_largest(f->mesh.vertex_count, out), 0.0, 0.0);
   supine_physics_equilibrium_destroy(eq);
@@ -367,8 +367,8 @@ TEST(test_solve_force_not_finite_reports_numerical) {
   free(force);
 }
 
-/* Both lungs of a real model, all nodes, by a sparse direct factorisation of the unsymmetric
- * definition. */
+/* Both lungs of a real model, against a sparse direct factorisation of the unsymmetric definition
+ * over all nodes. */
 static void check_real_lungs(const char *const *names, supine_axes axes) {
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 2, axes, &lungs)) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability: regional models, files, and what both do to displacement. */
+/* Expandability: regional models, files, and their effect on displacement. */
 #include <float.h>
 
 #include "precompute/lungs/expandability.h"
@@ -66,7 +66,7 @@ TEST(test_regional_bad_law_refused) {
   free(a);
 }
 
-TEST(test_load_both_forms_read_the_same) {
+TEST(test_load_both_forms_same_values) {
   static const double wanted[] = {1.5, 0.25, 3e-2};
   static const char *const texts[] = {
       "expandability\n1.5\n0.25\n3e-2\n",
@@ -84,7 +84,7 @@ TEST(test_load_both_forms_read_the_same) {
   }
 }
 
-TEST(test_load_bad_files_refused_naming_line_and_vertex) {
+TEST(test_load_bad_files_message_names_line_and_vertex) {
   static const struct {
     const char *text, *line, *detail;
   } bad[] = {
@@ -133,8 +133,9 @@ TEST(test_load_binary_or_missing_refused) {
   assert_int_equal(supine_tissue_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
 }
 
-/* Twice as expandable everywhere changes nothing; more expandable in one place moves that more. */
-TEST(test_expandability_is_relative_and_its_sign_is_as_documented) {
+/* Doubling the expandability everywhere changes nothing; raising it in one place moves that place
+ * more. */
+TEST(test_solve_expandability_scaled_changes_nothing_raised_moves_more) {
   const size_t n = lungs.mesh.vertex_count;
   const double g[3] = {0.0, 1.0, 0.0};
   double *e = malloc(n * sizeof *e);

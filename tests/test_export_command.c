@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine export: exit codes, and messages that name the remedy. */
+/* supine export: exit codes, and messages that say what to do. */
 #include "export_helpers.h"
 #include "test.h"
 
@@ -34,12 +34,12 @@ static int teardown(void **state) {
     }                                                                                              \
   } while (0)
 
-TEST(test_export_help_teaches) {
+TEST(test_export_help_prints_usage) {
   EXPECT(0, "--plain", "--help");
   assert_non_null(strstr(text, "Examples:"));
 }
 
-TEST(test_export_usage_errors_are_1) {
+TEST(test_export_usage_error_exit_1) {
   EXPECT(1, "name one basis file", "-o", glb);
   EXPECT(1, "-o FILE is missing", basis);
   EXPECT(1, "must end in .html or .glb", basis, "-o", "lungs.gltf");
@@ -51,16 +51,16 @@ TEST(test_export_usage_errors_are_1) {
   EXPECT(1, "did you mean '--plain'", basis, "--plan");
 }
 
-TEST(test_export_input_errors_are_2) {
+TEST(test_export_input_error_exit_2) {
   EXPECT(2, "/nonexistent/b", "/nonexistent/b", "-o", glb);
 }
 
-TEST(test_export_output_errors_are_4) {
+TEST(test_export_output_error_exit_4) {
   EXPECT(4, "/nonexistent/l.glb", basis, "-o", "/nonexistent/l.glb");
   EXPECT(4, "/nonexistent/l.html", basis, "-o", "/nonexistent/l.html");
 }
 
-TEST(test_export_numerical_errors_are_5) {
+TEST(test_export_numerical_error_exit_5) {
   EXPECT(5, "no displacement when supine", still, "-o", glb);
   EXPECT(5, "mL", basis, "-o", glb, "--breath", "1e12");
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Morph targets of a basis, and the glTF file that holds them. */
+/* Morph targets of a basis, and the glTF file. */
 #include "test.h"
 
 #include <jansson.h>
@@ -42,7 +42,8 @@ static uint32_t word(const unsigned char *at) {
   return value;
 }
 
-/* The file's JSON; `bytes` (malloc) and where its numbers begin. */
+/* Read a GLB file: return its JSON, the file in `bytes` (malloc) and the start of its binary chunk.
+ */
 static json_t *read_glb(unsigned char **bytes, const unsigned char **numbers) {
   size_t size = 0;
   *bytes = fixture_read(out, &size);
@@ -68,7 +69,8 @@ static size_t number(const json_t *object, const char *key) {
   return (size_t)json_integer_value(json_object_get(object, key));
 }
 
-/* Component `axis` of element `i` of an accessor, and that it is within its bounds. */
+/* Return component `axis` of element `i` of an accessor; assert that it is within the stated
+ * bounds. */
 static double component(const json_t *root, const unsigned char *numbers, size_t accessor, size_t i,
                         size_t axis) {
   const json_t *a = json_array_get(json_object_get(root, "accessors"), accessor);
@@ -95,8 +97,8 @@ static double real(const json_t *object, const char *key, size_t index) {
   return json_number_value(child(object, key, index));
 }
 
-/* Base and sum of weight and target, with weights as the extras say, are the library's positions;
- * s and t are the gains of each lung. */
+/* Assert that base + sum of weight * target, with weights from the extras, gives the positions of
+ * the library; s and t are the gains of each lung. */
 static void check_pose(const char *path, const supine_pose *given, const double s[2],
                        const double t[2]) {
   unsigned char *bytes = NULL;
@@ -147,8 +149,8 @@ static void check_positions(const char *path, double scale) {
   supine_basis_close(basis);
 }
 
-/* The bend has targets of its own, and each lung its own gains. */
-TEST(test_glb_bent_basis_targets_make_the_library_s_positions) {
+/* The bend has its own targets, and each lung its own gains. */
+TEST(test_glb_bent_basis_targets_give_positions_of_library) {
   char lungs[280];
   char path[280];
   (void)snprintf(lungs, sizeof lungs, "%s/bent.ply", folder);
@@ -178,16 +180,16 @@ TEST(test_glb_bent_basis_targets_make_the_library_s_positions) {
   supine_export_source_close(&source);
 }
 
-TEST(test_glb_plain_targets_make_the_library_s_positions) {
+TEST(test_glb_plain_basis_targets_give_positions_of_library) {
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out, "--plain"), 0);
   check_positions(vector, 0.7);
   assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--plain"), 0);
   check_positions(open_surface, 0.7);
 }
 
-/* Between the directions that are tried a weight may go past their extremes: a fiftieth of the
- * range is kept free at either end. */
-TEST(test_glb_weights_keep_a_margin) {
+/* Between the sampled directions a weight may exceed the sampled extremes: a fiftieth of the range
+ * is kept free at either end. */
+TEST(test_glb_weights_any_direction_within_range) {
   enum { TRIED = 4096 };
   export_source source = {0};
   export_breath breath;
@@ -222,8 +224,8 @@ TEST(test_glb_weights_keep_a_margin) {
   supine_export_source_close(&source);
 }
 
-/* Compressed arrays fill the file without gaps, and name what they decode to. */
-TEST(test_glb_compressed_views_are_whole) {
+/* Compressed arrays fill the file without gaps, and state the array that they decode to. */
+TEST(test_glb_compressed_views_fill_file) {
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 0);
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -248,7 +250,7 @@ TEST(test_glb_compressed_views_are_whole) {
   free(bytes);
 }
 
-TEST(test_glb_has_an_animation_for_each_posture) {
+TEST(test_glb_postures_one_animation_each) {
   assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--animate"), 0);
   assert_non_null(strstr(text, "and animations"));
   unsigned char *bytes = NULL;
@@ -268,7 +270,7 @@ TEST(test_glb_has_an_animation_for_each_posture) {
   free(bytes);
 }
 
-TEST(test_glb_without_triangles_is_refused) {
+TEST(test_glb_without_triangles_refused) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/points", folder);
   fixture *f = fixture_create(4, 2, 1, 1, false, false, 5, 5); /* too few vertices for triangles */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The page: its tensors are the basis', its texts stay texts. */
+/* The page: its tensors equal those of the basis, and its texts are escaped. */
 #include "test.h"
 
 #include <base64.h>
@@ -31,7 +31,7 @@ static int teardown(void **state) {
 }
 
 /* RFC 4648, section 10. */
-TEST(test_base64_of_known_texts) {
+TEST(test_base64_known_texts_literal) {
   static const char *const pairs[][2] = {{"", ""},
                                          {"f", "Zg=="},
                                          {"fo", "Zm8="},
@@ -49,7 +49,7 @@ TEST(test_base64_of_known_texts) {
   }
 }
 
-/* The page as a string (malloc). */
+/* Return the page as a string (malloc). */
 static char *read_page(void) {
   size_t size = 0;
   char *page = (char *)fixture_read(out, &size);
@@ -64,7 +64,7 @@ static int digit(char c) {
   return (int)(at - digits);
 }
 
-/* The bytes of a tensor of the page (malloc). */
+/* Return the bytes of a tensor of the page (malloc). */
 static unsigned char *take_bytes(const char *page, const char *name, size_t *size) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "id=\"tensor-%s\">", name);
@@ -87,7 +87,7 @@ static unsigned char *take_bytes(const char *page, const char *name, size_t *siz
   return bytes;
 }
 
-/* Compares a tensor of the page with bytes. */
+/* Compare a tensor of the page with bytes. */
 static void check_tensor(const char *page, const char *name, const void *bytes, size_t size) {
   size_t got = 0;
   unsigned char *found = take_bytes(page, name, &got);
@@ -96,7 +96,7 @@ static void check_tensor(const char *page, const char *name, const void *bytes, 
   free(found);
 }
 
-/* Rows of an even number of counts (malloc). */
+/* Return the rows padded to an even number of counts (malloc). */
 static int16_t *take_rows(const char *page, const char *name, size_t rows, size_t columns) {
   size_t size = 0;
   unsigned char *packed = take_bytes(page, name, &size);
@@ -108,7 +108,7 @@ static int16_t *take_rows(const char *page, const char *name, size_t rows, size_
   return counts;
 }
 
-/* A number of the page's description. */
+/* Return a number of the page's description. */
 static double number_of(const char *page, const char *name) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "&quot;%s&quot;:", name);
@@ -118,7 +118,7 @@ static double number_of(const char *page, const char *name) {
   return strtod(at + (*at == '['), NULL);
 }
 
-/* Positions and coefficients, for directions of unit length, are within half a count. */
+/* Assert positions and coefficients, for directions of unit length, to half a count. */
 static void check_motion(const char *page, const export_source *s, const uint32_t *order) {
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->mode_count;
@@ -149,7 +149,7 @@ static void check_motion(const char *page, const export_source *s, const uint32_
   free(counts);
 }
 
-/* Every triangle is there, from one corner or another. */
+/* Every triangle is present, starting at any of its corners. */
 static void check_corners(const char *page, const uint32_t *corners, size_t count) {
   size_t size = 0;
   unsigned char *packed = take_bytes(page, "triangles", &size);
@@ -169,7 +169,7 @@ static void check_corners(const char *page, const uint32_t *corners, size_t coun
   free(found);
 }
 
-TEST(test_page_carries_the_basis) {
+TEST(test_page_tensors_equal_basis) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   char *page = read_page();
   export_source s = {0};
@@ -191,7 +191,7 @@ TEST(test_page_carries_the_basis) {
   free(page);
 }
 
-TEST(test_page_of_an_open_surface_has_no_volumes) {
+TEST(test_page_open_surface_no_volumes) {
   assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--scale", "12"), 0);
   char *page = read_page();
   assert_non_null(strstr(page, "&quot;hasVolume&quot;:false"));
@@ -200,7 +200,7 @@ TEST(test_page_of_an_open_surface_has_no_volumes) {
   free(page);
 }
 
-TEST(test_page_title_stays_text) {
+TEST(test_page_title_with_markup_escaped) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--title", "</script><b>&"), 0);
   char *page = read_page();
   assert_non_null(strstr(page, "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>"));
@@ -208,7 +208,7 @@ TEST(test_page_title_stays_text) {
   free(page);
 }
 
-TEST(test_page_of_too_many_modes_or_vectors_is_refused) {
+TEST(test_page_too_many_modes_or_vectors_refused) {
   assert_int_equal(EXPORT_RUN(text, many, "-o", out), 3);
   assert_non_null(strstr(text, "--modes 16"));
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 3);

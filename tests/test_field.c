@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fields over a grid: forward and inverse, images that follow, and what plastimatch makes of them.
- */
+/* Displacement fields on a grid: forward, inverse, warped images, and the same by plastimatch and
+ * elastix. */
 #include "inside_helpers.h"
 
 #include "precompute/inside/embed.h"
@@ -14,7 +14,7 @@ static char folder[] = "/tmp/supine-field-XXXXXX";
 static supine_basis *surface;
 static supine_basis *grid;
 
-/* Half of the affine and the quadratic motion: up to about 20 mm. */
+/* Half of the affine and of the quadratic motion: up to about 20 mm. */
 static const double weights[HELPER_MODES] = {0.5, 0.4, 0.0};
 static const double scales[2] = {1.0, 1.0};
 
@@ -75,7 +75,7 @@ static supine_field made_field(void) {
   return field;
 }
 
-/* Its inverse, found once: a few seconds. */
+/* The inverse field, computed once, as it takes a few seconds. */
 static const supine_field *made_inverse(void) {
   if (inverse_kept.nodes.values == NULL) {
     supine_field field = made_field();
@@ -90,8 +90,9 @@ static double size_of(const double v[3]) {
   return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-/* On its nodes the field is the basis's; far outside it is 0; between, trilinear. */
-TEST(test_field_nodes_cells_and_border) {
+/* At grid nodes the field equals the motion of the basis; far outside it is 0; between nodes it is
+ * trilinear. */
+TEST(test_field_nodes_cells_and_border_interpolated) {
   supine_field field = made_field();
   const supine_basis_info *info = supine_basis_get_info(grid);
   float *moved = malloc(3 * info->vertex_count * sizeof *moved);
@@ -128,9 +129,9 @@ TEST(test_field_nodes_cells_and_border) {
   supine_field_free(&field);
 }
 
-/* Of a scan below full inflation the field counts from the scan: at its own state nothing moves,
- * and at another a point goes where it goes as content. */
-TEST(test_field_of_a_scan_below_full_counts_from_it) {
+/* For a scan below full inflation the field counts from the scan: in the scan's own state nothing
+ * moves, and in another state a point moves as embedded content does. */
+TEST(test_field_scan_below_full_counts_from_scan) {
   supine_inside_shells below;
   supine_inside_report report;
   supine_inside_content points = {.count = 1, .part_count = 1};
@@ -199,7 +200,7 @@ TEST(test_field_inverse_composes_to_less_than_a_tenth) {
                 residual.largest);
   assert_true(residual.largest <= 0.1);
   assert_true(residual.rms > 0.0 && residual.rms < residual.largest);
-  /* What is stated is what is: at points between the nodes too. */
+  /* The stated residual is the real one, also at points between the nodes. */
   const supine_basis_info *info = supine_basis_get_info(surface);
   uint64_t seed = 3;
   double largest = 0.0;
@@ -224,13 +225,13 @@ TEST(test_field_inverse_composes_to_less_than_a_tenth) {
     }
     largest = fmax(largest, size_of(v));
   }
-  assert_true(largest <=
-              1.5 * residual.largest); /* points between the nodes are no worse but by chance */
+  assert_true(largest <= 1.5 * residual.largest); /* points between the nodes are hardly worse */
   supine_field_free(&field);
   supine_field_free(&inverse);
 }
 
-/* 2 mm voxels over the left lump with a ball of radius 9 mm about each of some landmarks. */
+/* Make an image of 2 mm voxels over the left lump, with a ball of radius 9 mm around each landmark.
+ */
 enum { LANDMARKS = 5 };
 static const double landmarks[LANDMARKS][3] = {{71.0, 3.0, -40.0},
                                                {90.0, 20.0, 10.0},
@@ -252,7 +253,7 @@ static supine_image ball_image(supine_image_voxel voxel) {
                          image.origin[2] + 2.0 * (double)(i / 11000)};
     for (int l = 0; l < LANDMARKS; ++l) {
       const double d[3] = {p[0] - landmarks[l][0], p[1] - landmarks[l][1], p[2] - landmarks[l][2]};
-      if (supine_dot(d, d) < 81.0) { /* labels 1 to 5, or brightness that says which */
+      if (supine_dot(d, d) < 81.0) { /* labels 1 to 5, or a brightness for each */
         supine_image_put(&image, i, 1, &(double){voxel == SUPINE_VOXEL_U8 ? l + 1.0 : 1000.0});
       }
     }
@@ -260,7 +261,7 @@ static supine_image ball_image(supine_image_voxel voxel) {
   return image;
 }
 
-/* Centroid of what is bright near a point. */
+/* Return the centroid of the bright voxels near a point. */
 static void centroid(const supine_image *image, const double about[3], int label, double c[3]) {
   double sum = 0.0;
   c[0] = c[1] = c[2] = 0.0;
@@ -288,7 +289,7 @@ static void centroid(const supine_image *image, const double about[3], int label
   }
 }
 
-/* Where the points' own basis puts the landmarks. */
+/* Compute the landmarks' positions by embedding them. */
 static void moved_landmarks(double out[LANDMARKS][3]) {
   static bool known;
   static double kept[LANDMARKS][3];
@@ -322,7 +323,7 @@ static void moved_landmarks(double out[LANDMARKS][3]) {
   supine_inside_shells_free(&shells);
 }
 
-/* A moved image's landmarks against the moved points: within a voxel, 2 mm. */
+/* Landmarks of a warped image agree with the embedded points: within a voxel, 2 mm. */
 static void check_landmarks(const supine_image *image, bool labels) {
   double moved[LANDMARKS][3];
   double largest = 0.0;
@@ -335,14 +336,14 @@ static void check_landmarks(const supine_image *image, bool labels) {
       way[k] = moved[l][k] - landmarks[l][k];
       c[k] -= moved[l][k];
     }
-    assert_true(size_of(way) > 4.0); /* it did move */
+    assert_true(size_of(way) > 4.0); /* the landmarks moved */
     largest = fmax(largest, size_of(c));
   }
   print_message("landmarks off by %.2f mm at most\n", largest);
   assert_true(largest < 2.0);
 }
 
-TEST(test_resample_landmarks_land_where_the_points_do) {
+TEST(test_resample_landmarks_follow_embedded_points) {
   for (int labels = 0; labels < 2; ++labels) {
     supine_image image = ball_image(labels ? SUPINE_VOXEL_U8 : SUPINE_VOXEL_I16);
     supine_image moved = {0};
@@ -357,7 +358,7 @@ TEST(test_resample_landmarks_land_where_the_points_do) {
   }
 }
 
-/* Where a voxel of an image lies below the surface, mm. */
+/* Return the depth of a voxel below the surface, mm. */
 static double depth_at(const supine_field *field, const supine_image *image, size_t i) {
   double p[3];
   double depth;
@@ -368,7 +369,7 @@ static double depth_at(const supine_field *field, const supine_image *image, siz
   return depth;
 }
 
-/* Grams where a mask has a label. */
+/* Sum the mass within one label of a mask, g. */
 static double mass_of(const supine_image *image, const supine_image *mask, double label) {
   double sum = 0.0;
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
@@ -377,14 +378,14 @@ static double mass_of(const supine_image *image, const supine_image *mask, doubl
   return 1e-6 * sum * pow(image->step[0][0], 3.0);
 }
 
-/* Lungs of -850 to -550 HU in a vacuum and in a wall of 40 HU, and masks that move with them:
- * within 1 %, while without scaling it changes by more than 5 % where no wall
- * is mixed in. */
-TEST(test_resample_density_keeps_the_mass_of_the_lungs) {
+/* Lungs of -850 to -550 HU, in a vacuum and in a wall of 40 HU, with masks that are warped too: the
+ * mass within the mask is kept to 1 % with density scaling. Without scaling it changes by more than
+ * 5 %, if no wall is mixed in. */
+TEST(test_resample_density_mass_kept) {
   supine_field field;
   supine_field inverse;
   supine_field_residual residual;
-  const double larger[2] = {-1.4, 1.2}; /* one lung fuller, one emptier */
+  const double larger[2] = {-1.4, 1.2}; /* one lung inflates, one deflates */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), 60.0, &field, NULL),
                    SUPINE_OK);
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
@@ -392,7 +393,7 @@ TEST(test_resample_density_keeps_the_mass_of_the_lungs) {
     for (int wall = 0; wall < 2; ++wall) {
       supine_image image = field.depth;
       supine_image mask = field.depth;
-      for (size_t a = 0; a < 3; ++a) { /* 2.5 mm, half a voxel beside the nodes */
+      for (size_t a = 0; a < 3; ++a) { /* 2.5 mm, half a voxel off the nodes */
         image.size[a] = (size_t)((double)field.depth.size[a] * 4.0 / 2.5) - 2;
         image.step[a][a] = 2.5;
         image.origin[a] += 1.1;
@@ -429,7 +430,7 @@ TEST(test_resample_density_keeps_the_mass_of_the_lungs) {
       assert_true(fabs(after) < 0.01);
       assert_true(wall || fabs(unscaled) > 0.05);
       size_t changed = 0;
-      for (size_t i = 0; i < count && wall; ++i) { /* the wall stays, but for the mask's edge */
+      for (size_t i = 0; i < count && wall; ++i) { /* unchanged, except at the mask's edge */
         changed += supine_image_get(&moved, i) == 0.0 && supine_image_get(&scaled, i) != 40.0;
       }
       assert_true(changed < count / 1000);
@@ -444,8 +445,8 @@ TEST(test_resample_density_keeps_the_mass_of_the_lungs) {
   supine_field_free(&inverse);
 }
 
-/* Another program warps the image balls.nrrd by the field v.nrrd into warped.nrrd: then a landmark
- * is where the points say. Skipped where the program is not there. */
+/* Warp the image balls.nrrd by the field v.nrrd into warped.nrrd with another program; the
+ * landmarks agree with the embedded points. Skip if the program is missing. */
 static void check_warped_by(const char *asked, const char *command) {
   char text[512];
   (void)snprintf(text, sizeof text, "%s >/dev/null 2>&1", asked);
@@ -471,14 +472,14 @@ static void check_warped_by(const char *asked, const char *command) {
   supine_image_free(&image);
 }
 
-TEST(test_plastimatch_warps_by_the_inverse_field) {
+TEST(test_plastimatch_inverse_field_warps_landmarks) {
   check_warped_by("plastimatch --version",
                   "plastimatch warp --input balls.nrrd --fixed balls.nrrd --xf v.nrrd "
                   "--output-img warped.nrrd --output-type short >plastimatch.log 2>&1");
 }
 
-/* elastix's own transformix, with the field as a transform of its kind. */
-TEST(test_elastix_warps_by_the_inverse_field) {
+/* The same by transformix of elastix, with the field as a transform. */
+TEST(test_elastix_inverse_field_warps_landmarks) {
   FILE *file = fopen(in_folder("field.txt"), "wb");
   assert_non_null(file);
   (void)fputs("(Transform \"DeformationFieldTransform\")\n(NumberOfParameters 0)\n"
@@ -500,7 +501,7 @@ TEST(test_elastix_warps_by_the_inverse_field) {
                   "mv result.nrrd warped.nrrd");
 }
 
-TEST(test_field_of_no_grid_refused) {
+TEST(test_field_impossible_grid_refused) {
   supine_field field;
   supine_error error;
   assert_int_equal(
@@ -509,7 +510,7 @@ TEST(test_field_of_no_grid_refused) {
   assert_non_null(strstr(error.message, "supine embed"));
 }
 
-/* A grid's tensors, one after the other made to lie. */
+/* The tensors of a grid, each made invalid in turn. */
 TEST(test_field_malformed_grids_refused) {
   const supine_basis_info *info = supine_basis_get_info(grid);
   const size_t n = info->vertex_count;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fields of another simulator: loading, fitting, cross-validation, and everything that can be
- * wrong. */
+/* Fields of another simulator: loading, fitting, cross-validation, and refused input. */
 #include <sys/stat.h>
 
 #include "precompute/fields.h"
@@ -48,7 +47,7 @@ static int teardown(void **state) {
   return system(command); /* NOLINT(cert-env33-c) */
 }
 
-/* Displacements of the full physics for random directions. */
+/* Compute displacements by the full physics for random directions. */
 static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64_t seed,
                                     double soften) {
   const size_t n = of->mesh.vertex_count;
@@ -73,7 +72,7 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
   return fields;
 }
 
-/* Random fields of exactly this band at given directions. */
+/* Make random fields of exactly this band at given directions. */
 static supine_fields band_limited_fields(size_t band, size_t count, const double *directions) {
   const size_t n = lungs.mesh.vertex_count;
   const size_t terms = supine_sh_count(band);
@@ -114,7 +113,7 @@ static void check_band_limited(const supine_fields *fields, size_t band) {
   supine_projection_compression_free(&field);
 }
 
-TEST(test_fit_band_limited_fields_come_back) {
+TEST(test_fit_band_limited_fields_recovered) {
   enum { COUNT = 40 };
   double directions[3 * COUNT];
   uint64_t seed = 17;
@@ -126,7 +125,7 @@ TEST(test_fit_band_limited_fields_come_back) {
   supine_fields_free(&fields);
 }
 
-/* The closed form of the leave-one-out error against fitting without each direction in turn. */
+/* The closed form of the leave-one-out error equals refitting without each direction in turn. */
 TEST(test_fit_leave_one_out_equals_fitting_without) {
   enum { COUNT = 24, BAND = 2 };
   supine_fields fields = physics_fields(&lungs, COUNT, 99, 1.0);
@@ -172,7 +171,8 @@ TEST(test_fit_leave_one_out_equals_fitting_without) {
   supine_fields_free(&fields);
 }
 
-/* Error of a basis of 60 scattered directions, found on 40 others, against what it states. */
+/* Compare the error of a basis of 60 scattered directions, measured on 40 others, with the stated
+ * error. */
 static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields fields = physics_fields(of, 60, 2008, 1.0);
   supine_fields others = physics_fields(of, 40, 1999, 1.0);
@@ -193,11 +193,11 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   double field2 = 0.0;
   for (size_t d = 0; d < others.direction_count; ++d) {
     const double *g = others.directions + 3 * d;
-    supine_state posture = {.gravity = {g[0], g[1], g[2]}}; /* the default volume: as given */
+    supine_state posture = {.gravity = {g[0], g[1], g[2]}}; /* default: the fields as given */
     supine_pose pose;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_OK);
     supine_deform(basis, &pose, xyz);
-    posture.volume.kind = SUPINE_VOLUME_REST; /* nothing knows it */
+    posture.volume.kind = SUPINE_VOLUME_REST; /* rest is unknown */
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
     posture.volume.kind = SUPINE_VOLUME_FULL;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
@@ -219,11 +219,11 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields_free(&others);
 }
 
-TEST(test_fit_stated_error_is_found_on_other_directions) {
+TEST(test_fit_other_directions_stated_error) {
   check_stated_error(&lungs, "phantom");
 }
 
-TEST(test_fit_real_lung_stated_error_is_found_on_other_directions) {
+TEST(test_fit_real_lung_other_directions_stated_error) {
   static const char *const names[] = {"lungs/chaste_left_5k.obj"};
   supine_lungs real = {0};
   if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &real)) {
@@ -234,8 +234,8 @@ TEST(test_fit_real_lung_stated_error_is_found_on_other_directions) {
   supine_lungs_free(&real);
 }
 
-/* Band 1 and noise, and of band 2 as much as `amount` says: what leaving one out misses by band 2,
- * in parts of what it misses by band 1; and the band that is kept. */
+/* Fit fields of band 1 with noise and `amount` times fields of band 2. Return the leave-one-out
+ * error of band 2 relative to that of band 1, and the band chosen. */
 static double gain_of_band_2(double amount, size_t *band) {
   enum { COUNT = 60 };
   double directions[3 * COUNT];
@@ -259,8 +259,8 @@ static double gain_of_band_2(double amount, size_t *band) {
   return report.error[2] / report.error[1];
 }
 
-/* A higher band has to leave a hundredth less than the lower one does. */
-TEST(test_fit_band_that_gains_less_than_a_hundredth_is_not_kept) {
+/* A higher band is chosen only if its error is lower by at least a hundredth. */
+TEST(test_fit_band_gaining_below_a_hundredth_not_chosen) {
   static const double wanted[] = {0.995, 0.985};
   for (size_t i = 0; i < 2; ++i) {
     double range[2] = {0.0, 2.0};
@@ -314,7 +314,7 @@ TEST(test_fit_vector_volumes_exact) {
   supine_fields_free(&fields);
 }
 
-TEST(test_fit_few_directions_say_what_they_reach) {
+TEST(test_fit_few_directions_report_their_band) {
   supine_fields fields = physics_fields(&lungs, 10, 4, 1.0);
   supine_fit_options options = {.band = -1, .modes = 16};
   supine_compression field;
@@ -334,7 +334,7 @@ TEST(test_fit_few_directions_say_what_they_reach) {
   supine_fields_free(&fields);
 }
 
-/* Asks for a failure of this kind whose message has these words. */
+/* Assert that loading fails with this status and message. */
 static void expect_failure(const char *name, supine_status status, const char *words) {
   supine_fields fields = {0};
   supine_error error = {0};
@@ -345,7 +345,7 @@ static void expect_failure(const char *name, supine_status status, const char *w
   assert_null(fields.directions);
 }
 
-TEST(test_load_tensors_checked) {
+TEST(test_load_bad_tensors_refused) {
   const size_t n = lungs.mesh.vertex_count;
   double gravity[6] = {0, 1, 0, 0, 0, -2};
   float *displacement = calloc(6 * n, sizeof *displacement);

@@ -52,7 +52,7 @@ TEST(test_height_range_random_directions_equals_brute_force) {
   }
 }
 
-/* f [N] of one direction. */
+/* Compute f [N] for one direction. */
 static void force_along(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
                         double low, double high, double *force) {
   const supine_gravities gravity = {1, g, &low, &high};
@@ -78,7 +78,7 @@ TEST(test_force_default_law_is_height_zero_to_one) {
     least = fmin(least, down[i]);
     most = fmax(most, down[i]);
     assert_close(down[i], (height(lungs, g, i) - low) / (high - low), 4 * DBL_EPSILON);
-    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* the parity of the law */
+    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* h(-g) = 1 - h(g) */
   }
   assert_close(least, 0.0, 4 * DBL_EPSILON);
   assert_close(most, 1.0, 4 * DBL_EPSILON);
@@ -100,7 +100,8 @@ TEST(test_force_box_part_uses_box_coordinates) {
   free(force);
 }
 
-/* Softening multiplies the force by an expandability of geometric mean 1 that grows with height. */
+/* Softening multiplies the force by an expandability of geometric mean 1 that increases with
+ * height. */
 TEST(test_force_softened_follows_height) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
@@ -122,8 +123,8 @@ TEST(test_force_softened_follows_height) {
   free(force);
 }
 
-/* Some vertices for several directions are what each is alone. */
-TEST(test_force_of_some_vertices_is_that_of_all) {
+/* The force at some vertices for several directions equals that of each direction alone. */
+TEST(test_force_some_vertices_same_as_all) {
   const supine_lungs *lungs = *state;
   enum { COUNT = 5 };
   const size_t n = lungs->mesh.vertex_count;
@@ -150,8 +151,8 @@ TEST(test_force_of_some_vertices_is_that_of_all) {
   free(all);
 }
 
-/* Neighbouring directions share the search for the lowest and highest vertex. */
-TEST(test_height_range_neighbouring_directions_equals_each_alone) {
+/* The height range is the same whether directions share a search or not. */
+TEST(test_height_range_many_directions_equals_each_alone) {
   const supine_lungs *lungs = *state;
   enum { COUNT = 300 };
   double g[3 * COUNT];

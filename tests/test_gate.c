@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The checks that every surface of lungs passes. */
+/* The checks applied to every surface of lungs. */
 #include "mesh/anatomy.h"
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
@@ -12,7 +12,7 @@ static supine_mesh phantom(void) {
   return mesh;
 }
 
-/* The left half of it, whose triangles come first. */
+/* Return the left lung, whose triangles come first. */
 static supine_mesh left_lung(void) {
   supine_mesh mesh = phantom();
   mesh.triangle_count /= 2;
@@ -26,7 +26,7 @@ static void turn_triangle(supine_mesh *mesh, size_t t) {
   mesh->triangles[3 * t + 2] = second;
 }
 
-/* The surface as a file in other axes has it, read as if it were in LPS. */
+/* Permute the coordinates as if a file in other axes were read as LPS. */
 static void misread(supine_mesh *mesh, supine_axes axes) {
   double matrix[3][3];
   supine_mesh_axes_matrix(axes, matrix);
@@ -42,7 +42,7 @@ static void misread(supine_mesh *mesh, supine_axes axes) {
   }
 }
 
-/* Adds triangles, and vertices for them, counted from the first new one. */
+/* Append triangles with their vertices; indices count from the first new vertex. */
 static void append(supine_mesh *mesh, size_t vertices, const double *at, size_t triangles,
                    const uint32_t *corner, bool of_new) {
   const size_t n = mesh->vertex_count;
@@ -84,7 +84,7 @@ static void expect_said(const outcome *out, const char *words) {
   }
 }
 
-TEST(test_axes_letters_all_48_come_back) {
+TEST(test_axes_letters_all_48_round_trip) {
   for (int code = 1; code < SUPINE_AXES_COUNT; ++code) {
     char letters[4];
     supine_axes axes = SUPINE_AXES_AUTO;
@@ -101,7 +101,7 @@ TEST(test_axes_letters_all_48_come_back) {
   assert_false(supine_mesh_axes_parse("LPSX", &axes));
 }
 
-TEST(test_axes_apply_letters_say_which_way_each_grows) {
+TEST(test_axes_apply_letters_permute_and_flip) {
   supine_axes axes = SUPINE_AXES_AUTO;
   double p[3] = {1.5, -2.25, 4.0};
   assert_true(supine_mesh_axes_parse("SRA", &axes)); /* up, right, front */
@@ -109,7 +109,7 @@ TEST(test_axes_apply_letters_say_which_way_each_grows) {
   assert_true(p[0] == 4.5 && p[1] == -8.0 && p[2] == 3.0);
 }
 
-TEST(test_gate_clean_lungs_nothing_said) {
+TEST(test_gate_clean_lungs_no_message) {
   supine_mesh mesh = phantom();
   const supine_mesh before = phantom();
   outcome out = pass(&mesh, NULL);
@@ -124,8 +124,8 @@ TEST(test_gate_clean_lungs_nothing_said) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* Each of the 47 other ways of reading a pair of lungs is found, and what mends it. */
-TEST(test_gate_any_other_axes_named) {
+/* Each of the 47 wrong readings of a pair of lungs is detected, and the right axes are proposed. */
+TEST(test_gate_any_wrong_axes_proposes_right_ones) {
   for (int code = 2; code < SUPINE_AXES_COUNT; ++code) {
     supine_mesh mesh = phantom();
     char wanted[32] = "add --axes ";
@@ -141,8 +141,9 @@ TEST(test_gate_any_other_axes_named) {
   }
 }
 
-/* The message proposes axes for the file, not for the coordinates after a wrong --axes. */
-TEST(test_gate_axes_given_wrongly_right_ones_named) {
+/* The message proposes axes for the file, not for coordinates already converted by a wrong --axes.
+ */
+TEST(test_gate_wrong_axes_option_proposes_right_one) {
   supine_mesh mesh = phantom();
   const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS, .axes_given = true};
   misread(&mesh, SUPINE_AXES_RAS); /* an LPS file, read as RAS */
@@ -152,7 +153,7 @@ TEST(test_gate_axes_given_wrongly_right_ones_named) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_gate_single_lung_side_by_shape) {
+TEST(test_gate_single_lung_side_found_by_shape) {
   static const char *const said[] = {"taken for the left by its shape",
                                      "taken for the right by its shape"};
   for (int right = 0; right < 2; ++right) {
@@ -161,7 +162,7 @@ TEST(test_gate_single_lung_side_by_shape) {
       mesh.vertices[3 * i] *= -1.0; /* its mirror image is a right lung */
     }
     for (size_t i = 0; i < mesh.vertex_count; ++i) {
-      mesh.vertices[3 * i] += right != 0 ? 900.0 : -900.0; /* where the other one would be */
+      mesh.vertices[3 * i] += right != 0 ? 900.0 : -900.0; /* at the place of the other lung */
     }
     outcome out = pass(&mesh, NULL);
     assert_int_equal(out.status, SUPINE_OK);
@@ -173,7 +174,7 @@ TEST(test_gate_single_lung_side_by_shape) {
   }
 }
 
-TEST(test_gate_specks_dropped_and_told) {
+TEST(test_gate_specks_dropped_and_reported) {
   enum { SPECKS = 10 };
   static const double at[4][3] = {
       {300, -300, 300}, {301, -300, 300}, {300, -299, 300}, {300, -300, 301}};
@@ -199,7 +200,7 @@ TEST(test_gate_specks_dropped_and_told) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_gate_duplicate_loose_reversed_triangles_mended) {
+TEST(test_gate_duplicate_loose_reversed_triangles_repaired) {
   supine_mesh mesh = phantom();
   const supine_mesh before = phantom();
   uint32_t again[5][3];
@@ -223,8 +224,8 @@ TEST(test_gate_duplicate_loose_reversed_triangles_mended) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* More pieces than lobes, each too large for a speck: reported, as lungs may be among them. */
-TEST(test_gate_many_pieces_warned_of) {
+/* More pieces than lobes, each too large to be dropped: reported, as some may be lungs. */
+TEST(test_gate_many_pieces_reported) {
   supine_mesh mesh = phantom();
   for (int side = 0; side < 6; ++side) {
     double at[4][3];
@@ -242,8 +243,8 @@ TEST(test_gate_many_pieces_warned_of) {
   supine_mesh_free(&mesh);
 }
 
-/* Two lungs that share one vertex are still two. */
-TEST(test_gate_lungs_that_touch_parted) {
+/* Two lungs that share one vertex are still two lungs. */
+TEST(test_gate_touching_lungs_separated) {
   supine_mesh mesh = phantom();
   const size_t half = mesh.vertex_count / 2;
   size_t inner[2] = {0, half}; /* of the left lung, the lowest x, of the right the highest */
@@ -310,8 +311,8 @@ TEST(test_gate_impossible_size_refused_unless_units_given) {
   supine_mesh_free(&mesh);
 }
 
-/* Defects of closed surfaces one at a time: what is sound stays as it is. */
-TEST(test_repair_open_surface_left_alone) {
+/* Single defects of closed surfaces; valid surfaces stay unchanged. */
+TEST(test_repair_open_surface_unchanged) {
   supine_mesh mesh = phantom();
   supine_mesh_repair_report report;
   mesh.triangle_count -= 3; /* a hole */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine.glsl off screen, in GLSL ES 3.00 and GLSL 3.30 core: positions and normals by transform
- * feedback equal the C evaluator's within rounding, of lungs at different scales in one draw. Skips
- * where EGL gives no such context. */
+/* supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core: positions and normals by
+ * transform feedback equal those of the C evaluator within rounding, for lungs at different scales
+ * in one draw. Skipped if EGL has no such context. */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <GLES3/gl3.h>
@@ -16,7 +16,7 @@
 
 enum { VERTICES = 1003, LUNGS = 2, NORMALS = 8, WORDS = 3 };
 
-/* Functions common to both APIs, from the context's own library. */
+/* Functions of both APIs, loaded from the context's library. */
 #define GL_FUNCTIONS(F)                                                                            \
   F(PFNGLATTACHSHADERPROC, AttachShader)                                                           \
   F(PFNGLBEGINTRANSFORMFEEDBACKPROC, BeginTransformFeedback)                                       \
@@ -64,7 +64,7 @@ typedef struct gl_api {
 #undef MEMBER
 } gl_api;
 
-/* A current context of that API without a surface; false where there is none. */
+/* Make a context of this API without a surface current; return false if there is none. */
 static bool make_context(EGLenum api, EGLDisplay *display, EGLContext *context, gl_api *gl) {
   const EGLint renderable = api == EGL_OPENGL_API ? EGL_OPENGL_BIT : EGL_OPENGL_ES3_BIT;
   const EGLint wanted[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, renderable, EGL_NONE};
@@ -117,7 +117,7 @@ static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, co
   return shader;
 }
 
-/* One that displaces by the function for `vectors` vec4s of coefficients. */
+/* Link a program that displaces by the function for `vectors` vec4s of coefficients. */
 static GLuint make_program(const gl_api *gl, const char *version, const char *library,
                            size_t vectors) {
   static const char *const arguments[] = {"c0", "c0, c1", "c0, c1, c2", "c0, c1, c2, c3"};
@@ -161,7 +161,7 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
   return program;
 }
 
-/* Somewhere to draw to, though nothing is drawn: without a surface there is no default. */
+/* Make a framebuffer: without a surface there is no default one, even if nothing is rasterised. */
 static void make_framebuffer(const gl_api *gl) {
   GLuint framebuffer = 0;
   GLuint renderbuffer = 0;
@@ -173,7 +173,7 @@ static void make_framebuffer(const gl_api *gl) {
   gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, renderbuffer);
 }
 
-/* What a program draws with. */
+/* Input of a program. */
 typedef struct model {
   size_t modes;
   float *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] */
@@ -183,7 +183,7 @@ typedef struct model {
   float normal_weights[LUNGS * WORDS * 3];
 } model;
 
-/* Vertex arrays of the model. */
+/* Make the vertex arrays of the model. */
 static void load_model(const gl_api *gl, const model *m) {
   const size_t floats = SUPINE_GL_FLOATS + m->modes;
   const GLsizei stride = (GLsizei)(floats * sizeof(float));
@@ -214,7 +214,7 @@ static void load_model(const gl_api *gl, const model *m) {
   }
 }
 
-/* Position and normal of every vertex by the shader, [VERTICES, 6], in one draw. */
+/* Compute position and normal of every vertex by the shader, [VERTICES, 6], in one draw. */
 static void run_shader(const gl_api *gl, GLuint program, const model *m, float *captured) {
   const GLsizeiptr output = (GLsizeiptr)(6 * VERTICES * sizeof(float));
   const GLsizei vectors = (GLsizei)((m->modes + 3) / 4);
@@ -240,8 +240,8 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
   memcpy(captured, mapped, (size_t)output);
 }
 
-/* The GPU's normals have the numbers of the C evaluator's words; products and the root round: less
- * than this, of sums that random modes make cancel tenfold. */
+/* Bound for normals: the GPU has the same packed numbers as the C evaluator, but rounds products
+ * and the root; sums of random modes cancel tenfold. */
 static const double normal_rounding = 1e-4;
 
 static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes) {
@@ -272,7 +272,7 @@ static void check_modes(const gl_api *gl, const char *version, const char *libra
   assert_int_equal(supine_deform_lit(basis, POSED(basis, weights, scales), cpu, cpu + 3 * VERTICES),
                    SUPINE_OK);
   double moved = 0;
-  /* Both round as supine_basis_error says, so they differ by at most twice that. */
+  /* Both round as supine_basis_error states, so they differ by at most twice that. */
   const double bound = 2 * supine_basis_error(basis, POSED(basis, weights, scales));
   assert_true(bound < 1e-3);
   for (size_t i = 0; i < VERTICES; ++i) {

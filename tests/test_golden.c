@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A basis file of every version of the format ever written, read for ever. */
+/* Basis files of every version of the format stay readable. */
 #include "test.h"
 
 #include <supine/runtime.h>
 
 #include "tests/poses.h"
 
-/* Both files hold the same made pair of lungs of 324 vertices; the numbers are those that version
- * 0.1.0 printed for the first. */
+/* Both files hold the same synthetic pair of lungs with 324 vertices; the expected values were
+ * printed by version 0.1.0 for the first. */
 static void check_golden(const char *path, const char *version, const char *checksum) {
   supine_basis *basis = NULL;
   supine_error error = {0};
@@ -47,7 +47,7 @@ static void check_golden(const char *path, const char *version, const char *chec
   for (size_t i = 0; i < sizeof want / sizeof *want; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const double x = (double)xyz[3 * want[i].vertex + axis];
-      assert_true(fabs(x - want[i].at[axis]) <= 1e-5); /* mm: a float's last place at 100 mm */
+      assert_true(fabs(x - want[i].at[axis]) <= 1e-5); /* mm; resolution of float at 100 mm */
     }
   }
   supine_basis_close(basis);

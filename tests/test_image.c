@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Images: NRRD and NIfTI there and back in every orientation and type, and files that lie. */
+/* Images: NRRD and NIfTI round trips in every orientation and type, and invalid files. */
 #include "mesh/io/image.h"
 #include "test.h"
 
@@ -27,7 +27,7 @@ static int teardown(void **state) {
   return system(command); /* NOLINT(cert-env33-c) */
 }
 
-/* 5 x 4 x 3 voxels, turned any way. */
+/* Make an image of 5 x 4 x 3 voxels in any orientation. */
 static supine_image made(supine_image_voxel voxel, uint64_t seed) {
   supine_image image = {
       .size = {5, 4, 3}, .origin = {-101.5, 33.25, 7.0}, .voxel = voxel, .channels = 1};
@@ -59,7 +59,7 @@ static void check_same(const supine_image *a, const supine_image *b, double tole
   }
 }
 
-TEST(test_image_there_and_back_same) {
+TEST(test_image_write_then_read_same) {
   static const char *const names[] = {"a.nrrd", "a.nii", "a.nii.gz", "A.NRRD"};
   for (int voxel = 0; voxel < SUPINE_VOXEL_COUNT; ++voxel) {
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -92,7 +92,7 @@ static size_t read_bytes(const char *path, unsigned char *bytes, size_t room) {
   return size;
 }
 
-TEST(test_nrrd_in_ras_is_turned) {
+TEST(test_nrrd_in_ras_converted_to_lps) {
   static const char text[] = "NRRD0004\ntype: uchar\ndimension: 3\n"
                              "space: right-anterior-superior\nsizes: 2 1 2\n"
                              "space directions: (2,0.5,0) (0,3,0) (0,0,4)\n"
@@ -115,7 +115,7 @@ TEST(test_nrrd_in_ras_is_turned) {
   supine_image_free(&image);
 }
 
-/* Other bytes first, and a slope: 348 bytes as the standard lays them out. */
+/* The other byte order, and a slope: 348 bytes as in the standard. */
 TEST(test_nifti_other_endianness_and_slope) {
   unsigned char bytes[352 + 120];
   supine_image image = made(SUPINE_VOXEL_I16, 5);
@@ -210,7 +210,7 @@ TEST(test_nifti_bad_files_refused) {
              {40, {4, 5, 4, 1, 3}, 5, "4 axes"},
              {254, {0}, 1, "orientation"},
              {70, {32}, 1, "COMPLEX"},
-             {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* a row of the frame is 0 */
+             {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* a row of the matrix is 0 */
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     memcpy(changed, bytes, sizeof bytes);
     memcpy(changed + bad[i].at, bad[i].value, bad[i].count * sizeof(int16_t));
@@ -223,7 +223,7 @@ TEST(test_nifti_bad_files_refused) {
   }
 }
 
-/* A checksum that is wrong is found, although every voxel could be read. */
+/* A wrong checksum is detected, although every voxel could be read. */
 TEST(test_image_gzip_checksum_wrong_refused) {
   static const char *const names[] = {"c.nrrd", "c.nii.gz", "c.mha"};
   for (size_t i = 0; i < 3; ++i) {
@@ -231,7 +231,7 @@ TEST(test_image_gzip_checksum_wrong_refused) {
     supine_image image = made(SUPINE_VOXEL_F64, 5);
     assert_int_equal(supine_image_write(in_folder(names[i]), &image, NULL, NULL), SUPINE_OK);
     const size_t size = read_bytes(in_folder(names[i]), bytes, sizeof bytes);
-    bytes[size - (i == 2 ? 1 : 5)] ^= 0x55; /* zlib ends in it, gzip in it and four bytes more */
+    bytes[size - (i == 2 ? 1 : 5)] ^= 0x55; /* zlib ends with it, gzip 4 bytes later */
     write_bytes(in_folder(names[i]), bytes, size);
     check_refused(names[i], SUPINE_ERROR_FORMAT, names[i]);
     supine_image_free(&image);
@@ -251,7 +251,7 @@ TEST(test_image_truncated_gzip_refused) {
   }
 }
 
-TEST(test_image_names_and_places_refused) {
+TEST(test_image_bad_names_and_folders_refused) {
   supine_image image = made(SUPINE_VOXEL_U8, 5);
   supine_error error;
   assert_true(supine_image_supports("x.NII.GZ") && supine_image_supports("x.nrrd"));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What is carried along inside the lungs: who is inside, how it moves, what the file holds. */
+/* Content inside the lungs: location, motion, and the file. */
 #include "inside_helpers.h"
 
 #include "precompute/inside/biharmonic.h"
@@ -40,7 +40,7 @@ static double distance(const double a[3], const double b[3]) {
   return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
 }
 
-/* A point of the surface of a lung, in its triangle. */
+/* Return a point on the surface of a lung, inside a given triangle. */
 static void random_surface_point(const supine_inside_shell *shell, uint64_t *seed, double p[3],
                                  size_t corner[3], double weight[3]) {
   const size_t t = (size_t)(helper_random(seed) * (double)shell->triangle_count);
@@ -60,7 +60,8 @@ static void random_surface_point(const supine_inside_shell *shell, uint64_t *see
   }
 }
 
-/* A lump's points are its centre's share of the way to the surface: inside below 1. */
+/* Return the point at `share` of the way from the centre of a lump to its surface: inside if below
+ * 1. */
 static void point_at_share(size_t lung, uint64_t *seed, double share, double p[3]) {
   const double centre[3] = {lung == 0 ? 71.3 : -72.9, 3.1, -40.7};
   size_t corner[3];
@@ -71,7 +72,7 @@ static void point_at_share(size_t lung, uint64_t *seed, double share, double p[3
   }
 }
 
-/* The nearest point of a triangle by halving the barycentric square: slow and simple. */
+/* Find the nearest point of a triangle by halving barycentric intervals: slow and simple. */
 static double slow_distance(const supine_inside_shell *shell, const double x[3]) {
   double best = INFINITY;
   for (size_t t = 0; t < shell->triangle_count; ++t) {
@@ -86,7 +87,7 @@ static double slow_distance(const supine_inside_shell *shell, const double x[3])
       double at[2];
       for (int side = 0; side < 2; ++side) {
         const double a = low + (side + 1) * (high - low) / 3.0;
-        double square = 0.0; /* nearest b for this a, on the segment across the triangle */
+        double square = 0.0; /* nearest b for this a, on the line across the triangle */
         double along = 0.0;
         double length = 0.0;
         for (int k = 0; k < 3; ++k) {
@@ -127,7 +128,8 @@ TEST(test_surface_find_side_and_distance_of_random_points) {
     assert_int_equal(place.depth > 0.0, share < 1.0);
     assert_true(fabs(distance(p, place.nearest) - fabs(place.depth)) < 1e-9);
     if (i < 40) {
-      /* The slow search ends at 1e-10 of an edge; distances off the minimum grow as its square. */
+      /* The slow search ends at 1e-10 of an edge; the distance grows with the square of that error.
+       */
       assert_true(fabs(slow_distance(&shells.shell[0], p) - fabs(place.depth)) < 1e-6);
     }
   }
@@ -138,7 +140,7 @@ TEST(test_surface_find_near_place_same_answer) {
   supine_inside_place near = {0};
   for (int i = 0; i < 500; ++i) {
     double p[3];
-    if (i % 50 == 0) { /* a walk, begun anew now and then: the hint is then from far away */
+    if (i % 50 == 0) { /* a random walk with restarts, after which the hint is far away */
       point_at_share(0, &seed, 1.4 * helper_random(&seed), p);
     } else {
       for (int k = 0; k < 3; ++k) {
@@ -169,7 +171,7 @@ TEST(test_surface_find_torn_surface_inside_stays_inside) {
   supine_inside_surface_destroy(torn);
 }
 
-TEST(test_biharmonic_centres_and_affine_come_back) {
+TEST(test_biharmonic_centres_and_affine_exact) {
   enum { COUNT = 300, COLUMNS = 4, CENTRES = 120 };
   double points[3 * COUNT];
   double values[COUNT * COLUMNS];
@@ -194,7 +196,7 @@ TEST(test_biharmonic_centres_and_affine_come_back) {
     }
     noise = fmax(noise, fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]));
   }
-  assert_true(noise > 0.1); /* what is no centre is not met */
+  assert_true(noise > 0.1); /* points that are no centres are not interpolated */
   for (size_t j = 0; j < CENTRES; ++j) {
     const size_t i = fit.chosen[j];
     assert_true(fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]) < 1e-9);
@@ -212,7 +214,7 @@ TEST(test_biharmonic_points_in_a_plane_refused) {
   assert_non_null(strstr(error.message, "plane"));
 }
 
-/* Content of points at shares of the way to both lungs' surfaces. */
+/* Make content of points at given shares of the way to both lungs' surfaces. */
 static supine_inside_content made_points(size_t count, double lowest, double highest,
                                          uint64_t seed) {
   supine_inside_content content = {.count = count, .part_count = count};
@@ -240,7 +242,7 @@ static supine_inside_report embed(const supine_inside_content *content, bool cla
   return report;
 }
 
-/* Largest distance of embedded points from where one mode of the motion would put them. */
+/* Return the largest distance of embedded points from the motion of one mode. */
 static double farthest_from(const supine_inside_content *content, int mode) {
   supine_basis *inside = helper_open(inside_path);
   const double scales[2] = {1.3, 1.3};
@@ -266,8 +268,8 @@ static double farthest_from(const supine_inside_content *content, int mode) {
   return largest;
 }
 
-/* Affine: to the rounding of float32 at 200 mm. Quadratic, which a surface's values alone do not
- * determine inside: 6.2 % of the largest motion here, at most. */
+/* An affine motion is exact to the rounding of float32 at 200 mm. A quadratic motion, which its
+ * surface values do not determine inside, is wrong by at most 6.2 % of the largest displacement. */
 TEST(test_embed_affine_exact_quadratic_near) {
   supine_inside_content content = made_points(800, 0.0, 0.97, 21);
   const supine_inside_report report = embed(&content, false, 0);
@@ -288,8 +290,9 @@ TEST(test_embed_affine_exact_quadratic_near) {
   supine_inside_content_free(&content);
 }
 
-/* With few centres too: 0.01 mm on every vertex and in every triangle, for all modes at once. */
-TEST(test_embed_points_of_the_surface_move_with_it) {
+/* With few centres, too: within 0.01 mm on every vertex and in every triangle, for all modes at
+ * once. */
+TEST(test_embed_surface_points_move_with_surface) {
   enum { COUNT = 600 };
   supine_inside_content content = made_points(COUNT, 1.0, 1.0, 33);
   double target[3 * COUNT];
@@ -329,9 +332,9 @@ TEST(test_embed_points_of_the_surface_move_with_it) {
   supine_inside_content_free(&content);
 }
 
-/* Content of a scan that was not at full inflation: it is where the scan had it, at the scan's own
- * state it comes back there, and on the scan's surface it moves with it. */
-TEST(test_embed_of_a_scan_below_full_inflation) {
+/* Content of a scan below full inflation starts at its position in the scan, returns there in the
+ * scan's own state, and moves with the scan's surface if it lies on it. */
+TEST(test_embed_scan_below_full_counts_from_scan) {
   enum { COUNT = 400 };
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned", folder);
@@ -385,7 +388,7 @@ TEST(test_embed_of_a_scan_below_full_inflation) {
     assert_true(part[i] % 2 == 1 || distance(got, target + 3 * (size_t)part[i]) < 0.01);
   }
   supine_deform(inside, &moved_shells.scan, xyz);
-  for (size_t i = 0; i < COUNT; ++i) { /* back where it was given, to float32 */
+  for (size_t i = 0; i < COUNT; ++i) { /* back at the given position, to float32 */
     const double got[3] = {(double)xyz[3 * i], (double)xyz[3 * i + 1], (double)xyz[3 * i + 2]};
     assert_true(distance(got, content.points + 3 * (size_t)part[i]) < 1e-4);
   }
@@ -398,7 +401,7 @@ TEST(test_embed_of_a_scan_below_full_inflation) {
   free(surface_scanned);
 }
 
-TEST(test_shells_of_a_scan_out_of_reach_refused) {
+TEST(test_shells_unreachable_scan_refused) {
   char path[80];
   supine_inside_shells none;
   supine_error error;
@@ -443,7 +446,7 @@ TEST(test_embed_file_shares_weights_volume_and_metadata) {
   supine_inside_content_free(&content);
 }
 
-TEST(test_embed_points_of_one_lung_file_has_both) {
+TEST(test_embed_points_in_one_lung_file_has_both) {
   supine_inside_content content = made_points(30, 0.2, 0.9, 2);
   for (int other = 0; other < 2; ++other) {
     for (size_t i = 0; i < content.count; ++i) {
@@ -470,7 +473,7 @@ TEST(test_embed_outside_counted_and_clamped) {
   assert_int_equal(report.farthest, 17);
   const supine_inside_place place = supine_inside_surface_find(shells.shell[0].surface, far, NULL);
   assert_true(fabs(report.farthest_mm + place.depth) < 1e-9 && report.farthest_mm > 600.0);
-  assert_true(farthest_from(&content, 0) < 8.0 * 0x1p-24 * 1024.0); /* affine goes on outside */
+  assert_true(farthest_from(&content, 0) < 8.0 * 0x1p-24 * 1024.0); /* exact outside, too */
   report = embed(&content, true, 0);
   assert_int_equal(report.outside, 1);
   supine_basis *inside = helper_open(inside_path);
@@ -496,7 +499,7 @@ TEST(test_embed_outside_counted_and_clamped) {
 }
 
 /* Every point inside lies in a cell whose eight corners are stored. */
-TEST(test_grid_cells_of_all_points_inside_are_whole) {
+TEST(test_grid_points_inside_cells_complete) {
   const supine_image like = {.size = {300, 260, 280},
                              .origin = {180.0, 120.0, -200.0},
                              .step = {{-0.96, 0.28, 0.0}, {-0.28, -0.96, 0.0}, {0.0, 0.0, 1.5}}};
@@ -628,7 +631,7 @@ TEST(test_content_meshes_parts_and_triangles) {
   supine_inside_report report;
   const supine_inside_options options = {0};
   assert_int_equal(supine_inside_embed(&shells, &content, &options, inside_path, &report, NULL),
-                   SUPINE_ERROR_MESH); /* nothing */
+                   SUPINE_ERROR_MESH); /* no points */
   content = made_points(4, 0.5, 0.6, 1);
   assert_int_equal(supine_inside_embed(&shells, &content, &options, "/nowhere/x", &report, NULL),
                    SUPINE_ERROR_WRITE);
@@ -647,7 +650,8 @@ static double part_volume(const supine_basis_info *info, uint32_t part_end, cons
   return sum / 6.0;
 }
 
-/* Sum of squares from positions to others after a small turn about their mean along an axis. */
+/* Return the sum of squared distances to other positions after a small rotation about the mean and
+ * one axis. */
 static double misfit_turned(size_t count, const float *from, const float *to, size_t axis,
                             double angle) {
   const size_t a = (axis + 1) % 3;
@@ -673,9 +677,9 @@ static double misfit_turned(size_t count, const float *from, const float *to, si
   return sum;
 }
 
-/* A tumour that keeps its size beside one that does not: given where a scan had it, there again in
- * the scan's state, of one volume in every pose, the best rigid motion of the field, and the same
- * through every call that places vertices. */
+/* A rigid tumour beside a soft one: at its position in the scan's state, of constant volume in
+ * every pose, moved by the best rigid fit to the field, and the same by every function that places
+ * vertices. */
 TEST(test_embed_rigid_part_keeps_volume_and_follows_the_field) {
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned-rigid", folder);
@@ -732,7 +736,7 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_the_field) {
       others[k] += info->vertices[k];
     }
     supine_deform(inside, pose, xyz);
-    assert_close(part_volume(info, end, xyz) / given, 1.0, 1e-5); /* a thousandth is promised */
+    assert_close(part_volume(info, end, xyz) / given, 1.0, 1e-5); /* documented: to a thousandth */
     const double misfit = misfit_turned(end, xyz, others, 0, 0.0);
     for (size_t axis = 0; axis < 6; ++axis) {
       assert_true(misfit < misfit_turned(end, xyz, others, axis % 3, axis < 3 ? 0.002 : -0.002));
@@ -755,7 +759,7 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_the_field) {
       assert_memory_equal(others, xyz + 3 * begin, 3 * (last - begin) * sizeof *xyz);
     }
   }
-  assert_true(least_soft > 0.02); /* the field itself does not keep it */
+  assert_true(least_soft > 0.02); /* the field itself changes the volume */
   free(xyz);
   supine_basis_close(soft);
   supine_basis_close(inside);

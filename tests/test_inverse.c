@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equilibrium backwards: the force comes back from its catch, over the paper's links and over
+/* The inverse of the equilibrium recovers the force from its catch, over the paper's links and over
  * links with a reach. */
 #include "precompute/physics/model.h"
 #include "test.h"
@@ -59,7 +59,7 @@ static void solve(const fixture *f, int k, const double *stiffness, double *caug
       SUPINE_OK);
 }
 
-TEST(test_force_comes_back_from_its_catch) {
+TEST(test_equilibrium_force_of_its_catch_recovers_it) {
   const fixture *f = *state;
   const size_t n = f->lungs.mesh.vertex_count;
   double *caught = malloc(n * sizeof *caught);
@@ -70,7 +70,7 @@ TEST(test_force_comes_back_from_its_catch) {
       solve(f, k, stiffness, caught);
       assert_int_equal(supine_physics_equilibrium_force(f->equilibrium[k], caught, force, NULL),
                        SUPINE_OK);
-      assert_true(helper_difference(n, caught, f->force) > 0.01); /* something was passed on */
+      assert_true(helper_difference(n, caught, f->force) > 0.01); /* catch and force differ */
       assert_true(helper_difference(n, force, f->force) < 1e-10);
     }
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Kriging against fits without a point, and against truth drawn from its own model. */
+/* Kriging against refits without a point, and against data drawn from its own model. */
 #include "runtime/kriging.h"
 #include "test.h"
 
@@ -15,7 +15,7 @@ static double normal(uint64_t *state) {
   return sum;
 }
 
-/* Points of two lungs that move down by up to 40 mm. */
+/* Make points of two lungs that move down by up to 40 mm. */
 static void place(uint64_t *seed, size_t count, supine_kriging_point *points) {
   for (size_t j = 0; j < count; ++j) {
     supine_kriging_point *p = &points[j];
@@ -33,7 +33,7 @@ static void place(uint64_t *seed, size_t count, supine_kriging_point *points) {
   }
 }
 
-/* What points show: translation, volume, rotation, a draw of g, and noise where `noisy`. */
+/* Set the residuals of points: translation, volume, rotation, a draw of g, and noise if `noisy`. */
 static void draw(uint64_t *seed, size_t count, supine_kriging_point *points, const double *terms) {
   double *factor = fixture_allocate(count * count, sizeof *factor);
   double *white = fixture_allocate(count, sizeof *white);
@@ -113,7 +113,7 @@ static int by_value(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-TEST(test_kriging_truth_from_the_model_has_the_stated_error) {
+TEST(test_kriging_data_of_model_stated_error) {
   enum { SEEDS = 30 };
   double ratio[SEEDS];
   double held = 0;
@@ -159,7 +159,7 @@ TEST(test_kriging_truth_from_the_model_has_the_stated_error) {
   free(space);
 }
 
-TEST(test_kriging_one_point_and_repeated_points_stay_positive_definite) {
+TEST(test_kriging_one_or_repeated_points_positive_definite) {
   uint64_t seed = 5;
   supine_kriging_point points[12];
   double *space = fixture_allocate(supine_kriging_space(12), sizeof *space);
@@ -180,7 +180,7 @@ TEST(test_kriging_one_point_and_repeated_points_stay_positive_definite) {
     double scratch[12];
     predict(&fit, &points[0], shift, &variance);
     assert_true(isfinite((double)shift[0]) && variance > 0);
-    assert_true(variance <= 3.01F); /* as its own place was seen, with 1 mm of noise */
+    assert_true(variance <= 3.01F); /* it was observed itself, with 1 mm of noise */
     assert_int_equal(supine_kriging_leave_out(&fit, 0, left, scratch) > 0, count > 1);
   }
   points[1].noise = points[0].noise = 0;
@@ -192,7 +192,7 @@ TEST(test_kriging_one_point_and_repeated_points_stay_positive_definite) {
   free(space);
 }
 
-TEST(test_kriging_rotation_of_points_on_a_line_is_refused) {
+TEST(test_kriging_rotation_of_collinear_points_refused) {
   uint64_t seed = 9;
   supine_kriging_point points[4];
   double space[4 * 17];

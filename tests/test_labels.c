@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Label maps into surfaces: what comes back of lungs that are known, whose conventions are
- * understood, what is said of what was done, and maps that are none. */
+/* Surfaces from label maps: accuracy with known lungs, label conventions, the report, and refused
+ * maps. */
 #include "mesh/anatomy.h"
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
@@ -62,7 +62,7 @@ static made surfaces_of(const char *const *paths, size_t count,
   return out;
 }
 
-/* Writes the image under a name, and makes surfaces of the file. */
+/* Write the image under a name, and make surfaces from the file. */
 static made surfaces_of_image(const supine_image *image, const char *name,
                               const supine_labels_options *options) {
   const char *path = in_folder(name);
@@ -100,7 +100,7 @@ static void check_closed(const supine_mesh *mesh) {
   assert_true(supine_mesh_volume(mesh) > 0.0);
 }
 
-/* Distance of a map's surfaces from the true one, RMS. */
+/* Return the RMS distance of a map's surfaces from the true one. */
 static double rms_from(const supine_inside_surface *truth, const made *out) {
   enum { EVERY = 29 };
   double sum = 0.0;
@@ -116,9 +116,9 @@ static double rms_from(const supine_inside_surface *truth, const made *out) {
   return sqrt(sum / count);
 }
 
-/* The acceptance of the whole: voxels of 1, 2, 3 mm bring the lungs back within 0.5, 1 and 2 % of
- * volume and half a voxel RMS. */
-TEST(test_labels_phantom_comes_back) {
+/* Voxels of 1, 2 and 3 mm give the volume of the lungs within 0.5, 1 and 2 % and the surface within
+ * half a voxel RMS. */
+TEST(test_labels_phantom_recovered) {
   supine_mesh phantom = {0};
   supine_inside_surface *truth = NULL;
   assert_int_equal(supine_phantom_create(20000, 6000.0, &phantom, NULL), SUPINE_OK);
@@ -164,7 +164,7 @@ TEST(test_labels_phantom_comes_back) {
   supine_mesh_free(&phantom);
 }
 
-/* Relabels 1 (right) and 2 (left) by height, from the feet up, and by side. */
+/* Split labels 1 (right) and 2 (left) by height, from the feet up, and by side. */
 static supine_image relabelled(const supine_image *from, const uint8_t left[2],
                                const uint8_t right[3]) {
   supine_image image = *from;
@@ -183,7 +183,7 @@ static supine_image relabelled(const supine_image *from, const uint8_t left[2],
 TEST(test_labels_conventions_same_lungs) {
   static const struct {
     uint8_t left[2], right[3];
-    const char *options[3]; /* that are the same, ended by NULL after the first */
+    const char *options[3]; /* equivalent options, ended by NULL */
     const char *said;
   } maps[] = {
       {{2, 2}, {1, 1, 1}, {NULL, "lungmask", "left=2,right=1"}, "2 left; 1 right"},
@@ -216,7 +216,7 @@ TEST(test_labels_conventions_same_lungs) {
   supine_image_free(&image);
 }
 
-/* All of a TotalSegmentator map, other organs among it; and a file a lobe. */
+/* A whole TotalSegmentator map with other organs; and one file for each lobe. */
 TEST(test_labels_other_organs_and_files_of_lobes) {
   static const uint8_t left[2] = {11, 10};
   static const uint8_t right[3] = {14, 13, 12};
@@ -259,8 +259,8 @@ TEST(test_labels_other_organs_and_files_of_lobes) {
   supine_image_free(&image);
 }
 
-/* A lung alone has to be named. */
-TEST(test_labels_one_lung_named) {
+/* The side of a single lung must be given. */
+TEST(test_labels_one_lung_needs_side) {
   supine_image image = helper_two_lungs(4.0);
   const supine_labels_options left = {.labels = "left=2", .edge = 5.0};
   const supine_labels_options both = {.edge = 5.0};
@@ -286,14 +286,14 @@ static void box_set(supine_image *image, const size_t low[3], const size_t high[
   }
 }
 
-TEST(test_labels_touching_lungs_parted) {
+TEST(test_labels_touching_lungs_separated) {
   supine_image image = helper_two_lungs(4.0);
   const size_t left = count_label(&image, 2);
   const size_t right = count_label(&image, 1);
   for (size_t i = 0; i < voxels(&image); ++i) {
     ((uint8_t *)image.values)[i] = ((uint8_t *)image.values)[i] != 0;
   }
-  /* a bridge of 5 x 4 voxels across the midline, at x 0, and what it adds */
+  /* a bridge of 5 x 4 voxels across the midline at x = 0; count the voxels that it adds */
   const size_t low[3] = {image.size[0] / 2 - 5, image.size[1] / 2 - 2, image.size[2] / 2 - 2};
   const size_t high[3] = {image.size[0] / 2 + 4, image.size[1] / 2 + 3, image.size[2] / 2 + 2};
   box_set(&image, low, high, 1);
@@ -302,7 +302,7 @@ TEST(test_labels_touching_lungs_parted) {
   made out = surfaces_of_image(&image, "touch.nrrd", &options);
   assert_int_equal(out.report.lung_count, 2);
   assert_true(out.report.parted >= 16.0 && out.report.parted <= 24.0);
-  /* the bridge is shared out, and nothing of the lungs changes sides but by it */
+  /* the bridge is divided between the lungs, and no other voxel changes sides */
   assert_true(out.report.lung[0].mask >= 0.064 * (double)left - added &&
               out.report.lung[0].mask <= 0.064 * (double)left + added);
   assert_true(fabs(out.report.lung[0].mask + out.report.lung[1].mask -
@@ -318,7 +318,7 @@ TEST(test_labels_islands_cavities_gaps_counted) {
   const double left = voxel * (double)count_label(&image, 2);
   const size_t middle[3] = {(size_t)((66.0 - image.origin[0]) / 4.0), image.size[1] / 2,
                             image.size[2] / 2};
-  /* three cavities of 8, 1 and 1 voxels, two of which meet at an edge alone */
+  /* three cavities of 8, 1 and 1 voxels; two of them meet at an edge only */
   for (size_t c = 0; c < 3; ++c) {
     const size_t low[3] = {middle[0] + (c == 2 ? 1 : 4 * c) - 2, middle[1] + (c == 2 ? 1 : 0),
                            middle[2] + (c == 0 ? 4 : 0)};
@@ -326,7 +326,7 @@ TEST(test_labels_islands_cavities_gaps_counted) {
                             low[2] + (c == 0 ? 2 : 1)};
     box_set(&image, low, high, 0);
   }
-  /* an island of 12 voxels in a corner, of the right lung */
+  /* an island of 12 voxels of the right lung, in a corner */
   box_set(&image, (const size_t[3]){1, 1, 1}, (const size_t[3]){4, 3, 3}, 1);
   const supine_labels_options options = {.edge = 5.0};
   made out = surfaces_of_image(&image, "holes.nrrd", &options);
@@ -339,7 +339,7 @@ TEST(test_labels_islands_cavities_gaps_counted) {
   assert_true(fabs(lung[1].dropped - 12.0 * voxel) < 1e-9);
   assert_int_equal(lung[1].cavities, 0);
   release(&out);
-  /* a hollow with a channel to the outside is no cavity: said, until it is closed */
+  /* a hollow with a channel to the outside is no cavity: reported until --close closes it */
   const size_t hollow_low[3] = {middle[0] - 3, middle[1] - 3, middle[2] - 3};
   const size_t hollow_high[3] = {middle[0] + 4, middle[1] + 4, middle[2] + 4};
   box_set(&image, hollow_low, hollow_high, 0);
@@ -361,8 +361,8 @@ TEST(test_labels_islands_cavities_gaps_counted) {
   supine_image_free(&image);
 }
 
-/* Every flip of the axes says what it is, and a map that lies about them is found out. */
-TEST(test_labels_anatomy_against_the_header) {
+/* The axes of a header are reported, and anatomy finds the axes that the voxels really have. */
+TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   static const double spacing[3] = {4.0, 4.0, 4.0};
   const supine_labels_options options = {.labels = "one", .edge = 5.0};
   supine_mesh phantom = {0};
@@ -376,7 +376,7 @@ TEST(test_labels_anatomy_against_the_header) {
     static const char *const ways[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
     char wanted[64];
     supine_image map = image;
-    for (int a = 0; a < 3; ++a) { /* the header alone: the voxels stay where they are */
+    for (int a = 0; a < 3; ++a) { /* change the header only: the voxels stay in place */
       const bool flip = (flips >> a & 1) != 0;
       map.step[a][a] = flip ? -4.0 : 4.0;
       map.origin[a] = flip ? image.origin[a] + 4.0 * (double)(image.size[a] - 1) : image.origin[a];
@@ -392,11 +392,11 @@ TEST(test_labels_anatomy_against_the_header) {
     supine_mesh_axes_letters(anatomy.axes, found);
     assert_string_equal(found, letters);
     for (size_t lung = 0; lung < 2; ++lung) {
-      check_closed(&out.surface[lung]); /* outwards in left-handed maps too */
+      check_closed(&out.surface[lung]); /* surfaces of left-handed maps face outwards, too */
     }
     release(&out);
   }
-  /* with sides named, a mirrored header is refused */
+  /* with the sides given, a mirrored header is refused */
   supine_image map = image;
   map.step[0][0] = -4.0;
   const supine_labels_options named = {.labels = "lungmask"};
@@ -432,14 +432,14 @@ TEST(test_labels_cut_at_the_border_counted) {
   supine_image_free(&image);
 }
 
-/* The distance that is reported, against all faces of the mask. */
+/* The reported largest distance, against a search over all faces of the mask. */
 static double farthest_of(const supine_image *image, uint8_t label, const supine_mesh *mesh) {
   const uint8_t *at = image->values;
   double farthest = 0.0;
   for (size_t v = 0; v < mesh->vertex_count; ++v) {
     double voxel[3];
     supine_image_locate(image, mesh->vertices + 3 * v, voxel);
-    double nearest[2] = {INFINITY, INFINITY}; /* to voxels outside and in */
+    double nearest[2] = {INFINITY, INFINITY}; /* to voxels outside and inside */
     for (size_t i = 0; i < voxels(image); ++i) {
       const size_t index[3] = {i % image->size[0], i / image->size[0] % image->size[1],
                                i / image->size[0] / image->size[1]};
@@ -456,7 +456,7 @@ static double farthest_of(const supine_image *image, uint8_t label, const supine
   return sqrt(farthest);
 }
 
-TEST(test_labels_farthest_is_true) {
+TEST(test_labels_farthest_equals_search) {
   supine_image image = helper_two_lungs(13.0);
   image.step[2][2] = 17.0;
   const double edges[] = {9.0, 13.0, 19.0};
@@ -476,7 +476,7 @@ TEST(test_labels_farthest_is_true) {
   supine_image_free(&image);
 }
 
-/* Whatever the mask, the surface is one closed manifold. */
+/* The surface of any mask is one closed manifold. */
 TEST(test_labels_noise_closed_manifold) {
   uint64_t seed = 7;
   for (int trial = 0; trial < 6; ++trial) {
@@ -492,7 +492,7 @@ TEST(test_labels_noise_closed_manifold) {
       const bool is = 0.5 + 0.5 * random_signed(&seed) < density;
       at[i] = !is || i % 31 == 15 ? 0 : i % 31 < 15 ? 1 : 2;
     }
-    /* as it is; averaged over eight; interpolated */
+    /* full resolution; averaged over eight voxels; interpolated */
     const double edges[] = {4.0, 8.0, 2.7};
     for (size_t e = 0; e < 3; ++e) {
       const supine_labels_options options = {.edge = edges[e]};
@@ -514,8 +514,8 @@ TEST(test_labels_noise_closed_manifold) {
   }
 }
 
-/* Distances against all pairs, in boxes that are no cubes. */
-TEST(test_distance_against_all_pairs) {
+/* Distances against a search over all pairs, in boxes with unequal voxel sides. */
+TEST(test_distance_any_mask_equals_all_pairs) {
   uint64_t seed = 11;
   labels_mask mask = {.size = {9, 13, 7}, .spacing = {0.7, 1.3, 2.9}};
   const size_t count = supine_labels_mask_count(&mask);
@@ -559,8 +559,8 @@ static void refused(const char *name, const supine_labels_options *options, supi
   assert_null(out.surface[1].vertices);
 }
 
-/* A ball in two pieces and a tube, in voxels that are no cubes, each with its surface. */
-TEST(test_labels_shapes_of_any_label) {
+/* Surfaces of a ball in two pieces and of a tube, with unequal voxel sides. */
+TEST(test_labels_shapes_any_label_one_surface_each) {
   supine_image image = {.voxel = SUPINE_VOXEL_U16, .channels = 1, .size = {60, 50, 40}};
   static const double spacing[3] = {0.8, 0.9, 1.3};
   image.values = calloc(voxels(&image), sizeof(uint16_t));
@@ -607,7 +607,7 @@ TEST(test_labels_shapes_of_any_label) {
   }
   double low[3];
   double high[3];
-  supine_mesh_box(&shapes[1].surface, low, high); /* where the header has it */
+  supine_mesh_box(&shapes[1].surface, low, high); /* at the position given by the header */
   assert_true(fabs(low[0] - (31.7 + 4.0)) < 0.65 && fabs(high[0] - (31.7 + 20.0)) < 0.65);
   assert_true(fabs(high[1] - (31.7 - 40.3 - 12.0)) < 0.65);
   supine_labels_shapes_free(shapes, count);
@@ -672,16 +672,16 @@ TEST(test_labels_bad_maps_refused) {
   refused("absent.nii.gz", &plain, SUPINE_ERROR_READ, "absent.nii.gz");
   refused("map.mhd", &plain, SUPINE_ERROR_FORMAT, ".nrrd");
 
-  at[0] = 3; /* which three are lungs? */
+  at[0] = 3; /* three labels: ambiguous */
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "which of its labels (1, 2, 3)");
   at[0] = 0;
-  for (size_t i = 0; i < voxels(&image); ++i) { /* one lung, not said to be */
+  for (size_t i = 0; i < voxels(&image); ++i) { /* one lung without a given side */
     at[i] = at[i] == 2 ? 2 : 0;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "one lung");
-  for (size_t i = 0; i < voxels(&image); ++i) { /* halves above each other are no two lungs */
+  for (size_t i = 0; i < voxels(&image); ++i) { /* halves above each other are not two lungs */
     at[i] = at[i] == 0 ? 0 : i < voxels(&image) / 2 ? 1 : 2;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
@@ -693,19 +693,19 @@ TEST(test_labels_bad_maps_refused) {
   at[5030] = 2;
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "too little for a lung");
-  /* sheets of one voxel are nothing to cubes of 20 mm */
+  /* sheets of one voxel vanish in cubes of 20 mm */
   const supine_labels_options coarse = {.edge = 20.0};
   box_set(&image, (const size_t[3]){5, 5, 5}, (const size_t[3]){6, 40, 50}, 1);
   box_set(&image, (const size_t[3]){60, 5, 5}, (const size_t[3]){61, 40, 50}, 2);
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &coarse, SUPINE_ERROR_MESH, "smaller edge");
-  image.step[2][2] *= 100.0; /* as a header in other units has it */
+  image.step[2][2] *= 100.0; /* as from a header in other units */
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "check the size of the voxels");
   supine_image_free(&image);
 }
 
-TEST(test_labels_voxels_that_are_none_refused) {
+TEST(test_labels_impossible_voxels_refused) {
   static const struct {
     supine_image_voxel voxel;
     double value;
@@ -726,7 +726,7 @@ TEST(test_labels_voxels_that_are_none_refused) {
     }
     assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
     const char *path = in_folder("none.nrrd");
-    made out = surfaces_of(&path, 1, &plain); /* whole numbers are labels in any type */
+    made out = surfaces_of(&path, 1, &plain); /* whole numbers of any type are labels */
     assert_int_equal(out.report.lung_count, 2);
     release(&out);
     supine_image_put(&map, voxels(&image) - 1, 1, &(double){wrong[w].value});
@@ -737,7 +737,7 @@ TEST(test_labels_voxels_that_are_none_refused) {
   supine_image_free(&image);
 }
 
-/* Damaged files, of which the image reader's own test has more. */
+/* Damaged files; test_image.c has more. */
 TEST(test_labels_damaged_files_refused) {
   const supine_labels_options plain = {.edge = 5.0};
   supine_image image = helper_two_lungs(8.0);
@@ -760,14 +760,14 @@ TEST(test_labels_damaged_files_refused) {
   supine_image_free(&image);
 }
 
-/* Asks to stop at one call after another until the work gets through. */
+/* Interrupt at each call of the progress function in turn, until the work completes. */
 static bool stop_at(void *context, double fraction) {
   long *left = context;
   assert_true(fraction >= 0.0 && fraction <= 1.0);
   return (*left)-- > 0;
 }
 
-TEST(test_labels_interrupted_anywhere_leaves_nothing) {
+TEST(test_labels_interrupted_anywhere_nothing_leaks) {
   supine_image image = helper_two_lungs(8.0);
   assert_int_equal(supine_image_write(in_folder("stop.nrrd"), &image, NULL, NULL), SUPINE_OK);
   long calls = 0;

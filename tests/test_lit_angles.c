@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* How far supine_deform_lit's normals are from supine_normals', in postures and volumes from rest
- * to full inflation that took no part in making them: what was promised, and what the file says. */
+/* Angles between the normals of supine_deform_lit and supine_normals, in held-out postures and
+ * volumes from rest to full inflation: within the documented limits and as stated in the file. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -14,18 +14,17 @@
 
 enum { STATES = 192 };
 
-/* Promised, degrees. */
+/* Documented limits, degrees. */
 static const double mean_most = 0.1;
 static const double p999_most = 1.0;
-/* The file's numbers have two digits: the last is rounded by up to 5 %. */
+/* Numbers in the file have two digits, so they are rounded by up to 5 %. */
 static const double printed = 0.05;
-/* States differ in their error, which is why the mean over STATES of them is known to no better
- * than its standard error; this many of it. */
+/* Allowed difference of the mean over STATES random states, in standard errors. */
 static const double sigmas = 4.0;
-/* The percentile is the worst states' own. */
+/* Allowed ratio of the percentile, which depends on the worst states. */
 static const double p999_near = 1.4;
 
-/* The basis of lungs at full inflation, of the usual law but for `soften`. */
+/* Make the basis of lungs at full inflation by the default law, except for `soften`. */
 static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
   static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
@@ -40,7 +39,7 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   assert_true(file >= 0 && close(file) == 0);
   options.model.force.soften = soften;
   options.reference = &reference;
-  /* EXACT: rest positions of fewer bits would turn the small triangles that normals are made of. */
+  /* EXACT: rounded rest positions would rotate small triangles, whose normals are the reference. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   if (supine_reference_find(lungs, &options.model, &full, &resting, &reference, &error) !=
           SUPINE_OK ||
@@ -58,7 +57,7 @@ static int compare_floats(const void *left, const void *right) {
   return a < b ? -1 : a > b;
 }
 
-/* Angles of one state, degrees, [N]; their mean. */
+/* Compute the angles of one state, degrees, [N]; return their mean. */
 static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, float *lit,
                       float *exact, float *angles) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -138,7 +137,7 @@ static void check_real(const char *left, const char *right, supine_axes axes, do
   supine_lungs_free(&lungs);
 }
 
-TEST(test_made_lungs_as_said) {
+TEST(test_lit_synthetic_lungs_stated_angles) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
   assert_int_equal(supine_phantom_create(8000, 6000.0, &mesh, NULL), SUPINE_OK);
@@ -148,18 +147,18 @@ TEST(test_made_lungs_as_said) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_adult_as_said) {
+TEST(test_lit_adult_stated_angles) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 0.0, 16);
 }
 
-TEST(test_adult_softened_sixteen_modes_as_said) {
+TEST(test_lit_adult_softened_sixteen_modes_stated_angles) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 1.0, 16);
 }
 
-TEST(test_001_as_said) {
+TEST(test_lit_covid001_stated_angles) {
   check_real("covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS, 0.0, 16);
 }
 
-TEST(test_005_as_said) {
+TEST(test_lit_covid005_stated_angles) {
   check_real("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS, 0.0, 16);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors, and lungs found from points that the law itself moved. */
+/* Expected errors, and lungs located from points that the law itself moved. */
 #include "test.h"
 
 #include <supine/locate.h>
@@ -48,7 +48,7 @@ static supine_state state_of(const char *text) {
   return state;
 }
 
-/* Where the vertices are in a state. */
+/* Compute the positions of all vertices in a state. */
 static void deform(const supine_basis *basis, const supine_state *state, float *xyz) {
   supine_pose pose;
   supine_error error = {0};
@@ -58,7 +58,7 @@ static void deform(const supine_basis *basis, const supine_state *state, float *
   supine_deform(basis, &pose, xyz);
 }
 
-/* Turned by 40 degrees about (1, 2, 2) / 3 where `turned`, and shifted. */
+/* Rotate by 40 degrees about (1, 2, 2) / 3 if `turned`, and shift. */
 static void move(bool turned, const double x[3], double moved[3]) {
   static const double shift[3] = {512, -207, 1020};
   const double c = turned ? cos(0.7) : 1;
@@ -72,19 +72,19 @@ static void move(bool turned, const double x[3], double moved[3]) {
   }
 }
 
-/* Every twentieth vertex, observed in a state. */
+/* Observe every twentieth vertex in a state. */
 static void observe(world *w, const supine_state *state, bool turned) {
   float xyz[3 * VERTICES];
   deform(w->basis, state, xyz);
   for (size_t j = 0; j < SEEN; ++j) {
-    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* the apices and bases are among them */
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* apices and bases are included */
     const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
     w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
     move(turned, x, w->seen[j].position);
   }
 }
 
-/* RMS over all vertices of what was found less what is true. */
+/* Return the RMS difference of the located and the true positions of all vertices. */
 static double miss(const world *w, const supine_location *found, const supine_state *state,
                    bool turned) {
   float truth[3 * VERTICES];
@@ -116,7 +116,7 @@ static supine_location locate(world *w, const supine_state *state, bool rigid) {
   return found;
 }
 
-TEST(test_locate_law_as_truth_is_found) {
+TEST(test_locate_points_of_law_recover_it) {
   world *w = *state;
   const supine_state truth = state_of("prone:rest+300");
   const supine_state posture = state_of("prone");
@@ -138,7 +138,7 @@ TEST(test_locate_law_as_truth_is_found) {
   }
 }
 
-TEST(test_locate_given_volume_stays) {
+TEST(test_locate_given_volume_kept) {
   world *w = *state;
   const supine_state truth = state_of("prone:rest+300");
   observe(w, &truth, false);
@@ -148,9 +148,9 @@ TEST(test_locate_given_volume_stays) {
   assert_true(miss(w, &found, &truth, false) < 0.05);
 }
 
-TEST(test_locate_wrong_point_is_named_and_moves_nothing) {
+TEST(test_locate_wrong_point_reported_and_ignored) {
   world *w = *state;
-  const supine_state truth = state_of("left:full-700"); /* where points are known to 10 mm */
+  const supine_state truth = state_of("left:full-700"); /* whose points are known to 10 mm */
   const supine_state posture = state_of("left");
   observe(w, &truth, false);
   const supine_location before = locate(w, &posture, false);
@@ -175,7 +175,7 @@ TEST(test_locate_wrong_point_is_named_and_moves_nothing) {
   }
 }
 
-TEST(test_locate_error_is_never_above_that_without_points) {
+TEST(test_locate_any_points_error_not_above_prior) {
   world *w = *state;
   const supine_state truth = state_of("supine:scan-900");
   float expected[VERTICES];
@@ -190,12 +190,12 @@ TEST(test_locate_error_is_never_above_that_without_points) {
     assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
     assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma, NULL), SUPINE_OK);
     for (size_t i = 0; i < VERTICES; ++i) {
-      assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i])); /* |u| counts 2 mm at least */
+      assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i])); /* |u| is at least 2 mm */
     }
   }
 }
 
-TEST(test_locate_one_point_leaves_no_residual) {
+TEST(test_locate_one_point_no_residual) {
   world *w = *state;
   const supine_state truth = state_of("supine:scan-900");
   observe(w, &truth, false);
@@ -209,7 +209,7 @@ TEST(test_locate_one_point_leaves_no_residual) {
   }
 }
 
-TEST(test_locate_bad_task_is_refused) {
+TEST(test_locate_bad_task_refused) {
   world *w = *state;
   const supine_state truth = state_of("supine:rest");
   observe(w, &truth, false);
@@ -240,13 +240,14 @@ TEST(test_locate_bad_task_is_refused) {
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
   task.count = 3;
-  w->seen[1] = w->seen[2] = w->seen[0]; /* one place: no rotation */
+  w->seen[1] = w->seen[2] = w->seen[0]; /* one position shows no rotation */
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
 }
 
-/* sigma^2 = |u| min(4.5, RMS of u), and where rest is assumed what 5 % of full inflation moves. */
-TEST(test_expected_error_follows_its_formula) {
+/* sigma^2 = |u| min(4.5, RMS of u); if rest is assumed, plus the square of the motion by 5 % of
+ * full inflation. */
+TEST(test_expected_error_any_state_equals_formula) {
   world *w = *state;
   const supine_basis_info *info = supine_basis_get_info(w->basis);
   const double full = info->reference_volume[0] + info->reference_volume[1];
@@ -282,7 +283,7 @@ TEST(test_expected_error_follows_its_formula) {
   float sigma[VERTICES];
   assert_int_equal(supine_expected_error(w->basis, &scan, NULL, sigma, NULL), SUPINE_OK);
   for (size_t i = 0; i < VERTICES; ++i) {
-    assert_true(sigma[i] == 0); /* the scan itself is known */
+    assert_true(sigma[i] == 0); /* no error in the scan's own state */
   }
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Joining surfaces into a model, telling left from right, made lungs, and volume forms. */
+/* Models from surfaces, sides, synthetic lungs, and volume forms. */
 #include <float.h>
 
 #include "precompute/lungs/phantom.h"
@@ -32,7 +32,7 @@ TEST(test_lungs_two_files_any_order_left_first) {
   }
 }
 
-/* One file whose vertices alternate between the lungs. */
+/* One surface whose vertices alternate between the lungs. */
 TEST(test_lungs_interleaved_file_is_grouped) {
   supine_mesh lumps[2] = {helper_lump(4, -80.0, 3), helper_lump(4, 90.0, 4)};
   const size_t n = lumps[0].vertex_count;
@@ -63,7 +63,7 @@ TEST(test_lungs_interleaved_file_is_grouped) {
   supine_mesh_free(&lumps[1]);
 }
 
-TEST(test_lungs_one_file_midline_is_inner_face) {
+TEST(test_lungs_single_lung_midline_at_inner_face) {
   static const double places[] = {90.0, -90.0};
   for (size_t m = 0; m < 2; ++m) {
     supine_mesh lump = helper_lump(5, places[m], 3);
@@ -85,9 +85,8 @@ TEST(test_lungs_one_file_midline_is_inner_face) {
   }
 }
 
-/* X runs from the midline outwards on either side: from the first vertex of each lung to its last.
- */
-TEST(test_lungs_box_of_either_lung_counts_outwards) {
+/* X increases from the midline outwards in either lung: check the first and last vertex of each. */
+TEST(test_lungs_box_either_lung_increases_outwards) {
   supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(5, -80.0, 4)};
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
@@ -104,7 +103,7 @@ TEST(test_lungs_box_of_either_lung_counts_outwards) {
   supine_mesh_free(&lumps[1]);
 }
 
-TEST(test_lungs_given_midline_decides) {
+TEST(test_lungs_given_midline_decides_sides) {
   supine_mesh lump = helper_lump(5, 90.0, 3);
   supine_lungs lungs = {0};
   double midline = 300.0;
@@ -116,7 +115,7 @@ TEST(test_lungs_given_midline_decides) {
   supine_mesh_free(&lump);
 }
 
-/* Swaps two corners of every triangle from `first` on. */
+/* Swap two corners of every triangle from `first` on. */
 static void turn_inwards(supine_mesh *mesh, size_t first) {
   for (size_t t = first; t < mesh->triangle_count; ++t) {
     const uint32_t corner = mesh->triangles[3 * t];
@@ -125,7 +124,7 @@ static void turn_inwards(supine_mesh *mesh, size_t first) {
   }
 }
 
-TEST(test_lungs_inward_are_turned_round_and_told) {
+TEST(test_lungs_inward_flipped_and_reported) {
   for (int which = 0; which < 4; ++which) { /* bit 0: the left, bit 1: the right */
     supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
     const double volume = supine_mesh_volume(&lumps[0]) + supine_mesh_volume(&lumps[1]);
@@ -146,8 +145,8 @@ TEST(test_lungs_inward_are_turned_round_and_told) {
   }
 }
 
-/* Triangles of one piece that disagree have no inside: the surface counts as open. */
-TEST(test_lungs_half_inward_is_not_closed) {
+/* If triangles of one piece face different ways, the surface counts as open. */
+TEST(test_lungs_half_inward_not_closed) {
   supine_mesh lump = helper_lump(5, 90.0, 3);
   turn_inwards(&lump, lump.triangle_count / 2);
   supine_lungs lungs = {0};
@@ -182,7 +181,7 @@ TEST(test_lungs_given_twice_refused_at_any_resolution) {
   }
 }
 
-TEST(test_lungs_crumb_beside_a_lung_refused) {
+TEST(test_lungs_small_piece_beside_lung_refused) {
   supine_mesh lump = helper_lump(6, 90.0, 3);
   double vertices[] = {-81.3, 12.0, 33.1, -80.1, 12.6, 34.0, -79.9, 13.5, 33.3};
   uint32_t triangles[] = {0, 1, 2};
@@ -204,7 +203,7 @@ TEST(test_lungs_midline_out_of_place_refused) {
   expect_refused(lumps, 2, &midline, "x = 80 mm runs through the left lung");
   midline = 95.0;
   expect_refused(lumps, 1, &midline, "runs through the right lung");
-  midline = 20.0; /* a little over */
+  midline = 20.0; /* slightly off */
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(lumps, 2, &midline, &lungs, NULL), SUPINE_OK);
   assert_int_equal(lungs.lung_count, 2);
@@ -213,7 +212,7 @@ TEST(test_lungs_midline_out_of_place_refused) {
   supine_mesh_free(&lumps[1]);
 }
 
-TEST(test_lungs_debris_does_not_make_a_lung) {
+TEST(test_lungs_debris_not_taken_for_lung) {
   supine_mesh meshes[2] = {helper_lump(12, 90.0, 3), helper_lump(2, 20.0, 4)};
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(meshes, 2, NULL, &lungs, NULL), SUPINE_OK);
@@ -235,7 +234,7 @@ TEST(test_lungs_flat_or_empty_surface_refused) {
   assert_int_equal(supine_lungs_create(&empty, 1, NULL, &lungs, &error), SUPINE_ERROR_MESH);
 }
 
-TEST(test_phantom_pair_is_closed_and_has_its_volume) {
+TEST(test_phantom_pair_closed_with_given_volume) {
   static const size_t sizes[] = {84, 1000, 5000, 30000};
   for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {
     supine_mesh mesh = {0};
@@ -258,9 +257,9 @@ TEST(test_phantom_pair_is_closed_and_has_its_volume) {
   assert_int_equal(supine_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
 }
 
-/* Every harmonic of either lung, and the place of both: a sum over the vertices in which none of
- * them cancels. The sums are what the shape gave when it was made. */
-TEST(test_phantom_keeps_its_shape) {
+/* The phantom keeps its shape: sums over vertices to which every harmonic of both lungs
+ * contributes. Expected values are from the first version of the shape. */
+TEST(test_phantom_create_same_shape_as_first_version) {
   static const double made[2] = {-542.627977, 212.207209};
   supine_mesh mesh = {0};
   assert_int_equal(supine_phantom_create(1000, 6000.0, &mesh, NULL), SUPINE_OK);
@@ -272,13 +271,13 @@ TEST(test_phantom_keeps_its_shape) {
         sum += sin((double)(v + 1) * (double)(a + 1)) * mesh.vertices[3 * v + a];
       }
     }
-    assert_true(fabs(sum - made[lung]) <
-                1e-4); /* mm; a hundredth of the least coefficient's part */
+    /* mm: a hundredth of the smallest coefficient's contribution */
+    assert_true(fabs(sum - made[lung]) < 1e-4);
   }
   supine_mesh_free(&mesh);
 }
 
-/* Volume gained by one lung of a pair, by measuring the deformed surface itself. */
+/* Return the volume gained by one lung of a pair, measured on the deformed surface. */
 static double gained(const supine_lungs *lungs, size_t lung, const double *d, const double *columns,
                      size_t count, const double *weights, const double gains[3]) {
   const size_t n = lungs->mesh.vertex_count;
@@ -302,7 +301,7 @@ static double gained(const supine_lungs *lungs, size_t lung, const double *d, co
   return volume;
 }
 
-TEST(test_volume_forms_equal_measured_volume) {
+TEST(test_volume_forms_any_scale_equal_measured_volume) {
   enum { COLUMNS = 5 };
   supine_mesh lumps[2] = {helper_lump(7, 90.0, 3), helper_lump(8, -85.0, 4)};
   supine_lungs lungs = {0};

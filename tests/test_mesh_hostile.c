@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Files that are cut short, bent or built to do harm: each is refused or read, none is misread,
- * and none crashes or takes the machine's memory. */
+/* Truncated, corrupt and hostile files: each is refused or read right, and none crashes or exhausts
+ * memory. */
 #include <dirent.h>
 
 #include "mesh_samples.h"
 
-/* What loading says; on success the mesh must be whole. */
+/* Return the status of loading; on success assert a valid mesh. */
 static supine_status attempt(const char *path) {
   supine_mesh mesh = {0};
   supine_error error = {0};
@@ -26,7 +26,7 @@ static supine_status attempt(const char *path) {
   return status;
 }
 
-/* Loads `text` under `name` and expects the status; SUPINE_OK: with so many triangles. */
+/* Load `text` under `name` and assert the status; if SUPINE_OK, also the number of triangles. */
 static void expect_text(void **state, const char *name, const char *text, supine_status expected,
                         size_t triangles) {
   char path[256];
@@ -50,7 +50,7 @@ static void expect_bytes(void **state, const char *name, const void *bytes, size
   assert_int_equal(unlink(path), 0);
 }
 
-/* The box as our own file of that name. */
+/* Return the box as saved under that name. */
 static unsigned char *saved_box(void **state, const char *name, size_t *size) {
   char path[256];
   supine_mesh box = sample_box();
@@ -154,7 +154,7 @@ TEST(test_ply_body_illegal_format) {
   static const char *const bodies[] = {
       "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n",   /* no vertex 3 */
       "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",  /* a negative one */
-      "0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n", /* no integer */
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n", /* not an integer */
       "0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n",  /* a negative length */
       "0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n",
       "0 0 0\n1 0 0\n0 one 0\n3 0 1 2\n",
@@ -162,7 +162,7 @@ TEST(test_ply_body_illegal_format) {
       "0 0 0\n1 0 0\n0 1e 0\n3 0 1 2\n",
       "0 0 0\n1 0 0\n\n0 1 0\n3 0 1 2\n", /* importers count lines */
       "0 0 0 1 0 0 0 1 0\n3 0 1 2\n\n\n",
-      "0 0 0\r1 0 0\n0 1 0\n3 0 1 2\nx\n", /* CR that is no line end */
+      "0 0 0\r1 0 0\n0 1 0\n3 0 1 2\nx\n", /* CR that does not end a line */
   };
   for (size_t i = 0; i < sizeof bodies / sizeof *bodies; ++i) {
     char text[512];
@@ -171,8 +171,8 @@ TEST(test_ply_body_illegal_format) {
   }
 }
 
-/* Words that assimp 5.2 takes for counts, elements or coordinates. */
-TEST(test_ply_odd_but_legal_read) {
+/* Words that assimp 5.2 misreads as counts, elements or coordinates. */
+TEST(test_ply_unusual_but_legal_read) {
   static const char *const texts[] = {
       PLY_ASCII "comment 3 lungs\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "comment 4000000000 lungs\n" PLY_HEAD PLY_BODY,
@@ -193,7 +193,7 @@ TEST(test_ply_odd_but_legal_read) {
   }
 }
 
-/* Appends the four bytes of a value. */
+/* Append the four bytes of a value. */
 static size_t append(unsigned char *bytes, size_t at, uint32_t bits, bool big) {
   for (size_t k = 0; k < 4; ++k) {
     bytes[at + k] = (unsigned char)(bits >> (8 * (big ? 3 - k : k)));
@@ -201,7 +201,8 @@ static size_t append(unsigned char *bytes, size_t at, uint32_t bits, bool big) {
   return at + 4;
 }
 
-/* A binary PLY whose first byte is LF, in both byte orders, with an element before and after. */
+/* Binary PLY files whose data begins with LF, in both byte orders, with unknown elements before and
+ * after. */
 TEST(test_ply_binary_first_byte_line_feed_read) {
   for (int big = 0; big < 2; ++big) {
     unsigned char bytes[512] = {0};
@@ -245,7 +246,7 @@ TEST(test_ply_binary_first_byte_line_feed_read) {
   }
 }
 
-/* Loads bytes that must be refused with these words. */
+/* Load bytes; assert that they are refused with this message. */
 static void refuse_bytes(void **state, const void *bytes, size_t size, const char *words) {
   char path[256];
   supine_mesh mesh = {0};
@@ -292,7 +293,7 @@ TEST(test_ply_no_surface_mesh) {
   }
 }
 
-TEST(test_stl_and_obj_garbage_format) {
+TEST(test_load_stl_and_obj_garbage_format) {
   expect_text(state, "a.stl",
               "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 "
               "0\nendloop\nendfacet\nendsolid\n",
@@ -310,7 +311,7 @@ TEST(test_stl_and_obj_garbage_format) {
   expect_bytes(state, "a.obj", utf16, sizeof utf16, SUPINE_ERROR_FORMAT);
 }
 
-/* Every file of a folder of the test data; returns how many were there. */
+/* Load every file of a folder of the test data; return how many exist. */
 static size_t sweep(const char *name) {
   char folder[256];
   (void)snprintf(folder, sizeof folder, "%s/defects/%s", SUPINE_TEST_DATA, name);
@@ -324,7 +325,7 @@ static size_t sweep(const char *name) {
       char path[640];
       (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
       const supine_status status = attempt(path);
-      /* Of this folder one alone can be read: its material is missing. */
+      /* Only one file of this folder can be read: its material is missing. */
       if (strcmp(name, "invalid") == 0) {
         assert_int_equal(
             status, strcmp(entry->d_name, "malformed2.obj") == 0 ? SUPINE_OK : SUPINE_ERROR_FORMAT);
@@ -360,7 +361,7 @@ TEST(test_defects_known_read_right) {
       {"PLY/cube_uv.ply", SUPINE_OK, 8, 12},
       {"PLY/Wuson.ply", SUPINE_OK, 2117, 3732},
       {"PLY/points.ply", SUPINE_ERROR_MESH, 0, 0},
-      {"PLY/issue623.ply", SUPINE_ERROR_MESH, 0, 0}, /* its faces are in the vertices */
+      {"PLY/issue623.ply", SUPINE_ERROR_MESH, 0, 0}, /* its faces are listed among the vertices */
       {"STL/Wuson.stl", SUPINE_OK, 2117, 3732},
       {"STL/triangle_with_two_solids.stl", SUPINE_OK, 6, 2},
       {"STL/triangle_with_empty_solid.stl", SUPINE_OK, 3, 1},

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Loading small files of every kind: what is welded, dropped, turned and scaled. */
+/* Loading small files of every kind: welding, dropped elements, orientation and units. */
 #include <math.h>
 #include <pthread.h>
 #include <sys/inotify.h>
@@ -21,7 +21,7 @@ static const char tetrahedron_stl[] =
     "0\nvertex 0 0 120\nendloop\nendfacet\n"
     "endsolid\n";
 
-/* Loads what must load, and removes the file. */
+/* Load a file, assert success, and remove it. */
 static supine_mesh load(const char *path, const supine_mesh_load_options *options,
                         supine_mesh_report *report) {
   supine_mesh mesh = {0};
@@ -71,10 +71,10 @@ TEST(test_load_stl_soup_equals_indexed) {
   expect_tetrahedron(&soup);
   assert_int_equal(report.file_vertices, 12);
   assert_int_equal(report.file_faces, 4);
-  assert_int_equal(report.welded_vertices, 8); /* -0 is 0 */
+  assert_int_equal(report.welded_vertices, 8); /* -0 equals 0 */
   assert_int_equal(report.degenerate_faces, 0);
   assert_int_equal(report.unreferenced_vertices, 0);
-  /* In order of first appearance. */
+  /* Vertices are in order of first appearance. */
   static const double vertices[] = {0, 0, 0, 0, 120, 0, 120, 0, 0, 0, 0, 120};
   static const uint32_t triangles[] = {0, 1, 2, 0, 2, 3, 0, 3, 1, 2, 1, 3};
   assert_memory_equal(soup.vertices, vertices, sizeof vertices);
@@ -82,8 +82,7 @@ TEST(test_load_stl_soup_equals_indexed) {
   supine_mesh_free(&soup);
 }
 
-/* No coordinate is -0, whichever way it came, so that positions are the same where their bits are.
- */
+/* No reader returns -0, so that equal positions have equal bits. */
 TEST(test_load_negative_zero_becomes_zero) {
   static const char text[] = SAMPLE_PLY(5, 2) "-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
                                               "3 0 2 1\n3 3 1 4\n";
@@ -159,8 +158,8 @@ TEST(test_load_ply_strips_refused) {
               SUPINE_ERROR_FORMAT, "save triangles");
 }
 
-/* A flat face that turns both ways is cut along lines that run inside it, however small it is: all
- * its triangles face the same way and add up to its area. */
+/* A concave flat face of any size is cut along lines inside it: all triangles face the same way and
+ * their areas sum to its area. */
 TEST(test_load_concave_face_cut_inside) {
   static const double corners[9][3] = {{0, 0, 0},   {90, 0, 0},  {90, 60, 0},
                                        {60, 60, 0}, {60, 30, 0}, {30, 30, 0},
@@ -191,7 +190,7 @@ TEST(test_load_concave_face_cut_inside) {
   }
 }
 
-/* Corners on one line, and a face that crosses itself, still give every triangle. */
+/* Faces with collinear corners or self-intersections are cut into all triangles. */
 TEST(test_load_degenerate_faces_cut_into_all_triangles) {
   static const char text[] = SAMPLE_PLY(6, 3) "0 0 0\n10 0 0\n20 0 0\n30 0 0\n0 10 0\n10 10 0\n"
                                               "4 0 1 2 3\n5 0 1 2 3 4\n4 0 5 4 1\n";
@@ -211,7 +210,7 @@ TEST(test_load_face_of_too_many_corners_refused) {
   refuse_text(state, "a.ply", text, SUPINE_ERROR_FORMAT, "face 0 has 1025 corners");
 }
 
-/* Two nodes hold the tetrahedron: one moved, one mirrored and moved; both face outwards. */
+/* Two nodes have the tetrahedron, one shifted, one mirrored and shifted; both face outwards. */
 TEST(test_load_nodes_transformed_mirror_keeps_sense) {
   static const char text[] =
       "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
@@ -248,7 +247,7 @@ TEST(test_load_nodes_transformed_mirror_keeps_sense) {
   supine_mesh_free(&mesh);
 }
 
-/* Loads the tetrahedron with a first line `head`; returns vertex 1's x, 120 or -120. */
+/* Load the tetrahedron with a first line `head`; return x of vertex 1, 120 or -120. */
 static double x_under(void **state, const char *name, const char *head, supine_axes axes,
                       supine_mesh_report *report) {
   char text[512];
@@ -299,7 +298,7 @@ TEST(test_load_axes_tag_option_and_comment) {
   }
 }
 
-/* 3D Slicer's binary STL begins with its tag. */
+/* Binary STL by 3D Slicer begins with its tag; text behind the header is ignored. */
 TEST(test_load_axes_tag_in_stl_header) {
   static const char *const heads[] = {"SPACE=RAS", "a lung, SPACE=RAS"};
   for (size_t i = 0; i < 2; ++i) {
@@ -379,7 +378,7 @@ TEST(test_load_missing_folder_device_unreadable_read) {
   expect_refused("/dev/null", NULL, SUPINE_ERROR_READ, "not a regular file");
   (void)sample_text(state, "a.obj", tetrahedron_obj, path);
   assert_int_equal(chmod(path, 0), 0);
-  if (access(path, R_OK) != 0) { /* root may read all */
+  if (access(path, R_OK) != 0) { /* root may read everything */
     expect_refused(path, NULL, SUPINE_ERROR_READ, "Permission denied");
   }
   assert_int_equal(unlink(path), 0);
@@ -460,7 +459,7 @@ static void *read_often(void *argument) {
   return NULL;
 }
 
-/* A surface needs no materials: the file that an OBJ names is not even opened. */
+/* Materials are not needed: the file named by an OBJ is not opened. */
 TEST(test_load_obj_materials_not_opened) {
   char materials[256];
   char text[1024];

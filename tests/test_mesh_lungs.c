@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Real lungs, where they are there: their numbers as README.md here has them. */
+/* Real lungs, if available: their numbers as in README.md of this folder. */
 #include <math.h>
 
 #include "mesh_samples.h"
 
-/* Loads a file of the test data; skips the test where it is absent. */
+/* Load a file of the test data; skip the test if it is missing. */
 static supine_mesh lung_load(const char *name, supine_mesh_report *report) {
   char path[512];
   (void)snprintf(path, sizeof path, "%s/%s", SUPINE_TEST_DATA, name);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Each allocation of loading, welding, measuring and saving fails in turn: SUPINE_ERROR_MEMORY, or
- * a result as if nothing had happened; nothing half done, nothing lost (a sanitizer's leak check).
+/* Each allocation of loading, welding, measuring and saving fails in turn: the result is
+ * SUPINE_ERROR_MEMORY or as without the failure, and nothing leaks (checked by a leak sanitizer).
  */
 #include <errno.h>
 #include <sys/mman.h>
 
 #include "mesh_samples.h"
 
-/* Allocations that are still to succeed, negative: all; the linker sends ours here. */
+/* Number of allocations that still succeed; negative: all. The linker redirects allocations to this
+ * file. */
 static int allocations_left = -1;
 static int *allocations_failed; /* shared with the process that assimp runs in */
 
@@ -42,7 +43,7 @@ void *__wrap_realloc(void *old, size_t size) {
 }
 /* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
 
-/* Runs `work` with its allocation 0, 1, 2, ... failing, until none is left to fail. */
+/* Run `work` with allocation 0, 1, 2, ... failing, until none fails. */
 static void fail_each(supine_status (*work)(const char *path, supine_error *error),
                       const char *path, int least) {
   for (int nth = 0;; ++nth) {
@@ -60,9 +61,9 @@ static void fail_each(supine_status (*work)(const char *path, supine_error *erro
       return;
     }
     if (status == SUPINE_OK) {
-      continue; /* it managed without: a buffer, say */
+      continue; /* the memory was optional, as for a buffer */
     }
-    /* An output that cannot be had is one, whatever it lacks. */
+    /* An output that cannot be opened may be a write error; its message names memory, too. */
     if ((status != SUPINE_ERROR_MEMORY && status != SUPINE_ERROR_WRITE) || error.status != status ||
         strstr(error.message, "memory") == NULL) {
       fail_msg("%s: allocation %d: status %d, \"%s\"", path, nth, (int)status, error.message);
@@ -91,7 +92,7 @@ TEST(test_load_each_allocation_failing_memory) {
   for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
     char path[256];
     (void)sample_text(state, files[i].name, files[i].text, path);
-    fail_each(load, path, 6); /* head, bytes, vertices, triangles, weld's two */
+    fail_each(load, path, 6); /* header, bytes, vertices, triangles, and two for welding */
     assert_int_equal(unlink(path), 0);
   }
 }
@@ -109,7 +110,7 @@ static supine_status find_edges(const char *path, supine_error *error) {
   assert_true((status == SUPINE_OK) == (topology.component != NULL));
   supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
-  return supine_error_set(error, status, "out of memory"); /* it has no words of its own */
+  return supine_error_set(error, status, "out of memory"); /* it sets no message */
 }
 
 TEST(test_topology_each_allocation_failing_memory) {
@@ -130,9 +131,8 @@ static supine_status save(const char *path, supine_error *error) {
   return status;
 }
 
-/* Writers take no memory, but VTP's, but what opening the output takes; the folder's removal finds
- * leftovers.
- */
+/* Only the writer of VTP and the opening of an output allocate; removal of the folder fails if a
+ * file is left. */
 TEST(test_save_each_allocation_failing_memory) {
   static const char *const names[] = {"a.ply", "a.obj", "a.stl", "a.vtp"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -162,7 +162,7 @@ static supine_status save_series(const char *path, supine_error *error) {
 TEST(test_series_each_allocation_failing_memory) {
   char path[256];
   fail_each(save_series, sample_path(state, "a.vtp", path),
-            5); /* itself, offsets, bytes, packed, sizes */
+            5); /* series, offsets, bytes, packed, sizes */
 }
 
 static int setup(void **state) {

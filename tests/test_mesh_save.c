@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What is saved is read back the same, carries its displacement, and never stands there half. */
+/* Saved files: read back the same, with displacements, and never incomplete. */
 #include <fcntl.h>
 #include <float.h>
 #include <math.h>
@@ -10,7 +10,7 @@
 
 static const char *const endings[] = {"a.ply", "a.obj", "a.stl", "a.VTP"};
 
-/* A box with corners that are no float32. */
+/* A box with corners that float32 rounds. */
 static supine_mesh make_crooked(void) {
   supine_mesh mesh = sample_box();
   for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
@@ -27,7 +27,7 @@ static void save(const char *path, const supine_mesh *mesh,
   }
 }
 
-/* In a welded soup the order is that of first appearance: looks for the nearest vertex. */
+/* Welding orders vertices by first appearance, so compare with the nearest vertex. */
 static size_t nearest(const supine_mesh *mesh, const double position[3], double *distance) {
   size_t found = 0;
   *distance = INFINITY;
@@ -58,7 +58,7 @@ static void expect_same(const supine_mesh *found, const supine_mesh *expected, d
 TEST(test_save_load_round_trip_each_format_and_axes) {
   static const supine_axes all_axes[] = {SUPINE_AXES_AUTO, SUPINE_AXES_LPS, SUPINE_AXES_RAS};
   supine_mesh mesh = make_crooked();
-  for (size_t k = 0; k < 3; ++k) { /* VTP is not read */
+  for (size_t k = 0; k < 3; ++k) { /* VTP cannot be loaded */
     for (size_t a = 0; a < 3; ++a) {
       char path[256];
       const supine_mesh_save_options options = {
@@ -70,7 +70,7 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
       if (supine_mesh_load(path, NULL, &again, &report, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      /* One rounding to float32; reading text may cost assimp some more. */
+      /* One rounding to float32; assimp may round text once more. */
       expect_same(&again, &mesh, (k == 1 ? 4.0 : 0.5) * FLT_EPSILON * 128.0);
       assert_true(report.axes_from_tag);
       assert_false(report.comment_names_ras);
@@ -112,7 +112,7 @@ static const char *find(const unsigned char *bytes, size_t size, const char *tex
   return found + strlen(text);
 }
 
-/* One vertex moved by (3, 4, 12) mm, 13 mm in all; in RAS it is (-3, -4, 12). */
+/* One vertex is moved by (3, 4, 12) mm, 13 mm in total; in RAS it is (-3, -4, 12). */
 TEST(test_save_ply_displacement_rows) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
@@ -142,7 +142,8 @@ TEST(test_save_ply_displacement_rows) {
   supine_mesh_free(&mesh);
 }
 
-/* Millimetres also where the file is in centimetres; after the displacement where there is one. */
+/* The expected error is in mm even if the file is in cm; it follows the displacement if there is
+ * one. */
 TEST(test_save_expected_error_stays_in_millimetres) {
   static const float errors[4] = {1.5F, 2.5F, 3.5F, 4.5F};
   supine_mesh mesh = sample_tetrahedron();
@@ -204,8 +205,7 @@ static uint64_t size_at(const unsigned char *bytes) {
   return value;
 }
 
-/* One array in one block: what it holds when decompressed, at most 64 bytes; the next one's place.
- */
+/* Decompress one array of one block, of at most 64 bytes; return the start of the next array. */
 static const unsigned char *unpack(const unsigned char *at, unsigned char *array, size_t expected) {
   uLongf size = 64;
   assert_int_equal(size_at(at), 1);
@@ -296,8 +296,8 @@ TEST(test_save_vtp_opens_in_vtk) {
   assert_int_equal(unlink(path), 0);
 }
 
-/* A series: refused where it cannot be, gone where it was not committed. */
-TEST(test_series_statuses) {
+/* A series with an impossible path is refused, and one without commit leaves nothing. */
+TEST(test_series_impossible_or_uncommitted_leaves_nothing) {
   static const double times[2] = {0.0, 0.5};
   supine_mesh mesh = sample_tetrahedron();
   supine_mesh_series *series = NULL;
@@ -311,7 +311,7 @@ TEST(test_series_statuses) {
   supine_mesh_series_close(NULL);
 
   assert_int_equal(mkfifo(path, 0600), 0);
-  const int reader = open(path, O_RDONLY | O_NONBLOCK); /* so that a writer need not wait */
+  const int reader = open(path, O_RDONLY | O_NONBLOCK); /* so that a writer does not block */
   assert_true(reader >= 0);
   assert_int_equal(supine_mesh_series_open(path, &mesh, NULL, 2, times, &series, &error),
                    SUPINE_ERROR_WRITE);
@@ -337,7 +337,7 @@ TEST(test_series_statuses) {
   supine_mesh_free(&mesh);
 }
 
-/* Other axes and units turn and scale everything; lengths are on a grid, in the file's units. */
+/* Axes and units apply to all arrays; lengths are rounded to a grid, in units of the file. */
 TEST(test_save_vtp_axes_units_and_rounding) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
@@ -436,7 +436,7 @@ TEST(test_save_missing_folder_write) {
   supine_mesh_free(&mesh);
 }
 
-/* A name with our ending that leads to a device which is always full. */
+/* A link with a known ending to a device that is always full. */
 TEST(test_save_full_disk_write) {
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof endings / sizeof *endings; ++i) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law: from landmarks, held out, known constants found again; and what is refused. */
+/* A patient's law from landmarks: held-out errors, recovery of known constants, and refused input.
+ */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -14,7 +15,7 @@
 
 #include "lungs_helpers.h"
 
-/* Fits pairs as the command does. */
+/* Fit pairs as the command does. */
 static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
                       supine_patient_moved moved, supine_patient *patient,
                       supine_patient_fit_report *report) {
@@ -30,7 +31,7 @@ static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
   free(rows);
 }
 
-/* Points over two lungs, about 230 by 150 by 240 mm. */
+/* Draw points over two lungs, about 230 by 150 by 240 mm. */
 static supine_patient_pairs scatter(size_t count, unsigned long seed) {
   supine_patient_pairs pairs = {count, malloc(3 * count * sizeof(double)),
                                 malloc(3 * count * sizeof(double)), NULL};
@@ -46,13 +47,13 @@ static supine_patient_pairs scatter(size_t count, unsigned long seed) {
   return pairs;
 }
 
-/* Compute where a law moves a point; the side by the midline. */
+/* Compute the displacement of a point by a law; the midline decides its side. */
 static void displace(const supine_patient *patient, const double point[3], double u[3]) {
   const supine_patient_place place = supine_patient_find(&patient->frame, point, 0.0);
   supine_patient_displacement(patient, &place, 1.0, u);
 }
 
-/* Moves points by a law, and each coordinate by noise. */
+/* Move points by a law, and add noise to each coordinate. */
 static void move(supine_patient_pairs *pairs, const supine_patient *truth, double noise,
                  unsigned long seed) {
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -91,12 +92,12 @@ static supine_patient_record record_of(const supine_patient *patient) {
   return record;
 }
 
-/* Held-out blocks of the five public pairs: below what the quadratic law of 220ee0d left on the
- * same blocks, whichever way round the pair is told and counted from either of the two. */
+/* Held-out errors of the five public pairs are below those of the quadratic law of 220ee0d on the
+ * same blocks, for both orders of the images and both reference states. */
 TEST(test_fit_public_pairs_below_quadratic_law) {
   static const struct {
     const char *name;
-    double quadratic[2]; /* mm RMS: from the inhaled image, from the exhaled one */
+    double quadratic[2]; /* RMS held out, mm: from the inhaled image, from the exhaled one */
   } cases[] = {{"054", {3.01, 3.30}},
                {"055", {8.07, 9.83}},
                {"056", {3.83, 4.44}},
@@ -131,7 +132,7 @@ TEST(test_fit_public_pairs_below_quadratic_law) {
            100.0 * report.explained);
     assert_true(kept < cases[c / 2].quadratic[exhaled]);
     assert_true(kept < held[SUPINE_PATIENT_SCORE_LAW] && kept < held[SUPINE_PATIENT_SCORE_AFFINE]);
-    /* What is held out is never better known than what was fitted. */
+    /* Held-out errors are never below fitted ones. */
     assert_true(kept > report.fitted[SUPINE_PATIENT_SCORE_CORRECTED]);
     assert_true(report.band > 0.87 && report.band < 0.99);
     mean[exhaled] += kept / 5.0;
@@ -143,15 +144,15 @@ TEST(test_fit_public_pairs_below_quadratic_law) {
   assert_true(band > 0.92 && band < 0.98);
 }
 
-/* Evaluated at its own points the correction gives back what the fit predicts there. */
-TEST(test_correct_at_fitted_points_matches_prediction) {
+/* At the fitted points the correction equals the prediction of the fit. */
+TEST(test_correct_fitted_points_match_prediction) {
   supine_patient_pairs pairs = scatter(150, 8);
   supine_patient truth = known(&pairs);
   supine_patient found;
   supine_patient_fit_report report;
   double square = 0.0;
   move(&pairs, &truth, 0.4, 5);
-  for (size_t i = 0; i < pairs.count; ++i) { /* what no law of nine constants has */
+  for (size_t i = 0; i < pairs.count; ++i) { /* a motion outside the law */
     pairs.to[3 * i] += 6.0 * sin(pairs.from[3 * i + 2] / 30.0);
   }
   fit_pairs(&pairs, SUPINE_PATIENT_DEEP, SUPINE_PATIENT_RIGID, &found, &report);
@@ -173,8 +174,7 @@ TEST(test_correct_at_fitted_points_matches_prediction) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* Lungs move each by its own: a point beyond the midline belongs to the lung that it is said to lie
- * in. */
+/* A point beyond the midline moves with the lung that it is assigned to. */
 TEST(test_find_side_given_overrides_midline) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
@@ -184,12 +184,12 @@ TEST(test_find_side_given_overrides_midline) {
   assert_true(place.side == 1.0 && place.box[0] < 0.0);
   double u[3];
   supine_patient_displacement(&patient, &place, 1.0, u);
-  assert_true(u[0] == 0.0); /* not past the plane that stays */
+  assert_true(u[0] == 0.0); /* it does not cross the fixed plane */
   supine_patient_pairs_free(&pairs);
 }
 
-/* Points of the emptier state are taken to where the law says they were in the fuller one. */
-TEST(test_refer_moved_points_returns_them) {
+/* Points of the emptier state are mapped back to the fuller one. */
+TEST(test_refer_moved_points_returned) {
   supine_patient_pairs pairs = scatter(60, 12);
   supine_patient truth = known(&pairs);
   for (size_t k = 0; k < 3; ++k) {
@@ -207,7 +207,7 @@ TEST(test_refer_moved_points_returns_them) {
   supine_patient_pairs_free(&pairs);
 }
 
-TEST(test_noisy_landmarks_return_the_constants) {
+TEST(test_fit_noisy_landmarks_recover_constants) {
   supine_patient_pairs pairs = scatter(300, 4241);
   const supine_patient truth = known(&pairs);
   supine_patient found;
@@ -221,7 +221,7 @@ TEST(test_noisy_landmarks_return_the_constants) {
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
     printf("c%zu %8.4f found %8.4f +- %.4f\n", k + 1, expected[k], c[k], report.error[k]);
     assert_true(fabs(c[k] - expected[k]) <= 3.0 * report.error[k]);
-    assert_true(report.error[k] < 0.2 * (1.0 + fabs(expected[k]))); /* and that says something */
+    assert_true(report.error[k] < 0.2 * (1.0 + fabs(expected[k]))); /* and not trivially large */
   }
   double worst = 0.0;
   for (size_t i = 0; i < pairs.count; ++i) {
@@ -231,11 +231,12 @@ TEST(test_noisy_landmarks_return_the_constants) {
     displace(&found, pairs.from + 3 * i, v);
     worst = fmax(worst, hypot(hypot(u[0] - v[0], u[1] - v[1]), u[2] - v[2]));
   }
-  assert_true(worst < 0.5); /* no point is worse than one measurement */
+  assert_true(worst < 0.5); /* no error exceeds that of one measurement */
   supine_patient_pairs_free(&pairs);
 }
 
-/* What a unit of each unknown moves along a row is the difference that a small step makes. */
+/* Each entry of a row is the derivative of its displacement by one unknown: compare with small
+ * differences. */
 TEST(test_power_design_each_unknown_matches_difference) {
   supine_patient_pairs pairs = scatter(20, 3);
   const supine_patient truth = known(&pairs);
@@ -265,9 +266,9 @@ TEST(test_power_design_each_unknown_matches_difference) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* Free constants come back from points without noise, though the search begins with the deep law.
- */
-TEST(test_law_fit_free_constants_returns_them) {
+/* Free constants are recovered from points without noise, although the search starts at the deep
+ * law. */
+TEST(test_fit_free_constants_recovered) {
   supine_patient_pairs pairs = scatter(200, 3);
   const supine_patient truth = known(&pairs);
   const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER};
@@ -284,7 +285,7 @@ TEST(test_law_fit_free_constants_returns_them) {
   supine_patient_pairs_free(&pairs);
 }
 
-TEST(test_motion_between_scans_is_told_from_the_law) {
+TEST(test_fit_motion_between_scans_separated_from_law) {
   supine_patient_pairs pairs = scatter(250, 5);
   const supine_patient truth = known(&pairs);
   supine_patient found;
@@ -318,7 +319,7 @@ static void refused(const supine_patient_pairs *pairs, bool moved, const char *w
   }
 }
 
-TEST(test_impossible_pairs_are_refused) {
+TEST(test_pairs_check_impossible_pairs_refused) {
   supine_patient_pairs pairs = scatter(60, 99);
   const supine_patient truth = known(&pairs);
   char message[sizeof((supine_error *)0)->message];
@@ -329,11 +330,11 @@ TEST(test_impossible_pairs_are_refused) {
   pairs.count = 11;
   refused(&pairs, false, "11 pairs of points determine no law");
   pairs.count = n;
-  for (size_t i = 0; i < n; ++i) { /* an axis reversed in one of the two */
+  for (size_t i = 0; i < n; ++i) { /* one axis reversed in one of the two */
     pairs.to[3 * i] *= -1.0;
   }
   refused(&pairs, false, "mirror image");
-  for (size_t i = 0; i < n; ++i) { /* RAS beside LPS */
+  for (size_t i = 0; i < n; ++i) { /* one file in RAS, the other in LPS */
     pairs.to[3 * i + 1] *= -1.0;
   }
   refused(&pairs, true, "turned by 1");
@@ -342,7 +343,7 @@ TEST(test_impossible_pairs_are_refused) {
     pairs.to[i] += 150.0;
   }
   refused(&pairs, false, "mm apart");
-  assert_int_equal(check(&pairs, true, message), SUPINE_OK); /* --translation finds it */
+  assert_int_equal(check(&pairs, true, message), SUPINE_OK); /* --translation fits it */
   for (size_t i = 0; i < 3 * n; ++i) {
     pairs.to[i] = 0.1 * pairs.from[i];
   }
@@ -357,7 +358,7 @@ TEST(test_impossible_pairs_are_refused) {
     pairs.to[3 * i + 2] += 5.0;
   }
   refused(&pairs, true, "give a state in which the lungs have moved");
-  for (size_t i = 0; i < n; ++i) { /* each point's place that of another */
+  for (size_t i = 0; i < n; ++i) { /* each point has the partner of another */
     memcpy(pairs.to + 3 * i, pairs.from + 3 * ((i * 7 + 3) % n), 3 * sizeof(double));
   }
   refused(&pairs, false, "do not match");
@@ -381,7 +382,7 @@ static supine_status load_text(const char *text, bool reverse, supine_patient_pa
   return status;
 }
 
-TEST(test_pair_files_say_what_is_wrong) {
+TEST(test_pairs_load_bad_files_message_names_fault) {
   static const struct {
     const char *text, *words;
   } bad[] = {{"x,y,z,to_x,to_y\n1,2,3,4,5\n", "no column \"to_z\""},
@@ -404,7 +405,7 @@ TEST(test_pair_files_say_what_is_wrong) {
                    SUPINE_ERROR_READ);
 }
 
-TEST(test_pair_files_go_from_rest) {
+TEST(test_pairs_load_either_order_from_rest) {
   static const char images[] = "im1_x,im1_y,im1_z,im2_x,im2_y,im2_z\n1,2,3,4,5,6\n";
   static const char plain[] = "x,y,z,to_x,to_y,to_z\n1,2,3,4,5,6\n";
   supine_patient_pairs pairs = {0};
@@ -477,7 +478,7 @@ TEST(test_record_written_and_read_same) {
   assert_memory_equal(before.emptier, after.emptier, sizeof before.emptier);
   assert_true(after.reach == 10.0);
   assert_true(after.held_out == 4.25 && after.explained == 81.0 && after.points == 300);
-  /* Each part of it missing is named. */
+  /* A missing part is named. */
   static const char *const parts[] = {
       "frame",   "law",        "force",    "fuller",  "emptier",   "motion",       "format",
       "centres", "correction", "reach_mm", "version", "radius_mm", "emptier_frame"};
@@ -502,8 +503,8 @@ TEST(test_record_written_and_read_same) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* The share at rest is what the two states show, and a scan that is one of them needs no name. */
-TEST(test_scan_of_fitted_states_is_known) {
+/* The share at rest follows from the two states, and a scan in one of them needs no option. */
+TEST(test_scan_fitted_states_need_no_option) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   supine_patient_record record = record_of(&patient);
@@ -517,10 +518,10 @@ TEST(test_scan_of_fitted_states_is_known) {
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
   double gains[2][3];
   supine_patient_path(&record, gains);
-  for (size_t k = 0; k < 3; ++k) { /* all of the way */
+  for (size_t k = 0; k < 3; ++k) { /* at full inflation */
     assert_true(gains[0][k] == 0.0 && fabs(gains[1][k] - 1.0) < 1e-12);
   }
-  /* Half a litre above rest: full inflation by the usual share. */
+  /* Half a litre above rest: the default share gives full inflation. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_REST, 500.0};
   record.volume[0] = 2910.25;
   resting = supine_reference_resting_default();
@@ -536,14 +537,14 @@ TEST(test_scan_of_fitted_states_is_known) {
   for (size_t k = 0; k < 3; ++k) {
     assert_true(fabs(gains[0][k] - expected[k]) < 1e-9 && fabs(gains[1][k] - 1.0) < 1e-12);
   }
-  /* Volumes alone tell of no rest. */
+  /* Volumes alone do not define rest. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2910.25};
   record.state[1].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2410.25};
   assert_false(supine_patient_scan(&record, 1, 2410.25, &resting).known);
   supine_patient_pairs_free(&pairs);
 }
 
-TEST(test_force_is_one_at_the_centre_in_the_fitted_posture) {
+TEST(test_law_force_centre_in_fitted_posture_is_one) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   static const double postures[4][3] = {{0, 1, 0}, {0, -1, 0}, {0, 0, -1}, {0, 0, 1}};
@@ -564,16 +565,16 @@ TEST(test_force_is_one_at_the_centre_in_the_fitted_posture) {
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* Written as nine constants, the deep law keeps its force: base 0.9 and -0.2 along y. */
+  /* The deep law written as nine constants keeps its force: base 0.9 and -0.2 along y. */
   const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   const supine_force_law deep = supine_patient_force(&shape, 0.4, postures[0]);
   assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);
   supine_patient_pairs_free(&pairs);
 }
 
-/* Known gains come back from a third scan, prone or upright, within three of their standard errors;
- * one in the same posture tells none. */
-TEST(test_third_scan_tells_what_turns) {
+/* Known gains are recovered from a third scan, prone or upright, within three of their standard
+ * errors; one in the same posture does not determine them. */
+TEST(test_gain_third_scan_recovers_it) {
   static const double postures[2][3] = {{0.0, -1.0, 0.0}, {0.0, 0.0, -1.0}};
   static const double gains[2] = {0.23, 0.71};
   supine_patient_pairs pairs = scatter(200, 55);
@@ -616,7 +617,7 @@ TEST(test_third_scan_tells_what_turns) {
     assert_true(other->left < 0.3 * sqrt(3.0) * 1.1 && other->left < other->left_without);
   }
   gsl_rng_free(random);
-  /* The posture that was fitted tells nothing: the gain stays. */
+  /* A scan in the fitted posture: the gain stays. */
   const double kept = record.force.gain;
   memcpy(other->state.gravity, record.state[1].gravity, sizeof other->state.gravity);
   assert_int_equal(supine_patient_gain_fit(&record, NULL, false, &error), SUPINE_OK);
@@ -625,8 +626,8 @@ TEST(test_third_scan_tells_what_turns) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* Each map finds what it can express, and nothing beyond: literal maps, their own distances. */
-TEST(test_maps_explain_what_they_can) {
+/* Each map recovers motions within its class, and no others: literal maps and distances. */
+TEST(test_maps_fit_motions_of_their_class_explained) {
   supine_patient_pairs pairs = scatter(80, 21);
   supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT];
   supine_error error;
@@ -650,7 +651,7 @@ TEST(test_maps_explain_what_they_can) {
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].largest == 0.0);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 1.0);
   assert_true(distance[SUPINE_PATIENT_MAP_TRANSLATION].rms > 0.3 * none);
-  assert_true(distance[SUPINE_PATIENT_MAP_SIMILARITY].largest < 1e-3); /* digits of `turned` */
+  assert_true(distance[SUPINE_PATIENT_MAP_SIMILARITY].largest < 1e-3); /* precision of `turned` */
   assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
   for (size_t i = 0; i < pairs.count; ++i) {
     pairs.to[3 * i] += 0.2 * pairs.from[3 * i + 1]; /* a shear */
@@ -660,12 +661,12 @@ TEST(test_maps_explain_what_they_can) {
       SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_SIMILARITY].rms > 1.0);
   assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
-  /* Predicting nothing is worth nothing. */
+  /* The prediction of no motion scores 0. */
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 0.0);
-  /* A motion between the scans is taken out of the prediction, and no more. */
+  /* Only the rigid motion between scans is removed from the prediction. */
   double *turned_by = malloc(3 * pairs.count * sizeof *turned_by);
-  for (size_t i = 0; i < pairs.count; ++i) { /* a quarter about z, and a shift */
+  for (size_t i = 0; i < pairs.count; ++i) { /* a quarter turn about z, and a shift */
     turned_by[3 * i] = -pairs.to[3 * i + 1] + 40.0;
     turned_by[3 * i + 1] = pairs.to[3 * i];
     turned_by[3 * i + 2] = pairs.to[3 * i + 2] - 7.0;
@@ -679,7 +680,7 @@ TEST(test_maps_explain_what_they_can) {
                    SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms > 10.0);
   assert_true(distance[SUPINE_PATIENT_MAP_TRANSLATION].explained == 0.0);
-  /* Where nothing moved there is nothing to explain. */
+  /* Without motion there is nothing to explain. */
   memcpy(pairs.to, pairs.from, 3 * pairs.count * sizeof *pairs.to);
   assert_int_equal(
       supine_patient_validate_points(&pairs, turned_by, SUPINE_PATIENT_STILL, distance, &error),
@@ -688,8 +689,8 @@ TEST(test_maps_explain_what_they_can) {
   free(turned_by);
   supine_patient_pairs_free(&pairs);
 
-  /* No similarity mirrors. Of points 30, 20 and 10 from the middle along the axes, with x mirrored,
-   * the best leaves 2800 - (1800 + 800 - 200)^2 / 2800 of their squares. */
+  /* A similarity does not mirror. For points 30, 20 and 10 from the centre along the axes, with x
+   * mirrored, the best one leaves 2800 - (1800 + 800 - 200)^2 / 2800 of the sum of squares. */
   double axes[18] = {0.0};
   double mirrored[18] = {0.0};
   supine_patient_pairs six = {.count = 6, .from = axes, .to = mirrored};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability from motion: a lesion and a gradient come back from a surface of another meshing
- * with noise, and are kept where they are there and not where they are not. */
+/* Expandability from motion: a lesion and a gradient are recovered from a surface with another mesh
+ * and noise, and uniform tissue stays uniform. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -37,7 +37,7 @@ static double *gradient_of(const supine_lungs *lungs, const supine_expandability
   return e;
 }
 
-/* The lungs as the truth of a stiffness moves them, with noise on every coordinate. */
+/* Return the vertices moved by the true law with this stiffness, with noise on every coordinate. */
 static double *moved_by_truth(const supine_lungs *lungs, const double *e, double noise) {
   supine_model model = truth();
   supine_solution solution = {0};
@@ -57,8 +57,8 @@ static double *moved_by_truth(const supine_lungs *lungs, const double *e, double
   return positions;
 }
 
-/* How many times as stiff a lesion's core, within half its radius, is as the lung outside it, by
- * the means of log E. */
+/* Return the ratio of the stiffness in a lesion's core, within half its radius, to that outside it,
+ * from means of log E. */
 static double contrast(const supine_lungs *lungs, const supine_patient_stiffness *found,
                        const supine_lesion *lesion) {
   const size_t n = lungs->mesh.vertex_count;
@@ -80,11 +80,11 @@ static double contrast(const supine_lungs *lungs, const supine_patient_stiffness
   return exp(sum[1] / count[1] - sum[0] / count[0]);
 }
 
-/* Fits the lungs at rest to others of the same shape, moved by the truth of stiffness e, which it
- * frees. */
+/* Fit the lungs at rest to others of the same shape, moved by the true law with stiffness e; free
+ * e. */
 static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, double *e,
                        supine_patient_record *found) {
-  const supine_model model = truth(); /* its reach and force are known; the rest is found */
+  const supine_model model = truth(); /* its reach and force are given; the rest is fitted */
   supine_mesh state = other->mesh;
   const supine_patient_surface_task task = {.rest = rest,
                                             .state = &state,
@@ -118,11 +118,11 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(fabs(times / lesion->factor - 1.0) < 0.2);
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.5 * found.expand.held_out[0]);
-  /* What is said to be held out is what the regions had not seen. */
+  /* The held-out error is that of the final fit with its regions. */
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
-TEST(test_lesion_of_a_real_lung_comes_back) {
+TEST(test_fit_lesion_of_real_lung_recovered) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -134,7 +134,7 @@ TEST(test_lesion_of_a_real_lung_comes_back) {
   supine_lungs_free(&other);
 }
 
-/* Made lungs, both: of other vertices, but of one shape as far as 0.2 mm go. */
+/* Synthetic lungs for both: different vertices, but the same shape to 0.2 mm. */
 static void made(size_t vertices, supine_lungs *lungs) {
   supine_mesh mesh = {0};
   supine_error error;
@@ -143,7 +143,7 @@ static void made(size_t vertices, supine_lungs *lungs) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_lesion_of_made_lungs_comes_back) {
+TEST(test_fit_lesion_of_synthetic_lungs_recovered) {
   const supine_lesion lesion = {{-108.0, -139.0, -195.0}, 64.0, 3.0};
   supine_lungs rest = {0};
   supine_lungs other = {0};
@@ -154,7 +154,7 @@ TEST(test_lesion_of_made_lungs_comes_back) {
   supine_lungs_free(&other);
 }
 
-TEST(test_even_lungs_keep_no_stiffness) {
+TEST(test_fit_uniform_lungs_no_stiffness_kept) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   static supine_patient_record found;
@@ -168,8 +168,8 @@ TEST(test_even_lungs_keep_no_stiffness) {
   supine_lungs_free(&other);
 }
 
-/* The lungs as the truth moves them with tissue whose expandability grows threefold from apex to
- * base: what is seen of it comes back. */
+/* Lungs moved by the true law, with an expandability that triples from apex to base: the visible
+ * part of it is recovered. */
 static void check_gradient(const supine_lungs *rest, const supine_lungs *other) {
   const supine_expandability_law law = {SUPINE_EXPANDABILITY_LINEAR, 2, 0.5, 1.5};
   const size_t n = rest->mesh.vertex_count;
@@ -211,7 +211,7 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
   free(is);
 }
 
-TEST(test_gradient_of_made_lungs_comes_back) {
+TEST(test_fit_gradient_of_synthetic_lungs_recovered) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   made(1600, &rest);
@@ -221,7 +221,7 @@ TEST(test_gradient_of_made_lungs_comes_back) {
   supine_lungs_free(&other);
 }
 
-TEST(test_gradient_of_a_real_lung_comes_back) {
+TEST(test_fit_gradient_of_real_lung_recovered) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {

@@ -83,7 +83,7 @@ refused 2 'No such file' --landmarks absent.csv
 refused 1 'nothing to fit to' --name nobody
 refused 1 'give --translation or --rigid, not both' --landmarks good.csv --translation --rigid
 
-# Surfaces: a made lung of each side, and what breathing makes of it.
+# Surfaces: synthetic lungs, one file each, and the same after a breath.
 "$supine" phantom -o pair.obj --vertices 700 >/dev/null || fail phantom
 half() { # NAME FIRST|SECOND: one lung of the pair
   awk -v second="$2" '/^v / { v[++n] = $0 } /^f / { f[++m] = $0 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law from surfaces: a known one is found again; what is refused. */
+/* A patient's law from surfaces: recovery of a known law, and refused input. */
 #include "test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -12,7 +12,7 @@
 
 #include "patient_helpers.h"
 
-/* Where the truth puts the vertices, [N, 3]. */
+/* Return the vertices moved by the true law, [N, 3]. */
 static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   const supine_model model = truth();
   supine_solution solution = {0};
@@ -26,7 +26,7 @@ static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   return positions;
 }
 
-TEST(test_known_law_is_found_from_another_meshing) {
+TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -44,7 +44,7 @@ TEST(test_known_law_is_found_from_another_meshing) {
   gsl_rng_free(random);
   moved.vertices = target;
 
-  const supine_model model = truth(); /* its stiffness and reach are known; the rest is found */
+  const supine_model model = truth(); /* its stiffness and reach are given; the rest is fitted */
   const supine_patient_surface_task task = {.rest = &rest,
                                             .state = &moved,
                                             .model = &model,
@@ -57,7 +57,7 @@ TEST(test_known_law_is_found_from_another_meshing) {
   }
   const supine_patient patient = fit.patient;
   const supine_patient_surface_report surface = fit.surface;
-  /* As a basis would move it: counted from the emptier state, the scale is of opposite sign. */
+  /* The basis counts from the emptier state, so the scale has the opposite sign. */
   supine_patient_record record = {.patient = patient, .reach = 10.0, .from_surface = true};
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
@@ -86,7 +86,7 @@ TEST(test_known_law_is_found_from_another_meshing) {
   }
   printf("\n");
   assert_true(sqrt(square) <= 0.15);
-  /* The force comes back without (18) being told: supine, its heights are 1 - Y. */
+  /* The force is recovered without use of (18): supine, its heights are 1 - Y. */
   const supine_patient_applied *applied = &fit.applied;
   printf("force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f, "
          "%zu blocks\n",
@@ -108,9 +108,9 @@ TEST(test_known_law_is_found_from_another_meshing) {
   supine_lungs_free(&other);
 }
 
-/* Law and kriging from surfaces of another meshing, a law that is far from deep: as the basis moves
- * it, the surface lies on the other state. */
-TEST(test_fit_surface_deep_law_meets_other_meshing) {
+/* Law and kriging from surfaces with another mesh, moved by a law far from deep: the basis moves
+ * the surface onto the other state. */
+TEST(test_fit_surface_other_law_basis_reaches_the_state) {
   supine_mesh coarse = helper_lump(9, 70.3, 5);
   supine_mesh fine = helper_lump(15, 70.3, 5);
   supine_lungs rest = {0};
@@ -142,9 +142,9 @@ TEST(test_fit_surface_deep_law_meets_other_meshing) {
   supine_lungs_free(&other);
 }
 
-/* A force that is fixed to the body does not follow gravity, and that shows; a turn of gravity
- * turns the correlation round. */
-TEST(test_force_that_ignores_gravity_shows) {
+/* A force fixed to the body does not follow gravity: its correlation with height is low. Reversing
+ * gravity reverses the correlation. */
+TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
   supine_mesh lump = helper_lump(9, 70.3, 5);
   supine_lungs rest = {0};
   supine_error error;
@@ -184,9 +184,9 @@ TEST(test_force_that_ignores_gravity_shows) {
   supine_lungs_free(&rest);
 }
 
-/* Of normal errors the median's 1.4826-fold is the standard deviation, and 4.685 of those are where
- * nothing counts any more (95 % efficiency: Tukey's biweight). Outliers do not move that. */
-TEST(test_weights_end_at_4_685_standard_deviations) {
+/* The standard deviation is estimated as 1.4826 times the median, and weights vanish at 4.685 of it
+ * (95 % efficiency: Tukey's biweight). Outliers hardly change it. */
+TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
   enum { NORMAL = 2000, LOOK = 4, OUTLIERS = 100, COUNT = NORMAL + LOOK + OUTLIERS };
   static const double sigma = 0.37;
   static const double look[LOOK] = {1.5, -3.0, 4.5, -4.9}; /* standard deviations */
@@ -205,7 +205,7 @@ TEST(test_weights_end_at_4_685_standard_deviations) {
   for (size_t k = 0; k < LOOK; ++k) {
     const double t = look[k] / 4.685;
     const double expected = fabs(t) < 1.0 ? pow(1.0 - t * t, 2.0) : 0.0;
-    /* the outliers, a twentieth of all, raise the median by 6 % */
+    /* the outliers, 5 % of all, raise the median by 6 % */
     assert_true(fabs(m.rows[NORMAL + k].weight - expected) < 0.07);
     assert_true(k > 1 || m.rows[NORMAL + k].weight >= expected);
   }
@@ -229,7 +229,7 @@ static void refused(const supine_lungs *rest, const supine_mesh *moved, const ch
   }
 }
 
-TEST(test_other_frames_units_and_sides_are_refused) {
+TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
   supine_mesh lump = helper_lump(7, 70.3, 5);
   supine_lungs rest = {0};
   supine_error error;

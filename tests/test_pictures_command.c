@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine compare and supine render, as their users meet them. */
+/* The commands supine compare, report and render. */
 #include "program_helpers.h"
 
 #include <jansson.h>
@@ -93,9 +93,9 @@ static void check_posture(const json_t *posture) {
     share += json_number_value(json_object_get(slab, "share"));
     volume += json_number_value(json_object_get(slab, "volume_ml"));
   }
-  assert_true(fabs(gain - 400) < 0.05); /* positions at run time are floats */
+  assert_true(fabs(gain - 400) < 0.05); /* positions are floats */
   assert_true(fabs(share - 1) < 1e-4);
-  /* the slabs are those of the posture's rest */
+  /* slabs are counted from the rest of the posture */
   assert_true(fabs(volume - number(posture, "volume_ml", "left") -
                    number(posture, "volume_ml", "right")) < 0.05);
   const json_t *top = json_array_get(slabs, 1);
@@ -104,7 +104,7 @@ static void check_posture(const json_t *posture) {
               1.1 * json_number_value(json_object_get(top, "expansion")));
 }
 
-TEST(test_compare_json_holds_what_it_says) {
+TEST(test_compare_json_has_stated_values) {
   EXPECT(0, "{",
          "compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8 "
          "--volume rest --breath 400 --json");
@@ -157,14 +157,14 @@ TEST(test_compare_csv_has_six_fields_a_row) {
     assert_int_equal(count_words(line, ","), 5);
     ++rows;
   }
-  /* A heading; for each posture gravity, 4 statistics and the expected error, 2 lungs twice, 4
-   * numbers of 10 slabs; 3 pairs; 3 energies; the farthest direction and its distance; directions,
-   * area, vertices. */
+  /* Number of rows: a heading; for each posture gravity, 4 statistics and the expected error, 2
+   * volumes for 2 lungs, 4 numbers of 10 slabs; 3 pairs; 3 energies; 3 directions found and their 3
+   * distances; directions, area, vertices. */
   assert_int_equal(rows, 1 + 3 * (3 + 5 + 4 + 40) + 3 * 5 + 3 + (3 + 1) + 3);
   free(text);
 }
 
-/* Every element closes, in order; attributes are quoted; no stray '<' or '&'. */
+/* Assert that elements are closed in order, attributes are quoted, and no '<' or '&' is stray. */
 static void check_markup(const char *text) {
   char open[64][16];
   size_t depth = 0;
@@ -215,7 +215,7 @@ static void check_report(const char *name) {
   free(text);
 }
 
-TEST(test_compare_without_breath_finds_nothing_moved) {
+TEST(test_compare_without_breath_no_difference) {
   EXPECT(0, "0.000", "compare lungs.safetensors --volume scan -o still.html");
   assert_null(strstr(printed, "nan"));
   size_t size = 0;
@@ -226,12 +226,12 @@ TEST(test_compare_without_breath_finds_nothing_moved) {
   free(text);
 }
 
-TEST(test_report_is_well_formed_and_needs_nothing_else) {
+TEST(test_report_html_well_formed_and_self_contained) {
   EXPECT(0, "", "compare lungs.safetensors --postures supine,prone,left -o report.html");
   check_report("report.html");
 }
 
-TEST(test_compare_open_surface_wants_rms) {
+TEST(test_compare_open_surface_needs_rms) {
   EXPECT(2, "--rms MM", "compare open.safetensors");
   EXPECT(0, "{", "compare open.safetensors --rms 5 --json --postures supine,prone,left");
   json_t *root = json_loads(printed, 0, NULL);
@@ -245,7 +245,7 @@ TEST(test_compare_open_surface_wants_rms) {
   EXPECT(0, "", "compare open.safetensors --rms 5 --csv open.csv -o open.html");
 }
 
-TEST(test_compare_misuse_is_a_usage_error) {
+TEST(test_compare_misuse_usage_error) {
   EXPECT(1, "did you mean 'prone'", "compare lungs.safetensors --postures supine,pron");
   EXPECT(1, "not all 0", "compare lungs.safetensors --postures 0:0:0");
   EXPECT(1, "three numbers", "compare lungs.safetensors --postures 1:2");
@@ -263,7 +263,7 @@ TEST(test_compare_misuse_is_a_usage_error) {
   EXPECT(0, "Usage", "compare --help");
 }
 
-TEST(test_render_misuse_is_a_usage_error) {
+TEST(test_render_misuse_usage_error) {
   EXPECT(1, ".png", "render lungs.safetensors --posture prone");
   EXPECT(1, ".png", "render lungs.safetensors --posture prone -o lung.gif");
   EXPECT(1, "which posture", "render lungs.safetensors -o lung.png");
@@ -289,7 +289,7 @@ TEST(test_render_misuse_is_a_usage_error) {
   assert_int_equal(count_files("a.png"), 0);
 }
 
-/* Runs a render; false, after a line, where nothing can draw. */
+/* Run supine render; print a line and return false if drawing is not available. */
 SUPINE_PRINTF(1, 2)
 static bool render(const char *format, ...) {
   char arguments[512];
@@ -306,7 +306,7 @@ static bool render(const char *format, ...) {
   return true;
 }
 
-/* Mean difference of red, green and blue, 0 to 255, of two pictures of one size. */
+/* Return the mean difference of red, green and blue, 0 to 255, of two pictures of one size. */
 static double png_difference(const char *a, const char *b) {
   cairo_surface_t *image[2] = {cairo_image_surface_create_from_png(a),
                                cairo_image_surface_create_from_png(b)};
@@ -333,8 +333,8 @@ static double png_difference(const char *a, const char *b) {
   return sum / (3.0 * width * height);
 }
 
-/* Other fonts and drivers change a picture by less than another posture does. */
-TEST(test_render_agrees_with_golden_picture) {
+/* Fonts and drivers change a picture by less than another posture does. */
+TEST(test_render_same_as_golden_picture) {
   static const double tolerance = 1.5;
   char path[256];
   if (!render("lungs.safetensors --posture prone --largest 40 --size 240x180 -o golden.png")) {
@@ -350,8 +350,8 @@ TEST(test_render_agrees_with_golden_picture) {
   assert_true(other > 2 * tolerance);
 }
 
-/* Mean place of what is orange in a picture's upper left, which is the ball's arrow, from the
- * middle of the ball. */
+/* Compute the mean position of orange pixels in the upper left of a picture, the arrow of the ball,
+ * relative to the centre of the ball. */
 static void find_arrow(const char *path, double place[2]) {
   cairo_surface_t *image = cairo_image_surface_create_from_png(path);
   assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
@@ -361,7 +361,7 @@ static void find_arrow(const char *path, double place[2]) {
   double count = 0;
   int low[2] = {width, width};
   int high[2] = {0, 0};
-  for (int y = width / 24; y < width / 5; ++y) { /* within the card's frame, left of the title */
+  for (int y = width / 24; y < width / 5; ++y) { /* inside the card, left of the title */
     const unsigned char *row = cairo_image_surface_get_data(image) + (ptrdiff_t)y * stride;
     for (int x = width / 24; x < width / 5; ++x) {
       const unsigned char *pixel = row + (ptrdiff_t)4 * x; /* blue, green, red */
@@ -382,9 +382,9 @@ static void find_arrow(const char *path, double place[2]) {
   }
 }
 
-/* Seen from the front, left is on the right and feet are below; who lies supine or prone is seen
- * along gravity. */
-TEST(test_render_arrow_points_where_gravity_does) {
+/* From the front, left is on the right and feet are below; supine and prone, the view is along
+ * gravity. */
+TEST(test_render_arrow_points_along_gravity) {
   static const struct {
     const char *posture;
     int toward[2]; /* right, down */
@@ -406,8 +406,8 @@ TEST(test_render_arrow_points_where_gravity_does) {
   }
 }
 
-/* One point alone inside is seen. */
-TEST(test_render_one_point_inside_is_seen) {
+/* A single point inside is visible. */
+TEST(test_render_one_point_inside_visible) {
   char path[2][256];
   (void)snprintf(path[0], sizeof path[0], "%s/one.csv", folder);
   FILE *points = fopen(path[0], "w");
@@ -426,8 +426,7 @@ TEST(test_render_one_point_inside_is_seen) {
   assert_true(png_difference(path[0], path[1]) > 0.02);
 }
 
-/* Lungs that are seen through are a grey shell, fainter the less opaque, where whole ones have
- * colours. */
+/* Transparent lungs are a grey shell, fainter at lower opacity; opaque ones are coloured. */
 TEST(test_render_opacity_below_one_draws_a_grey_shell) {
   static const char *const shares[3] = {"1", "0.5", "0.25"};
   cairo_surface_t *image[3];
@@ -450,7 +449,7 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
                (ptrdiff_t)y * cairo_image_surface_get_stride(image[i]);
     }
     for (int x = 0; x < 4 * 240; x += 4) {
-      if (abs(row[0][x] - row[0][x + 1]) > 40) { /* blue less green: violet */
+      if (abs(row[0][x] - row[0][x + 1]) > 40) { /* blue minus green: violet */
         ++coloured;
         for (int i = 1; i < 3; ++i) {
           assert_in_range(abs(row[i][x] - row[i][x + 1]), 0, 8);
@@ -467,7 +466,7 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
   }
 }
 
-/* Frame `wanted` of an animation, RGBA (malloc); what it says of itself. */
+/* Decode frame `wanted` of an animation, RGBA (malloc), and its information. */
 static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo *info, int *time) {
   size_t size = 0;
   char *bytes = read_file(name, &size);
@@ -488,7 +487,7 @@ static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo
   return copy;
 }
 
-/* The mean difference of two frames, of 255. */
+/* Return the mean difference of two frames, 0 to 255. */
 static double frame_difference(const unsigned char *a, const unsigned char *b, size_t area) {
   double sum = 0;
   for (size_t i = 0; i < 4 * area; ++i) {
@@ -497,10 +496,10 @@ static double frame_difference(const unsigned char *a, const unsigned char *b, s
   return sum / (3.0 * (double)area);
 }
 
-/* Every frame is another; the last rests; there and back again begin and end alike. */
-TEST(test_render_turn_plays_from_posture_to_posture) {
+/* All frames differ; the last pauses; an animation there and back begins and ends alike. */
+TEST(test_render_turn_animates_between_postures) {
   enum { FRAMES = 7, WIDTH = 240, HEIGHT = 180 };
-  static const double loss = 2.5; /* of 255, by the codec and the words about degrees */
+  static const double loss = 2.5; /* of 255, by the codec and the text of the angle */
   WebPAnimInfo info;
   int time = 0;
   if (!render("lungs.safetensors --turn supine:left:0.4s --size 240x180 -o there.webp")) {
@@ -516,7 +515,7 @@ TEST(test_render_turn_plays_from_posture_to_posture) {
   assert_int_equal(info.canvas_width, WIDTH);
   assert_int_equal(info.canvas_height, HEIGHT);
   assert_int_equal(info.frame_count, FRAMES);
-  assert_int_equal(info.loop_count, 0); /* for ever */
+  assert_int_equal(info.loop_count, 0); /* repeat for ever */
   unsigned char *first = read_frame("back.webp", 0, &info, &time);
   unsigned char *last = read_frame("back.webp", FRAMES - 1, &info, &time);
   assert_true(frame_difference(frame[0], last, WIDTH * HEIGHT) < loss);
@@ -536,7 +535,7 @@ TEST(test_render_turn_plays_from_posture_to_posture) {
          "nothere.safetensors");
 }
 
-/* Red, green and blue of the page, in its corner. */
+/* Return red, green and blue of a corner of the picture. */
 static void corner_of(const char *name, int rgb[3]) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -550,8 +549,8 @@ static void corner_of(const char *name, int rgb[3]) {
   cairo_surface_destroy(image);
 }
 
-/* A dark page is all but black, a light one all but white, both all but grey. */
-TEST(test_render_themes_are_dark_and_light) {
+/* A dark background is nearly black, a light one nearly white, both nearly grey. */
+TEST(test_render_themes_dark_or_light_background) {
   int rgb[2][3];
   if (!render("lungs.safetensors --posture supine --size 260x380 --theme dark -o dark.png")) {
     skip();
@@ -598,7 +597,7 @@ TEST(test_render_options_change_the_picture) {
   }
 }
 
-TEST(test_render_many_postures_and_open_surfaces_work) {
+TEST(test_render_many_postures_or_open_surface_accepted) {
   if (!render("lungs.safetensors --posture supine,prone,left,right,upright,inverted,0.6:0:-0.8 "
               "--size 1400x260 -o row.png")) {
     skip();

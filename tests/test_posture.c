@@ -85,18 +85,18 @@ TEST(test_quaternion_known_orientations_literal) {
   const double h = sqrt(0.5);
   double g[3];
   assert_int_equal(supine_posture_quaternion((double[]){1, 0, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* body axes as the world's: upright */
+  assert_vector(g, 0, 0, -1); /* body axes equal world axes: upright */
   assert_false(signbit(g[0]) || signbit(g[1]));
-  /* Turned by +90 degrees about x, body y (the back) points to world z: lying on the belly. */
+  /* Rotated by +90 degrees about x, body y (the back) points to world z: prone. */
   assert_int_equal(supine_posture_quaternion((double[]){h, h, 0, 0}, g), SUPINE_OK);
   assert_vector(g, 0, -1, 0);
   assert_int_equal(supine_posture_quaternion((double[]){-3 * h, 3 * h, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, 1, 0); /* -90 degrees, sign and length of no matter: supine */
+  assert_vector(g, 0, 1, 0); /* -90 degrees; sign and length do not matter: supine */
   /* +90 degrees about y takes body z (head) to world x and body x (left) to world -z. */
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, h, 0}, g), SUPINE_OK);
   assert_vector(g, 1, 0, 0);
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, 0, h}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* turning about gravity changes nothing */
+  assert_vector(g, 0, 0, -1); /* a turn about gravity changes nothing */
 }
 
 /* v_world = q v q*, written out with cross products. */

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From lungs to a basis file and back: coefficients, stated errors and volumes against the full
- * physics. */
+/* From lungs to a basis file: coefficients, stated errors and volumes against the full physics. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
@@ -44,7 +43,7 @@ static supine_lungs phantom(size_t vertices) {
   return lungs;
 }
 
-/* An adult's two lungs of 20,001 vertices each; skips the test where they are not there. */
+/* Load both lungs of an adult, 20,001 vertices each; skip the test if they are missing. */
 static supine_lungs real_pair(void) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   supine_lungs lungs = {0};
@@ -54,7 +53,7 @@ static supine_lungs real_pair(void) {
   return lungs;
 }
 
-static double reach; /* of the bases made from here on; 0: the paper's */
+static double reach; /* of the next bases; 0: that of the paper */
 
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
@@ -72,7 +71,7 @@ static supine_precompute_report make_basis(const supine_lungs *lungs, size_t ban
   return report;
 }
 
-/* As the file has it: what compact storage adds is the run time's to state. */
+/* Open with the file's precision; compact storage states its own error. */
 static supine_basis *open_basis(void) {
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
@@ -83,8 +82,8 @@ static supine_basis *open_basis(void) {
   return basis;
 }
 
-/* Coefficients in the file against a direct factorisation over all nodes, one right-hand side a
- * harmonic, with the same quadrature of the force. */
+/* Coefficients in the file against a direct factorisation over all nodes, with one right-hand side
+ * for each harmonic and the same quadrature of the force. */
 static void check_coefficients(const char *const *names, supine_axes axes) {
   enum { BAND = 3, TERMS = 16, LATITUDES = 32 };
   supine_lungs lungs = {0};
@@ -98,7 +97,7 @@ static void check_coefficients(const char *const *names, supine_axes axes) {
   assert_int_equal(supine_sh_grid_create(LATITUDES, 2 * LATITUDES, &grid), SUPINE_OK);
   double *projected = calloc(TERMS * n, sizeof *projected);
   double *force = malloc(n * sizeof *force);
-  /* f is linear in position: project it at four points, which is all of it */
+  /* the force is linear in position: projecting it at four points determines it */
   double moments[TERMS][4] = {{0.0}};
   for (size_t d = 0; d < 2 * LATITUDES * LATITUDES; ++d) {
     double g[3];
@@ -164,7 +163,7 @@ TEST(test_precompute_real_ras_lungs_coefficients_equal_direct_solution) {
   check_coefficients(names, SUPINE_AXES_RAS);
 }
 
-/* Mean and standard error of the mean of what each direction has to say. */
+/* Compute the mean and the standard error of the mean over directions. */
 typedef struct sample_mean {
   double mean, error;
 } sample_mean;
@@ -182,8 +181,9 @@ static sample_mean mean_of(size_t count, const double *values) {
 
 enum { CHECKED = 300 };
 
-/* Squared difference between the basis and supine_physics_solve for each direction, averaged over
- * the vertices: of the field in error2 (against field2), and in mm where both breathe `volume`. */
+/* For each direction, compute the mean squared difference over vertices between basis and
+ * supine_physics_solve: of the field in error2 (with field2), and in mm if both breathe `volume`.
+ */
 static void true_errors(const supine_lungs *lungs, const supine_model *model,
                         const supine_basis *basis, size_t count, const double *directions,
                         double volume, double *error2, double *field2, double *error_mm2) {
@@ -219,7 +219,7 @@ static void true_errors(const supine_lungs *lungs, const supine_model *model,
   free(should);
 }
 
-/* Relative RMS error of a basis' first modes alone. */
+/* Return the relative RMS error of the first modes of a basis. */
 static double error_of_first(size_t kept, const supine_lungs *lungs, const supine_model *model,
                              const supine_basis *basis, size_t count, const double *directions) {
   const size_t n = lungs->mesh.vertex_count;
@@ -248,8 +248,8 @@ static double error_of_first(size_t kept, const supine_lungs *lungs, const supin
   return sqrt(error2 / field2);
 }
 
-/* The file's table says what the first modes, and the first bands, leave: here of at most as many
- * vertices as it looks at. */
+/* The file's table states the error of the first modes and of the first bands, measured on a
+ * limited number of vertices. */
 static void check_error_table(const supine_lungs *lungs, const supine_model *model,
                               const supine_basis *basis, size_t count, const double *directions) {
   const supine_tensor *by_modes = supine_basis_tensor(basis, "error_modes");
@@ -270,8 +270,8 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
   }
 }
 
-/* On the held-out directions themselves, the stated error is what deforming and solving one by one
- * find, to the rounding of float positions and, with softening, to what the few solves leave. */
+/* On the held-out directions, the stated error equals that of deforming and solving one by one: to
+ * rounding, and with softening to the error of the few solves. */
 static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
                                double soften) {
   enum { HELD_OUT = 40 };
@@ -302,8 +302,7 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   supine_basis_close(basis);
 }
 
-/* On other directions it may differ by what chance in their choice allows: four standard errors of
- * this sample's own. */
+/* On other directions it may differ by chance: by four standard errors of this sample. */
 static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t modes,
                                   double soften, const char *what) {
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
@@ -326,7 +325,7 @@ static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t
   printf("%s, soften %g: stated %.3f %%, %.4f mm; found %.3f %%, %.4f mm\n", what, soften,
          100.0 * stated->relative_rms, stated->rms_mm, 100.0 * sqrt(error.mean / field.mean),
          sqrt(mean_of(CHECKED, error_mm2).mean));
-  assert_true(error.error < 0.2 * error.mean); /* or this test would say little */
+  assert_true(error.error < 0.2 * error.mean); /* so that the test is meaningful */
   assert_close(stated->relative_rms * stated->relative_rms, error.mean / field.mean,
                4.0 * error.error / field.mean);
   supine_basis_close(basis);
@@ -340,7 +339,7 @@ TEST(test_precompute_stated_error_equals_deform_against_solve) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_stated_error_is_found_on_other_directions) {
+TEST(test_precompute_other_directions_stated_error) {
   supine_lungs lungs = phantom(1500);
   check_error_elsewhere(&lungs, 3, 0, 0.0, "phantom, 16 harmonics");
   check_error_elsewhere(&lungs, 15, 16, 0.0, "phantom, best modes of band 15");
@@ -348,7 +347,7 @@ TEST(test_precompute_stated_error_is_found_on_other_directions) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_real_lung_stated_error_is_found_and_small) {
+TEST(test_precompute_real_lung_stated_error_right_and_small) {
   static const char *const names[] = {"lungs/chaste_left_5k.obj"};
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &lungs)) {
@@ -361,7 +360,8 @@ TEST(test_precompute_real_lung_stated_error_is_found_and_small) {
   supine_lungs_free(&lungs);
 }
 
-/* Default basis against the paper's form: least ratio of their errors, and most error. */
+/* Compare the default basis with the paper's form: least ratio of their errors, and largest error.
+ */
 static void check_default_basis(const char *name, supine_axes axes, double soften, double most,
                                 double least_ratio) {
   supine_lungs lungs = {0};
@@ -385,12 +385,12 @@ TEST(test_precompute_real_lung_default_error_within_half_a_percent) {
   check_default_basis("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 1.0, 0.006, 8.0);
 }
 
-TEST(test_precompute_another_real_lung_same_ratio) {
+TEST(test_precompute_another_real_lung_same_error_ratio) {
   check_default_basis("covid/covid002_right.ply", SUPINE_AXES_RAS, 0.0, 0.005, 8.0);
   check_default_basis("covid/covid002_right.ply", SUPINE_AXES_RAS, 1.0, 0.006, 8.0);
 }
 
-/* Volume of the deformed surface itself, mL above rest. */
+/* Return the volume of the deformed surface, mL above rest. */
 static double measured_volume(const supine_basis *basis, const double *weights,
                               const double *scales) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -449,7 +449,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
 TEST(test_precompute_volumes_exact_in_every_direction) {
   supine_lungs lungs = phantom(3000);
   check_volumes(&lungs, 3, 0, 0.0, -300.0);
-  /* head down, a softening phantom folds at -299 mL */
+  /* head down, a phantom with softening folds at -299 mL */
   check_volumes(&lungs, 7, 10, 1.0, -200.0);
   supine_lungs_free(&lungs);
 }
@@ -498,7 +498,8 @@ static void normal_of(const float *xyz, const uint32_t *corner, double *normal) 
   normal[2] = u[0][0] * u[1][1] - u[0][1] * u[1][0];
 }
 
-/* The file's lungs as the run time deforms them: share of reversed triangles, worst of six. */
+/* Return the share of reversed triangles when the library deforms the file's lungs, worst of six
+ * postures. */
 static double turned_over_at_run_time(double volume) {
   supine_basis *basis = open_basis();
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -532,10 +533,10 @@ static double turned_over_at_run_time(double volume) {
   return worst;
 }
 
-/* Lungs that are emptied in one posture, not at all in the opposite one and half in the others:
- * what the one turns over is found, beside what all of them turn over half emptied. Of the postures
- * those are taken that turn over the most: left, supine and right. */
-TEST(test_turned_over_looks_at_either_end_of_an_axis) {
+/* Lungs emptied in one posture, unchanged in the opposite one and half emptied in the others: more
+ * triangles are reversed than with all postures half emptied. Postures with many reversed triangles
+ * are used: left, supine and right. */
+TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   supine_lungs lungs = phantom(1500);
   const size_t n = lungs.mesh.vertex_count;
   const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -554,8 +555,8 @@ TEST(test_turned_over_looks_at_either_end_of_an_axis) {
   static const int postures[] = {0, 1, 3};
   for (size_t p = 0; p < sizeof postures / sizeof *postures; ++p) {
     const int g = postures[p];
-    /* Volumes that change by `part` of the lungs at one end of an axis, by 0 at the other and by
-     * half of it between: bands 0 and 1, whose functions are 0.2821 and 0.4886 along the axis. */
+    /* Volumes change by `part` at one end of an axis, by 0 at the other and by half of it between:
+     * bands 0 and 1, whose functions are 0.2821 and 0.4886 along the axis. */
     static const size_t term[3] = {3, 1, 2};
     const double part = -0.76 * full;
     const double sign = g < 3 ? 1.0 : -1.0;
@@ -579,7 +580,7 @@ TEST(test_turned_over_looks_at_either_end_of_an_axis) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_turned_over_is_what_the_run_time_turns) {
+TEST(test_precompute_turned_over_equals_run_time) {
   supine_lungs lungs = phantom(3000);
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 4, .held_out = 20};
@@ -592,7 +593,7 @@ TEST(test_precompute_turned_over_is_what_the_run_time_turns) {
   assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over < 0.001);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
-  options.model.stiffness = stiffness; /* torn on purpose */
+  options.model.stiffness = stiffness; /* so irregular that triangles reverse */
   assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over > 0.01);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
@@ -600,7 +601,7 @@ TEST(test_precompute_turned_over_is_what_the_run_time_turns) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_reach_keeps_a_fine_real_surface_whole) {
+TEST(test_precompute_reach_fine_real_surface_few_reversed) {
   supine_lungs lungs = real_pair();
   const supine_precompute_report links = make_basis(&lungs, 7, 4, 0.0, 20);
   reach = 10.0;
@@ -613,7 +614,7 @@ TEST(test_precompute_reach_keeps_a_fine_real_surface_whole) {
   supine_lungs_free(&lungs);
 }
 
-/* Says stop once, at the call that is due, and go on ever after. */
+/* Request a stop once, at call number `due`. */
 static bool stop_once(void *context, double fraction) {
   (void)fraction;
   return (*(int *)context)-- != 0;
@@ -642,7 +643,7 @@ TEST(test_precompute_interrupted_anywhere_leaves_old_file) {
       status = supine_precompute(&lungs, &options, path, NULL, NULL);
     }
     assert_int_equal(status, SUPINE_OK);
-    assert_true(due >= 0); /* it was never asked so often */
+    assert_true(due >= 0); /* it was called less often */
     assert_true(calls > 1);
   }
   supine_lungs_free(&lungs);
@@ -672,7 +673,7 @@ TEST(test_precompute_bad_options_refused) {
   options.modes = 65;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.modes = 16;
-  options.model.force.soften = 1.0; /* without a reach */
+  options.model.force.soften = 1.0; /* softening needs a reach */
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The program as its users meet it: results, exit codes, messages, and what bad input leaves
- * behind. */
+/* The program: results, exit codes, messages, and refused input. */
 #include "program_helpers.h"
 
 #include <ftw.h>
@@ -18,7 +17,7 @@ static void write_text(const char *name, const char *text) {
   write_file(name, text, strlen(text));
 }
 
-/* A file of the folder into bytes [size]; returns its length. */
+/* Read a file of the folder into bytes [size]; return its length. */
 static size_t take_file(const char *name, char *bytes, size_t size) {
   size_t length = 0;
   char *text = read_file(name, &length);
@@ -37,7 +36,7 @@ static int setup(void **state) {
          run("precompute lungs.ply -o lungs.safetensors --band 3 --modes harmonics") != 0;
 }
 
-TEST(test_help_every_command_teaches) {
+TEST(test_help_every_command_prints_usage) {
   static const char *const commands[] = {"phantom", "precompute", "info",    "deform",
                                          "compare", "render",     "breathe", "export",
                                          "solve",   "pv",         "fit",     "validate"};
@@ -56,7 +55,7 @@ TEST(test_help_every_command_teaches) {
   EXPECT(1, "needs a value", "deform lungs.safetensors -o");
 }
 
-TEST(test_deform_each_way_to_say_prone_same_file) {
+TEST(test_deform_all_spellings_of_prone_same_file) {
   static const char *const ways[] = {"--posture prone",    "--posture HFP",
                                      "--posture ffp",      "--gravity 0,-1,0",
                                      "--gravity 0,-7.5,0", "--posture upright-90"};
@@ -83,7 +82,7 @@ TEST(test_deform_each_way_to_say_prone_same_file) {
   }
 }
 
-TEST(test_deform_volumes_and_scale_as_asked) {
+TEST(test_deform_volume_or_scale_reached) {
   EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume scan-300 -o a.ply");
   EXPECT(0, "+350.00 mL",
          "deform lungs.safetensors --posture left --volume left=scan+100,right=scan+250 -o a.vtp");
@@ -104,7 +103,7 @@ TEST(test_deform_volumes_and_scale_as_asked) {
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
   EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
-  EXPECT(5, "left: 7915 mL are 132 % of", /* at the breath's end */
+  EXPECT(5, "left: 7915 mL are 132 % of", /* at the end of the breath */
          "compare lungs.safetensors --postures left --volume rest --breath 5000 -o b.html");
   EXPECT(5, "7692 mL are 128 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 -o b.vtp");
@@ -118,8 +117,9 @@ TEST(test_deform_volumes_and_scale_as_asked) {
          "deform lungs.safetensors --posture left --volume scan-5500 --allow-folds -o a.ply");
 }
 
-/* Volumes as people mean them, of synthetic lungs of 2714.1 and 3285.9 mL: shares of resting.h. */
-TEST(test_deform_rest_and_full_by_posture) {
+/* Volumes of rest and full inflation, of synthetic lungs of 2714.1 and 3285.9 mL; the shares are
+ * those of resting.h. */
+TEST(test_deform_rest_and_full_volumes_by_posture) {
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture supine -o a.ply");
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture inverted --volume rest -o a.ply");
   EXPECT(0, "-3031.86 mL", "deform lungs.safetensors --posture upright -o a.ply");
@@ -136,7 +136,7 @@ TEST(test_deform_rest_and_full_by_posture) {
   EXPECT(1, "all lungs together", "solve lungs.ply --posture left --volume left=rest -o b.ply");
 }
 
-/* Largest difference of a coordinate between two PLY files of the program's own, as they stand. */
+/* Return the largest difference of a coordinate between two PLY files written by the program. */
 static double positions_apart(const char *first, const char *second) {
   static char text[2][1 << 20];
   const char *names[2] = {first, second};
@@ -168,8 +168,8 @@ static double positions_apart(const char *first, const char *second) {
   return apart;
 }
 
-/* A scan's own state and frame come back. */
-TEST(test_scanned_state_and_frame_come_back) {
+/* A basis reproduces the scan's own state and frame. */
+TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(0, "-2000.00 mL",
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
   EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL; full inflation 6000 mL",
@@ -188,7 +188,7 @@ TEST(test_scanned_state_and_frame_come_back) {
   char head[256] = "";
   (void)take_file("ras.ply", head, sizeof head - 1);
   assert_non_null(strstr(head, "SPACE=RAS cm\n"));
-  /* That put the left lung first; from here on the order stays. */
+  /* That put the left lung first; the order stays from here on. */
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "again.ply",
          "deform ras.safetensors --posture left --volume scan --as-scanned -o again.ply");
@@ -249,7 +249,7 @@ TEST(test_orientation_bad_values_refused) {
   EXPECT(0, "gravity 0,0.6,0.8", "deform lungs.safetensors --gravity 0,3,4 -o d.ply");
 }
 
-TEST(test_output_impossible_exit_4_and_nothing_left) {
+TEST(test_output_impossible_exit_4_no_file_left) {
   EXPECT(4, "nowhere/out", "deform lungs.safetensors --posture prone -o nowhere/out.ply");
   EXPECT(4, "nowhere/out", "precompute lungs.ply -o nowhere/out.safetensors");
   EXPECT(4, "/dev/full", "precompute lungs.ply -o /dev/full");
@@ -276,7 +276,7 @@ TEST(test_basis_damaged_or_foreign_refused) {
   assert_int_equal(count_files("e."), 0);
 }
 
-TEST(test_mesh_bad_input_named_and_nothing_left) {
+TEST(test_mesh_bad_input_message_names_it_no_file_left) {
   static char bytes[1 << 20];
   EXPECT(2, "missing.ply", "precompute missing.ply -o f.safetensors");
   write_text("empty.ply", "");
@@ -317,7 +317,7 @@ TEST(test_mesh_wrong_units_refused) {
   assert_null(strstr(printed, "units"));
 }
 
-TEST(test_mesh_inward_lung_turned_round_and_told) {
+TEST(test_mesh_inward_lung_flipped_and_reported) {
   write_text("in.obj",
              "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n");
   EXPECT(0, "note: the triangles of the left lung faced inwards: reversed",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The projection against full solves and a plain quadrature, and modes against a plain singular
- * value decomposition. */
+/* The projection against full solves and plain quadrature, and modes against a dense singular value
+ * decomposition. */
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
@@ -30,7 +30,7 @@ static int teardown(void **state) {
   return 0;
 }
 
-/* Coefficients [N, P] of a projection, from its factors. */
+/* Multiply the factors of a projection: coefficients [N, P]. */
 static double *coefficients_of(const supine_projection *projection) {
   const size_t terms = supine_sh_count(projection->band);
   double *c = calloc(projection->vertex_count * terms + 1, sizeof *c);
@@ -45,7 +45,7 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
-/* Weights of the span at some directions, [count, R]. */
+/* Compute the weights of the span at some directions, [count, R]. */
 static double *weights_at(const supine_lungs *lungs, const supine_model *model,
                           const supine_span *span, size_t count, const double *g) {
   double *range = malloc(2 * count * sizeof *range);
@@ -60,10 +60,9 @@ static double *weights_at(const supine_lungs *lungs, const supine_model *model,
   return weights;
 }
 
-/* The grid is fine enough for the kinks of the lowest and highest vertex: one of many times the
- * directions, summed one by one, gives the same functions, but for what is far below any error that
- * a basis states. */
-TEST(test_projection_grid_is_fine_enough_for_the_kinks) {
+/* The grid resolves the kinks of the lowest and highest vertex: a grid with many times the
+ * directions gives the same functions, to far below any stated error. */
+TEST(test_projection_finer_grid_same_functions) {
   enum { LATITUDES = 512, LONGITUDES = 513 };
   static const size_t bands[] = {1, 15};
   static const double most[] = {5e-5, 2e-5};
@@ -106,8 +105,8 @@ TEST(test_projection_grid_is_fine_enough_for_the_kinks) {
   }
 }
 
-/* The transfer does not turn: what it makes of a few forces sums to what it makes of any, to
- * rounding without softening, and to a hundredth of what modes leave with it. */
+/* The transfer does not depend on gravity, so a sum of few solves gives any solve: to rounding
+ * without softening, and with it to a hundredth of the error of the modes. */
 static void check_superposition(const supine_lungs *lungs, const supine_model *model,
                                 size_t rank_most, double most) {
   enum { COUNT = 20 };
@@ -140,7 +139,7 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
   free(weights);
 }
 
-TEST(test_projection_few_solves_sum_to_any_full_solve) {
+TEST(test_projection_few_solves_sum_to_full_solve) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   static const double softens[] = {0.0, 0.5, 1.0, 2.0, 5.0};
@@ -186,7 +185,7 @@ TEST(test_projection_impossible_softening_refused) {
   supine_mesh_free(&mesh);
 }
 
-/* Singular values and reproduced fields against a dense decomposition of the weighted matrix. */
+/* Compare singular values and fields with a dense decomposition of the weighted matrix. */
 static void check_modes(const supine_projection *projection, const double *weight, size_t most) {
   const size_t n = projection->vertex_count;
   const size_t terms = supine_sh_count(projection->band);
@@ -212,13 +211,13 @@ static void check_modes(const supine_projection *projection, const double *weigh
   double tail = 0.0;
   for (size_t k = 0; k < terms; ++k) {
     const double should = gsl_vector_get(s, k);
-    if (k < modes.mode_count) { /* the Gram matrix costs half the digits of small ones */
+    if (k < modes.mode_count) { /* the Gram matrix halves the digits of small values */
       assert_close(singular[k], should, 1e-7 * gsl_vector_get(s, 0));
     } else {
       tail += should * should;
     }
   }
-  double error = 0.0; /* what the modes leave is what the best approximation of that rank leaves */
+  double error = 0.0; /* the error of the modes is that of the best approximation of this rank */
   for (size_t i = 0; i < n; ++i) {
     for (size_t t = 0; t < terms; ++t) {
       double is = 0.0;
@@ -267,7 +266,7 @@ TEST(test_modes_equal_dense_decomposition) {
   free(weight);
 }
 
-TEST(test_modes_beat_harmonics_of_the_same_number) {
+TEST(test_modes_same_number_better_than_harmonics) {
   const supine_lungs *lungs = *state;
   static const double softens[] = {0.0, 1.0};
   char path[] = "/tmp/supine-projection-XXXXXX";
@@ -291,9 +290,9 @@ TEST(test_modes_beat_harmonics_of_the_same_number) {
   (void)unlink(path);
 }
 
-/* Singular values of 3e-7 and 3e-8 of the first lie on either side of what the Gram matrix tells
- * from rounding. */
-TEST(test_modes_end_where_rounding_begins) {
+/* Singular values of 3e-7 and 3e-8 of the first are just above and below the rounding of the Gram
+ * matrix. */
+TEST(test_modes_below_rounding_dropped) {
   enum { ROWS = 7, TERMS = 4 };
   static const double sizes[TERMS] = {2.0, 0.5, 2.0 * 3e-7, 2.0 * 3e-8};
   double columns[ROWS * TERMS] = {0.0};
@@ -316,7 +315,7 @@ TEST(test_modes_end_where_rounding_begins) {
 }
 
 /* Bins are 1/256 of a power of two wide, and a percentile is the upper edge of its bin. */
-TEST(test_tally_percentile_is_the_edge_above) {
+TEST(test_tally_percentile_is_upper_edge_of_bin) {
   supine_tally *tally = calloc(1, sizeof *tally);
   supine_tally *other = calloc(1, sizeof *other);
   static const double low[] = {1.0, 1.001, 1.003};

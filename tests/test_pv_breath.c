@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A breath: V(t) and P(t). */
+/* A breath: volume V(t) and pressure P(t). */
 #include <float.h>
 
 #include "test.h"
@@ -10,8 +10,8 @@
 
 enum { FRAMES = 401 };
 
-/* A phase of order 10 rounds to a few epsilon; volume changes by no more than a few times the tidal
- * volume in a breath's time. */
+/* Tolerance: a phase of about 10 rounds to a few epsilon, and the volume changes by a few tidal
+ * volumes in the time of a breath. */
 static const double rounding = 256.0 * DBL_EPSILON;
 
 static supine_pv_breath breath_of(supine_pv_course course) {
@@ -36,7 +36,7 @@ TEST(test_breath_each_course_rests_and_reaches_tidal) {
       assert_near(volumes[0], 0.0, rounding * breath.tidal);
       assert_near(volumes[1], breath.tidal, rounding * breath.tidal);
       assert_near(pressures[0], breath.rest_pressure, 1e-9);
-      double held[2]; /* the peak pressure holds the tidal volume on the inhale limb */
+      double held[2]; /* the peak pressure gives the tidal volume on the inhale limb */
       const double limb[2] = {breath.rest_pressure, pressures[1]};
       assert_int_equal(
           supine_breath_curve_evaluate(&supine_breath_normal()->limb[0], 2, limb, held, NULL, NULL),
@@ -76,7 +76,7 @@ TEST(test_breath_each_course_rises_then_falls_and_repeats) {
   }
 }
 
-/* Pressure follows its course, and volume the limbs. */
+/* Pressure follows the course of the breath, and volume the limbs. */
 TEST(test_breath_volume_follows_scaled_limbs) {
   const supine_pv *normal = supine_breath_normal();
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
@@ -110,7 +110,7 @@ TEST(test_breath_volume_follows_scaled_limbs) {
 }
 
 /* [Santhanam2008] V: 500 mL over 5 s of inhalation, in steps of 15 ms (66.66 a second): 1.5 mL. */
-TEST(test_breath_constant_flow_is_paper_step) {
+TEST(test_breath_constant_flow_has_step_of_paper) {
   const supine_pv_breath breath = {
       .tidal = 500.0, .rate = 6.0, .inhale_fraction = 0.5, .course = SUPINE_PV_CONSTANT_FLOW};
   double times[334];

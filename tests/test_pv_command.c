@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine pv: exit codes, and what it prints. */
+/* supine pv: exit codes and output. */
 #include "test.h"
 
 #include "program/breath/pv.h"
@@ -48,7 +48,7 @@ static int teardown(void **state) {
 
 #define RUN(kept, ...) COMMAND_RUN(&supine_command_pv, kept, text, __VA_ARGS__)
 
-TEST(test_command_fit_writes_parameters_that_load) {
+TEST(test_pv_fit_written_parameters_load) {
   assert_int_equal(RUN(KEPT_OUT, "fit", good, "-o", out), 0);
   assert_non_null(strstr(text, "inhale: 16 samples, 0 to 30 cmH2O"));
   assert_non_null(strstr(text, "exhale: no samples"));
@@ -59,7 +59,7 @@ TEST(test_command_fit_writes_parameters_that_load) {
   assert_true(difference < 1e-6 && difference > -1e-6);
 }
 
-TEST(test_command_fit_json_has_each_field) {
+TEST(test_pv_fit_json_has_each_field) {
   assert_int_equal(RUN(KEPT_OUT, "fit", "--json", "--confidence", "0.5", good), 0);
   static const char *const keys[] = {"{\"confidence\": 0.5, \"inhale\": {\"samples\": 16",
                                      "\"pressure_cmH2O\": [0.0, 30.0]",
@@ -76,7 +76,7 @@ TEST(test_command_fit_json_has_each_field) {
   assert_string_equal(text + strlen(text) - 3, "}}\n");
 }
 
-TEST(test_command_show_prints_curve) {
+TEST(test_pv_show_prints_curve) {
   assert_int_equal(RUN(KEPT_OUT, "show", "--step", "12.5"), 0);
   double cell[4][5];
   char *at = strchr(text, '\n');
@@ -95,11 +95,11 @@ TEST(test_command_show_prints_curve) {
     assert_true(cell[row][0] == pressures[row]);
   }
   assert_true(cell[0][1] == 0.0 && cell[3][1] == 6000.0); /* inhale, mL */
-  assert_true(cell[1][3] > cell[1][1]);                   /* exhale holds more */
-  assert_true(cell[0][4] > cell[3][4]);                   /* and stiffens */
+  assert_true(cell[1][3] > cell[1][1]);                   /* exhalation has more volume */
+  assert_true(cell[0][4] > cell[3][4]);                   /* and compliance decreases */
 }
 
-TEST(test_command_help_teaches) {
+TEST(test_pv_help_prints_usage) {
   assert_int_equal(RUN(KEPT_OUT, "--help"), 0);
   assert_non_null(strstr(text, "pressure_cmH2O,volume_mL,limb"));
   assert_non_null(strstr(text, "Examples:"));
@@ -111,7 +111,7 @@ static void expect_printed(const char *message) {
   }
 }
 
-TEST(test_command_failures_have_their_exit_codes) {
+TEST(test_pv_failures_have_exit_codes) {
   assert_int_equal(RUN(KEPT_ERR, "fit"), 1);
   expect_printed("give 'fit FILE'");
   assert_int_equal(RUN(KEPT_ERR, "fit", good, bad), 1);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A limb's equation forwards and backwards, and the built-in normal lung. */
+/* The equation of a limb, its inverse, and the built-in normal lung. */
 #include <float.h>
 
 #include "test.h"
@@ -10,7 +10,8 @@
 
 enum { COUNT = 61 };
 
-/* Of quadrature and rounding, as a share of the volume range: some 400 times a double's epsilon. */
+/* Error of quadrature and rounding relative to the volume range: some 400 times a double's epsilon.
+ */
 static const double integration = 1e-13;
 
 static const supine_pv_curve sigmoid = {
@@ -63,7 +64,7 @@ TEST(test_evaluate_second_control_gives_gaussian_compliance) {
   }
 }
 
-/* u' from differences of the logarithm of compliance matches the sum over Legendre polynomials. */
+/* u' by finite differences of the log compliance equals the sum over Legendre polynomials. */
 TEST(test_evaluate_any_controls_satisfy_equation) {
   const double half = 0.5 * (sigmoid.pressure[1] - sigmoid.pressure[0]);
   const double step = 1e-4;
@@ -78,7 +79,7 @@ TEST(test_evaluate_any_controls_satisfy_equation) {
     const double u = c[0] + c[1] * x + c[2] * (3.0 * x * x - 1.0) / 2.0 +
                      c[3] * (5.0 * x * x * x - 3.0 * x) / 2.0 +
                      c[4] * (35.0 * pow(x, 4) - 30.0 * x * x + 3.0) / 8.0;
-    /* The difference quotient's own error is of order step^2. */
+    /* The error of the difference quotient is of order step^2. */
     assert_near(log(compliances[1] / compliances[0]) / (2.0 * step), u, 100 * step * step);
   }
 }
@@ -98,7 +99,7 @@ TEST(test_evaluate_ends_and_order_exact) {
   assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 0, NULL, NULL, NULL, NULL), SUPINE_OK);
 }
 
-TEST(test_evaluate_wild_controls_still_rise) {
+TEST(test_evaluate_extreme_controls_still_rise) {
   const supine_pv_curve wild = {{0.0, 20.0}, {0.0, 1.0}, {9.1, -17.3, 21.7, 14.9, -11.3}};
   double pressures[COUNT];
   double volumes[COUNT];
@@ -178,7 +179,7 @@ TEST(test_evaluate_outside_range_or_bad_curve_refused) {
   }
 }
 
-TEST(test_normal_lung_is_its_stated_curves) {
+TEST(test_normal_lung_has_stated_curves) {
   const double k = log(2.0) / 7.58; /* [Salazar1964]: half-inflation pressure 7.58 cmH2O */
   const double rise = 1.0 / (1.0 + exp(-20.0 / 6.0)) - 1.0 / (1.0 + exp(10.0 / 6.0));
   double pressures[COUNT];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Files of samples and of parameters. */
+/* Files of pressure-volume samples and of fitted parameters. */
 #include "test.h"
 
 #include "program/breath/pv.h"

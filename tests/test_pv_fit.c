@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The inverse problem: curves of the literature, noise, confidence, bad samples. */
+/* Fits to pressure-volume samples: published curves, noise, confidence, refused samples. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -11,7 +11,7 @@
 
 enum { SAMPLES = 33, HELD_OUT = 211 };
 
-/* A published form: Venegas' sigmoid where d > 0, Salazar-Knowles otherwise. */
+/* A published curve: Venegas' sigmoid if d > 0, else Salazar-Knowles. */
 typedef struct truth {
   const char *name;
   double low, high;  /* cmH2O */
@@ -46,7 +46,7 @@ static double truth_volume(const truth *lung, double pressure) {
                        : -lung->b * expm1(-lung->c * pressure);
 }
 
-/* Pressures unevenly between the ends, and the true volumes. */
+/* Sample the true volumes at unevenly spaced pressures. */
 static void truth_sample(const truth *lung, size_t count, double *pressures, double *volumes) {
   for (size_t j = 0; j < count; ++j) {
     const double share = (double)j / (double)(count - 1);
@@ -60,7 +60,7 @@ static double truth_range(const truth *lung) {
   return truth_volume(lung, lung->high) - truth_volume(lung, lung->low);
 }
 
-/* RMS distance to the truth, in percent of the volume range, at pressures that no sample had. */
+/* Return the RMS distance to the truth at other pressures, % of the volume range. */
 static double held_out_percent(const truth *lung, const supine_pv_curve *curve) {
   double pressures[HELD_OUT];
   double volumes[HELD_OUT];
@@ -103,7 +103,7 @@ TEST(test_fit_published_curves_under_one_percent) {
                   report.rms_percent, held_out, report.condition);
     assert_true(report.rms_percent < 1.0);
     assert_true(held_out < 1.0);
-    assert_true(held_out < 0.3); /* what the form reaches: see the header for why */
+    assert_true(held_out < 0.3); /* % of the range: the limit of the form of the curve */
     assert_near(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
                 1e-9 * report.rms + 1e-12);
     assert_true(curve.pressure[0] == truths[i].low && curve.pressure[1] == truths[i].high);
@@ -116,7 +116,7 @@ TEST(test_fit_published_curves_under_one_percent) {
   }
 }
 
-TEST(test_fit_one_percent_noise_follows_truth) {
+TEST(test_fit_one_percent_noise_near_truth) {
   enum { SEEDS = 20 };
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   assert_non_null(random);
@@ -187,8 +187,8 @@ TEST(test_fit_model_own_data_recovers_parameters) {
   }
 }
 
-/* The number of fits whose interval holds the true parameter is binomial: over 400 seeds at 0.95,
- * 380 +- 4.4. Within 5 deviations, and a rate of 0.80 outside them. */
+/* The number of fits whose interval contains the true parameter is binomial: with 400 seeds and
+ * 0.95, 380 +- 4.4. Allowed are 5 deviations; a rate of 0.80 would be outside. */
 TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
   enum { SEEDS = 400, COUNT = 21 };
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -230,7 +230,7 @@ TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
   }
 }
 
-/* The minimum is one: a small move of any parameter makes the misfit worse. */
+/* The fit is a minimum: a small change of any parameter increases the misfit. */
 TEST(test_fit_result_is_a_minimum) {
   double pressures[SAMPLES];
   double volumes[SAMPLES];
@@ -268,7 +268,7 @@ static void expect_format(size_t count, const double *pressures, const double *v
   }
 }
 
-TEST(test_fit_bad_samples_name_the_line) {
+TEST(test_fit_bad_samples_message_names_line) {
   double p[SAMPLES];
   double v[SAMPLES];
   model_sample(SAMPLES, p, v);
@@ -296,8 +296,8 @@ TEST(test_fit_bad_samples_name_the_line) {
   }
 }
 
-/* A limb recorded from high to low pressure is blamed by its own lines. */
-TEST(test_fit_falling_limb_names_its_line) {
+/* A limb recorded from high to low pressure is reported with its own line numbers. */
+TEST(test_fit_falling_limb_message_names_line) {
   double p[SAMPLES];
   double v[SAMPLES];
   double reversed_p[SAMPLES];
@@ -311,7 +311,7 @@ TEST(test_fit_falling_limb_names_its_line) {
   expect_format(SAMPLES, reversed_p, reversed_v, "s.csv:112", "volume must rise");
 }
 
-/* A small dip in smooth samples is no noise; the same dip among noise of its size is. */
+/* A small dip in smooth samples is not noise; the same dip among noise of its size is. */
 TEST(test_fit_dip_judged_against_noise) {
   double p[SAMPLES];
   double v[SAMPLES];
@@ -331,14 +331,13 @@ TEST(test_fit_dip_judged_against_noise) {
   assert_int_equal(fit(SAMPLES, p, v, 0.95, &curve, NULL, NULL), SUPINE_OK);
 }
 
-/* Where the limb is flat, and neighbours that are up and down by the noise let no rise be expected.
- */
+/* Make a flat limb whose samples alternate by the noise, so that no rise is expected. */
 static size_t dip_at(size_t count) {
   return (count - 3) / 2 * 2;
 }
 
-/* A dip of `share` of the range at one of `count` samples with noise of +- `noise` shares, turn by
- * turn. */
+/* Make `count` samples with alternating noise of +- `noise` and a dip of `share` at one of them,
+ * relative to the range. */
 static supine_status fit_dip(size_t count, double noise, double share, supine_pv_curve *curve,
                              double *pressures, double *volumes) {
   const size_t at = dip_at(count);
@@ -364,7 +363,7 @@ static double least_refused_dip(size_t count, double noise, supine_pv_curve *kep
   return range[0];
 }
 
-/* Greatest less least of the samples, which falls are shares of. */
+/* Return the range of the samples. */
 static double span_of(const double *v, size_t count) {
   double least = v[0];
   double greatest = v[0];
@@ -375,17 +374,17 @@ static double span_of(const double *v, size_t count) {
   return greatest - least;
 }
 
-/* How far the dip falls below the one before and the rise that its neighbours let one expect.
- */
+/* Return the fall at the dip below the previous sample and the rise expected from its neighbours,
+ * relative to the range. */
 static double fall_of(const double *v, size_t count) {
   const size_t at = dip_at(count);
   const double expected = fmax(0.0, (v[at + 1] - v[at - 2]) / 3.0);
   return (v[at - 1] - v[at] + expected) / span_of(v, count);
 }
 
-/* Few samples may fall by 8 % of the range, many by 15 %, and by no more than 7 sqrt(2) times the
- * noise, 1.4826 of the median residual; 15 samples are many. */
-TEST(test_fit_falls_are_allowed_up_to_the_stated_limits) {
+/* Allowed falls: 8 % of the range for few samples, 15 % for at least 15, and at most 7 sqrt(2)
+ * times the noise, 1.4826 times the median residual. */
+TEST(test_fit_dips_accepted_up_to_stated_limits) {
   double p[SAMPLES];
   double v[SAMPLES];
   supine_pv_curve curve;
@@ -400,7 +399,7 @@ TEST(test_fit_falls_are_allowed_up_to_the_stated_limits) {
   assert_int_equal(supine_breath_curve_evaluate(&curve, SAMPLES, p, fitted, NULL, NULL), SUPINE_OK);
   for (size_t j = 0; j < SAMPLES; ++j) {
     residual[j] = fabs(fitted[j] - v[j]) / span;
-    for (size_t k = j; k > 0 && residual[k] < residual[k - 1]; --k) { /* in order */
+    for (size_t k = j; k > 0 && residual[k] < residual[k - 1]; --k) { /* insertion sort */
       const double swap = residual[k];
       residual[k] = residual[k - 1];
       residual[k - 1] = swap;
@@ -409,6 +408,6 @@ TEST(test_fit_falls_are_allowed_up_to_the_stated_limits) {
   const double sigma =
       1.4826 * residual[SAMPLES / 2] * sqrt((double)SAMPLES / (SAMPLES - SUPINE_PV_CONTROLS - 2));
   const double fall = fall_of(v, SAMPLES);
-  assert_true(fall < 0.1); /* of the noise, not of the range */
+  assert_true(fall < 0.1); /* limited by the noise, not by the range */
   assert_near(fall, 7.0 * sqrt(2.0) * sigma, 1e-4 * fall);
 }

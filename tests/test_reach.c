@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The spreading length in mm: its definition, what it balances, and that it is a length. */
+/* The reach in mm: its definition, its balance, and its independence of the mesh. */
 #include <float.h>
 
 #include "test.h"
@@ -13,9 +13,9 @@
 
 #include "lungs_helpers.h"
 
-static supine_model model; /* with the reach of the test that runs */
+static supine_model model; /* with the reach of the current test */
 
-/* Solves one right-hand side on lungs as they are. */
+/* Solve one right-hand side on lungs. */
 static double *solve(const supine_lungs *lungs, const double *stiffness, const double *force) {
   const size_t n = lungs->mesh.vertex_count;
   supine_equilibrium *equilibrium = NULL;
@@ -56,7 +56,7 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 3.0 * area[one.triangles[0]];
 }
 
-/* Over all nodes, masses and springs, with the link weights of equilibrium.h and nothing else. */
+/* Solve over all nodes (masses and springs) by the link weights of equilibrium.h alone. */
 TEST(test_reach_equals_dense_definition) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);
@@ -107,7 +107,7 @@ TEST(test_reach_equals_dense_definition) {
       gsl_matrix_set(weight, n + k, edge[c], w);
     }
   }
-  /* I - A, A[i, j] = S_i w_ij / Z_j, and the share that a mass keeps. */
+  /* I - A with A[i, j] = S_i w_ij / Z_j, and the share kept by a mass. */
   gsl_matrix *matrix = gsl_matrix_alloc(nodes, nodes);
   gsl_vector *b = gsl_vector_calloc(nodes);
   gsl_vector *x = gsl_vector_alloc(nodes);
@@ -166,8 +166,8 @@ TEST(test_reach_constant_force_stays_constant) {
   supine_lungs_free(&lungs);
 }
 
-/* A sphere of 100 mm about the origin whose vertices, for an irregularity above 0, are shifted
- * within the surface by up to this share of a link. */
+/* Make a sphere of 100 mm about the origin; its vertices are shifted within the surface by up to
+ * `irregularity` of a link. */
 static supine_mesh sphere(size_t frequency, double irregularity) {
   supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
                       .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
@@ -188,8 +188,8 @@ static supine_mesh sphere(size_t frequency, double irregularity) {
   return mesh;
 }
 
-/* Error of the reduction that the reach makes of a harmonic, relative to that reduction.
- * (1 - R^2 Laplacian) F = Y_lm on a sphere of radius r has F = Y_lm / (1 + l (l + 1) R^2 / r^2). */
+/* Return the relative error of the damping of a harmonic. (1 - R^2 Laplacian) F = Y_lm on a sphere
+ * of radius r has F = Y_lm / (1 + l (l + 1) R^2 / r^2). */
 static double harmonic_error(size_t frequency, double irregularity, double reach, size_t l, int m) {
   supine_lungs lungs = lungs_of(sphere(frequency, irregularity), reach);
   const size_t n = lungs.mesh.vertex_count;
@@ -214,7 +214,7 @@ static double harmonic_error(size_t frequency, double irregularity, double reach
   return sqrt(error / norm);
 }
 
-TEST(test_reach_on_sphere_damps_harmonics_as_the_laplacian_does) {
+TEST(test_reach_sphere_damps_harmonics_as_laplacian) {
   static const double reaches[] = {10.0, 25.0, 60.0};
   for (size_t r = 0; r < 3; ++r) {
     for (size_t l = 1; l <= 5; ++l) {
@@ -224,7 +224,7 @@ TEST(test_reach_on_sphere_damps_harmonics_as_the_laplacian_does) {
       const double rough = harmonic_error(24, 0.15, reaches[r], l, m);
       printf("R %2.0f mm, l %zu: error %.2e with 642 vertices, %.2e with 5762, %.2e irregular\n",
              reaches[r], l, coarse, fine, rough);
-      /* Links do not run in all directions quite alike, so finer meshes do not bring it to 0. */
+      /* Links are not isotropic, so finer meshes do not reduce it to 0. */
       assert_true(coarse < 0.1);
       assert_true(fine < 0.1);
       assert_true(rough < 0.15);
@@ -232,7 +232,7 @@ TEST(test_reach_on_sphere_damps_harmonics_as_the_laplacian_does) {
   }
 }
 
-/* Root mean square distance, weighted by area, over which a unit force spreads. */
+/* Return the area-weighted RMS distance over which a unit force spreads. */
 static double spread(size_t frequency, double reach) {
   supine_lungs lungs = lungs_of(sphere(frequency, 0.1), reach);
   const size_t n = lungs.mesh.vertex_count;
@@ -259,8 +259,8 @@ static double spread(size_t frequency, double reach) {
   return sqrt(square / sum);
 }
 
-/* In the plane the response to a point is K_0(r / R), whose root mean square radius is 2 R. */
-TEST(test_reach_is_a_length_where_links_are_not) {
+/* In the plane the response to a point is K_0(r / R), of RMS radius 2 R. */
+TEST(test_reach_finer_mesh_same_length) {
   double with[3];
   double without[3];
   static const size_t frequencies[] = {12, 24, 48};
@@ -275,8 +275,9 @@ TEST(test_reach_is_a_length_where_links_are_not) {
   assert_true(without[2] < 0.6 * without[0]);
 }
 
-/* Twice as expandable tissue moves twice as far, outside the reach of where it ends. */
-TEST(test_reach_twice_expandable_half_moves_twice_as_far) {
+/* Tissue twice as expandable moves twice as far, at distances beyond the reach from its boundary.
+ */
+TEST(test_reach_half_twice_expandable_moves_twice_as_far) {
   const double reach = 10.0;
   supine_lungs lungs = lungs_of(sphere(24, 0.1), reach);
   const size_t n = lungs.mesh.vertex_count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Full inflation as the reference: found from scans in any state, and rest by posture. */
+/* Full inflation as the reference: estimated from scans in any state; rest by posture. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -15,7 +15,7 @@
 
 #include "tests/poses.h"
 
-static const double promised = 0.005; /* mm, of a scan's reproduction */
+static const double promised = 0.005; /* mm, error of a reproduced scan */
 
 static char path[] = "/tmp/supine-reference-XXXXXX";
 
@@ -37,7 +37,7 @@ static supine_scan scan_named(const char *text) {
   return scan;
 }
 
-/* The reference that lungs at full inflation have. */
+/* Compute the reference of lungs at full inflation. */
 static supine_reference reference_of(supine_lungs *full, const supine_model *model) {
   const supine_scan scan = scan_named("full");
   const supine_resting resting = supine_reference_resting_default();
@@ -47,7 +47,7 @@ static supine_reference reference_of(supine_lungs *full, const supine_model *mod
   return found;
 }
 
-/* The same lungs where they hold `volume` mL in a posture, shared out by the model: a scan. */
+/* Make a scan: the same lungs with a total of `volume` mL in a posture, divided by the model. */
 static supine_lungs scan_of(supine_lungs *full, const supine_model *model, const double g[3],
                             double volume) {
   const supine_reference reference = reference_of(full, model);
@@ -86,7 +86,7 @@ static double farthest(const double *a, const double *b, size_t count) {
   return most;
 }
 
-TEST(test_axes_values_met_and_harmonics_agree_everywhere) {
+TEST(test_resting_axes_values_interpolated_by_harmonics) {
   static const double values[6] = {-3.1, 2.7, 0.4, -1.9, 5.3, 0.08};
   double harmonics[9];
   uint64_t seed = 77;
@@ -120,7 +120,7 @@ TEST(test_resting_defaults_and_options) {
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
-  /* one share for both keeps their proportion, of lungs of usual size exactly the share */
+  /* one share for both lungs keeps their proportion, and is exact for lungs of usual size */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
@@ -153,8 +153,9 @@ TEST(test_resting_defaults_and_options) {
   assert_non_null(strstr(error.message, "line 3"));
 }
 
-/* Volumes in mL become shares of the lungs' own size; what was not told keeps its proportion. */
-TEST(test_resting_settle_volumes_become_shares) {
+/* Volumes in mL become shares of the lungs' own full volumes; volumes not given keep their
+ * proportion. */
+TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
   supine_resting resting = supine_reference_resting_default();
@@ -182,7 +183,7 @@ TEST(test_resting_settle_volumes_become_shares) {
   assert_non_null(strstr(error.message, "--resting"));
 }
 
-TEST(test_scan_parse_states_taken_and_refused) {
+TEST(test_scan_parse_states_accepted_or_refused) {
   static const struct {
     const char *text;
     supine_volume_kind kind;
@@ -217,9 +218,9 @@ TEST(test_scan_parse_states_taken_and_refused) {
   }
 }
 
-/* Milic-Emili's lines: at rest and full each lung holds its share; between, all go the same part
- * of the way; below rest they keep their proportion. */
-TEST(test_share_out_follows_the_lines) {
+/* Milic-Emili's lines: at rest and at full inflation each lung has its share; between, all regions
+ * have gone the same part of the way; below rest they keep their proportion. */
+TEST(test_share_out_any_volume_follows_lines) {
   static const double left_side[3] = {1.0, 0.0, 0.0};
   static const double upright[3] = {0.0, 0.0, -1.0};
   const supine_reference r = {.known = true,
@@ -240,8 +241,8 @@ TEST(test_share_out_follows_the_lines) {
   assert_true(fabs(ml[0] - 1.109 * 2000.0) < 1e-9 && fabs(ml[1] - 1.109 * 3000.0) < 1e-9);
 }
 
-/* In the posture that it was fitted in the split of the gradient changes nothing. */
-TEST(test_deep_law_supine_is_its_unsplit_form) {
+/* In the fitted posture, splitting the gradient changes nothing. */
+TEST(test_deep_law_supine_equals_unsplit_form) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   supine_lungs lungs = made_lungs();
   const supine_model split = supine_physics_model(SUPINE_LAW_DEEP);
@@ -264,7 +265,7 @@ TEST(test_deep_law_supine_is_its_unsplit_form) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_laws_constants_are_as_tabled) {
+TEST(test_law_constants_equal_table) {
   static const struct {
     const char *name;
     double base, gain, box[3], c[6], reach;
@@ -284,8 +285,8 @@ TEST(test_laws_constants_are_as_tabled) {
   }
 }
 
-/* Lungs of one person come out alike whatever state they were scanned in. */
-TEST(test_scan_of_any_state_gives_the_full_lungs_back) {
+/* The full inflation of one person is the same from scans in any state. */
+TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   static const struct {
     const char *scanned;
     double volume; /* of the scan, mL */
@@ -332,8 +333,8 @@ TEST(test_scan_of_any_state_gives_the_full_lungs_back) {
   supine_lungs_free(&full);
 }
 
-/* ECSC 1993 by hand: a man of 1.78 m has 7.1422 L, 6.4402 L lying, and 0.86 L of tissue. */
-TEST(test_capacity_follows_height_and_sex) {
+/* ECSC 1993, by hand: a man of 1.78 m has 7.1422 L, 6.4402 L supine, and 0.86 L of tissue. */
+TEST(test_capacity_height_and_sex_literal) {
   static const struct {
     supine_person person;
     double range[2];
@@ -349,13 +350,14 @@ TEST(test_capacity_follows_height_and_sex) {
   }
 }
 
-/* A doubt where a scan is no adult's at full inflation, and where what is told of rest differs. */
-TEST(test_doubt_names_the_option) {
+/* A scan is doubted if its size is not that of an adult at full inflation, or if given rest volumes
+ * disagree. */
+TEST(test_doubt_odd_scan_names_option) {
   static const struct {
     const char *scanned;
     double full;        /* of each lung */
-    double told;        /* mL at rest supine, or 0 */
-    const char *doubts; /* or NULL */
+    double told;        /* given volume at rest supine, mL, or 0 */
+    const char *doubts; /* expected doubts, or NULL */
   } known[] = {{"full", 3000.0, 0.0, NULL},
                {"full", 1700.0, 0.0, "--scanned supine:rest"},
                {"supine:rest", 5100.0, 0.0, "--scanned full"},
@@ -383,8 +385,8 @@ TEST(test_doubt_names_the_option) {
   }
 }
 
-/* The promise of 30 solves, on real lungs as empty as 0.35 of full. */
-TEST(test_real_scans_reach_full_inflation) {
+/* At most 30 solves for real lungs at 0.35 of full inflation or more. */
+TEST(test_reference_real_scans_reach_full_inflation) {
   static const char *const pairs[][2] = {{"lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj"},
                                          {"covid/covid001_left.ply", "covid/covid001_right.ply"}};
   static const char *const states[] = {"supine:rest", "left:rest", "prone:rest", "upright:rest"};
@@ -411,7 +413,7 @@ TEST(test_real_scans_reach_full_inflation) {
   }
 }
 
-/* A basis of lungs as scanned. */
+/* Make a basis of lungs as scanned. */
 static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, double *rms_mm) {
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
@@ -432,7 +434,7 @@ static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, doub
   return basis;
 }
 
-/* Positions of a basis in a state, and what its lungs hold there. */
+/* Compute the positions of a basis in a state, and the volumes of its lungs. */
 static double *positions_in(const supine_basis *basis, const supine_state *state, double *ml) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   supine_pose pose;
@@ -452,8 +454,8 @@ static double *positions_in(const supine_basis *basis, const supine_state *state
   return placed;
 }
 
-/* What the library makes of a basis from a scan that was not full. */
-TEST(test_basis_reproduces_its_scan_and_rests_where_it_should) {
+/* A basis from a scan below full inflation, evaluated by the library. */
+TEST(test_basis_scan_reproduced_and_rest_right) {
   static const char *const scans[] = {"supine-20:full-2500", "supine:rest", "left:rest",
                                       "upright:rest+300", "upright:full"};
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -481,7 +483,7 @@ TEST(test_basis_reproduces_its_scan_and_rests_where_it_should) {
     printf("%s: scan reproduced within %.4f and %.4f mm; basis errs by %.4f mm RMS\n", scans[s],
            farthest(placed, scanned, n), farthest(told, scanned, n), rms);
     assert_true(farthest(placed, scanned, n) < promised);
-    /* the file's full inflation is where the compressed field leads: a few mL from the true one */
+    /* full inflation in the file follows the compressed field: a few mL from the true one */
     assert_true(farthest(told, scanned, n) <
                 (rests && scan.state.volume.ml == 0.0 ? promised : 0.15));
     free(placed);
@@ -500,7 +502,7 @@ TEST(test_basis_reproduces_its_scan_and_rests_where_it_should) {
   supine_lungs_free(&full);
 }
 
-TEST(test_states_that_cannot_be_are_refused) {
+TEST(test_reference_impossible_states_refused) {
   supine_lungs lungs = made_lungs();
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const supine_resting resting = supine_reference_resting_default();
@@ -521,7 +523,7 @@ TEST(test_states_that_cannot_be_are_refused) {
     }
     assert_false(found.known);
   }
-  supine_model rough = model; /* tears on its way up */
+  supine_model rough = model; /* folds on the way to full inflation */
   rough.reach = 0.0;
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 5;
@@ -551,8 +553,8 @@ TEST(test_states_that_cannot_be_are_refused) {
   supine_mesh_free(&open);
 }
 
-/* A lung given alone has nearly the field that it has beside its fellow. */
-TEST(test_lung_alone_moves_as_in_its_pair) {
+/* A single lung moves nearly as in its pair. */
+TEST(test_reference_single_lung_moves_as_in_pair) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   static const double postures[][3] = {{0, 1, 0},  {0, -1, 0}, {1, 0, 0},
                                        {-1, 0, 0}, {0, 0, -1}, {0, 0, 1}};

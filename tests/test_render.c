@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Pictures: views, colours, bars, and what is drawn. */
+/* Pictures: views, colours, colour bars and drawings. */
 #include "test.h"
 
 #include <supine/compare.h>
@@ -9,7 +9,7 @@
 
 #include "tests/poses.h"
 
-TEST(test_view_axes_are_right_handed_and_orthonormal) {
+TEST(test_view_axes_any_view_right_handed_orthonormal) {
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     double a[3][3];
     assert_non_null(supine_render_view_name(view));
@@ -28,8 +28,8 @@ TEST(test_view_axes_are_right_handed_and_orthonormal) {
   assert_null(supine_render_view_name(SUPINE_VIEW_COUNT));
 }
 
-/* In front of the patient his left is on the right; the viewer from the left looks to the right. */
-TEST(test_view_axes_look_where_their_names_say) {
+/* `towards` points from the lungs to the viewer. */
+TEST(test_view_axes_each_view_points_to_viewer) {
   static const struct {
     supine_view view;
     double towards[3];
@@ -47,13 +47,13 @@ static double linear(double encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
 }
 
-/* L* of CIE 1976 from sRGB: another measure than the map was made with. */
+/* Return L* of CIE 1976 from sRGB, a measure not used to make the map. */
 static double lightness(const double rgb[3]) {
   const double y = 0.2126 * linear(rgb[0]) + 0.7152 * linear(rgb[1]) + 0.0722 * linear(rgb[2]);
   return 116 * cbrt(y) - 16;
 }
 
-TEST(test_colours_grow_lighter_in_even_steps) {
+TEST(test_colours_increasing_value_even_steps_of_lightness) {
   enum { STEPS = 64 };
   for (supine_colours map = 0; map < SUPINE_COLOURS_COUNT; ++map) {
     double before = 0;
@@ -72,7 +72,7 @@ TEST(test_colours_grow_lighter_in_even_steps) {
   }
 }
 
-TEST(test_colours_beyond_the_ends_are_the_ends) {
+TEST(test_colours_out_of_range_clamped) {
   static const supine_colours map = SUPINE_COLOURS_DIFFERENCE;
   double a[3];
   double b[3];
@@ -84,7 +84,7 @@ TEST(test_colours_beyond_the_ends_are_the_ends) {
   assert_memory_equal(a, b, sizeof a);
 }
 
-TEST(test_bar_ends_at_a_round_tick) {
+TEST(test_bar_any_range_ends_at_round_tick) {
   static const double cases[][3] = {{31.6, 5, 35}, {18.7, 2, 20}, {20, 5, 20}, {0.043, 0.01, 0.05},
                                     {7.99, 1, 8},  {8, 2, 8},     {0, 0.2, 1}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -93,7 +93,7 @@ TEST(test_bar_ends_at_a_round_tick) {
   }
 }
 
-/* A made basis, opened, with a renderer. */
+/* A synthetic basis, opened, with a renderer. */
 typedef struct made {
   fixture *f;
   unsigned char *bytes;
@@ -150,7 +150,7 @@ static size_t covered(const uint32_t *pixels) {
   return count;
 }
 
-/* Mean difference of the channels, 0 to 255. */
+/* Return the mean difference of the channels, 0 to 255. */
 static double difference(const uint32_t *a, const uint32_t *b) {
   double sum = 0;
   for (size_t i = 0; i < PIXELS; ++i) {
@@ -161,7 +161,7 @@ static double difference(const uint32_t *a, const uint32_t *b) {
   return sum / (4.0 * PIXELS);
 }
 
-TEST(test_draw_shows_lungs_on_clear_ground) {
+TEST(test_draw_lungs_background_transparent) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const double weights[5] = {0};
@@ -179,8 +179,8 @@ TEST(test_draw_shows_lungs_on_clear_ground) {
   unmake(&m);
 }
 
-/* The made lungs' values grow with z, so that seen from the front the top is lighter. */
-TEST(test_draw_puts_the_head_on_top) {
+/* The values of the synthetic lungs increase with z, so from the front the top is lighter. */
+TEST(test_draw_anterior_head_on_top) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const double weights[5] = {0};
@@ -197,8 +197,8 @@ TEST(test_draw_puts_the_head_on_top) {
   unmake(&m);
 }
 
-/* Vertices at the lungs' outermost places come to lie at the outermost pixels drawn. */
-TEST(test_project_agrees_with_the_drawing) {
+/* The outermost vertices are projected to the outermost pixels drawn. */
+TEST(test_project_outer_vertices_match_drawing) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const supine_basis_info *info = supine_basis_get_info(m.basis);
@@ -239,7 +239,7 @@ TEST(test_project_agrees_with_the_drawing) {
   unmake(&m);
 }
 
-TEST(test_draw_same_state_twice_is_equal) {
+TEST(test_draw_same_state_twice_equal) {
   static uint32_t first[PIXELS];
   static uint32_t second[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 9, 62));
@@ -252,7 +252,7 @@ TEST(test_draw_same_state_twice_is_equal) {
   unmake(&m);
 }
 
-TEST(test_draw_impossible_size_is_refused) {
+TEST(test_draw_impossible_size_refused) {
   uint32_t pixel = 0;
   made m = make(fixture_create(100, 3, 2, 1, false, false, 1, 65));
   const double weights[3] = {0};
@@ -266,7 +266,7 @@ TEST(test_draw_impossible_size_is_refused) {
   unmake(&m);
 }
 
-TEST(test_png_is_a_png) {
+TEST(test_png_written_has_signature_and_size) {
   static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
   made m = make(fixture_create(300, 3, 2, 1, false, false, 1, 66));
   const double weights[3] = {0};

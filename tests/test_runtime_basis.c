@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Basis files: what opens, and every damage that must not. */
+/* Basis files: valid ones open, and every damage is refused. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -11,7 +11,7 @@
 
 #include "tests/poses.h"
 
-/* Opens from a copy of exactly that size, so that a sanitizer sees any read past it. */
+/* Open from a copy of exactly this size, so that a sanitizer sees any read past its end. */
 static supine_status open_copy(const unsigned char *bytes, size_t size, supine_error *error) {
   unsigned char *copy = malloc(size == 0 ? 1 : size);
   assert_non_null(copy);
@@ -24,7 +24,7 @@ static supine_status open_copy(const unsigned char *bytes, size_t size, supine_e
   return status;
 }
 
-TEST(test_open_made_basis_holds_what_was_written) {
+TEST(test_open_synthetic_basis_returns_written_content) {
   fixture *f = fixture_create(37, 7, 3, 3, false, true, 9, 1);
   char *folder = fixture_folder();
   char path[128];
@@ -73,7 +73,7 @@ TEST(test_open_every_truncation_refused) {
   fixture_destroy(f);
 }
 
-/* Everything that one basis says, equal in the other. */
+/* Assert that two bases are equal in everything they state. */
 static void assert_same_basis(const unsigned char *a, const unsigned char *b, size_t size) {
   supine_basis *left = NULL;
   supine_basis *right = NULL;
@@ -131,9 +131,9 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
     }
     damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
   }
-  /* Only the padding can change without a trace, between a space and other white space. */
+  /* Only white space of the padding may change unnoticed. */
   assert_true(accepted <= 8);
-  /* Whole bytes of the header: every value. */
+  /* Bytes of the header: each value. */
   for (size_t i = 0; i < 8 + header; ++i) {
     for (unsigned value = 0; value < 256; value += 7) {
       damaged[i] = (unsigned char)value;
@@ -148,7 +148,7 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
   fixture_destroy(f);
 }
 
-/* Writes the fixture after `spoil` has had its way, and expects the file to be refused. */
+/* Write the fixture after `spoil` changed it; assert that the file is refused. */
 static void expect_refused(void (*spoil)(fixture *), const char *reason) {
   fixture *f = fixture_create(12, 3, 1, 2, false, true, 9, 4);
   spoil(f);
@@ -179,7 +179,7 @@ static void spoil_mode(fixture *f) {
   f->mode[11] = (double)NAN;
 }
 
-/* Finite, and no lung's: weights of it overflow into positions that are no numbers. */
+/* A finite but impossible value: positions would overflow. */
 static void spoil_mode_size(fixture *f) {
   f->mode[11] = 1e277;
 }
@@ -249,7 +249,7 @@ typedef struct parts {
 static const float zeros[64] = {0};
 static const double zeros64[64] = {0};
 
-/* A sound basis of four vertices and one mode, to be spoiled. */
+/* Return a valid basis of four vertices and one mode. */
 static parts sound(void) {
   return (parts){.tensors = {{"vertices", SUPINE_F32, 2, {4, 3}, zeros},
                              {"triangles", SUPINE_U32, 2, {2, 3}, zeros},
@@ -284,7 +284,7 @@ static supine_status open_parts(const parts *p) {
 TEST(test_open_wrong_structure_refused) {
   parts p = sound();
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  for (size_t i = 0; i < 9; ++i) { /* each tensor missing, misnamed, of other type */
+  for (size_t i = 0; i < 9; ++i) { /* each tensor missing, misnamed, of another type */
     p = sound();
     p.tensors[i].name = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
@@ -300,14 +300,14 @@ TEST(test_open_wrong_structure_refused) {
       assert_int_equal(open_parts(&p), free_axis ? SUPINE_OK : SUPINE_ERROR_FORMAT);
     }
   }
-  for (size_t i = 0; i < 3; ++i) { /* each metadata string missing or other */
+  for (size_t i = 0; i < 3; ++i) { /* each metadata string missing or changed */
     p = sound();
     p.metadata[i].value = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
     p.metadata[i].key = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
-  p = sound(); /* resting volumes are optional, nine terms where they are */
+  p = sound(); /* resting volumes are optional; if present, they have nine terms */
   p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9].dtype = SUPINE_F32;
@@ -325,7 +325,7 @@ TEST(test_open_wrong_structure_refused) {
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   p.tensors[3] = (supine_tensor){"coefficients", SUPINE_F32, 3, {4, 3, 1}, zeros};
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  p = sound(); /* no volumes at all is an open surface */
+  p = sound(); /* without volume forms the surface is open */
   p.tensor_count = 6;
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensor_count = 7;
@@ -385,7 +385,7 @@ TEST(test_open_foreign_files_refused) {
   assert_int_equal(supine_basis_open("/tmp", &basis, &error), SUPINE_ERROR_READ);
 }
 
-/* What an open basis shows is the file's own numbers. */
+/* The accessors of a basis return the file's own numbers. */
 static void check_view(bool vector, bool volume) {
   fixture *f = fixture_create(26, 3, 1, 2, vector, volume, 9, 41);
   size_t size = 0;
@@ -410,7 +410,7 @@ static void check_view(bool vector, bool volume) {
       box[3 + i % 3] = fmaxf(box[3 + i % 3], f->vertex[i]);
     }
     assert_memory_equal(info->bounds + 6 * lung, box, sizeof box);
-    assert_string_equal(info->lung_names[lung], lung == 0 ? "0" : "1"); /* the file has no names */
+    assert_string_equal(info->lung_names[lung], lung == 0 ? "0" : "1"); /* unnamed in the file */
   }
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
   assert_non_null(lung);
@@ -432,13 +432,13 @@ static void check_view(bool vector, bool volume) {
   fixture_destroy(f);
 }
 
-TEST(test_view_shows_the_file) {
+TEST(test_view_open_basis_equals_file) {
   check_view(false, true);
   check_view(true, true);
   check_view(false, false);
 }
 
-TEST(test_version_of_library_is_that_of_headers) {
+TEST(test_version_library_equals_headers) {
   int part[3] = {0};
   char text[32];
   assert_string_equal(supine_version(), SUPINE_VERSION);
@@ -460,7 +460,7 @@ TEST(test_weights_bad_gravity_refused) {
   assert_int_equal(supine_basis_weights(basis, (double[]){0, (double)NAN, 0}, weights),
                    SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_basis_weights(basis, (double[]){0, 2.5, 0}, weights), SUPINE_OK);
-  /* Y(0,0), Y(1,-1), Y(1,0), Y(1,1) at (0,1,0), as sh.h lists them. */
+  /* Values of Y(0,0), Y(1,-1), Y(1,0), Y(1,1) at (0,1,0), in the order of sh.h. */
   const double y[4] = {0.28209479177387814, 0.48860251190291992, 0, 0};
   for (size_t k = 0; k < 2; ++k) {
     double want = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What the library asks of the system: memory and files when opening, nothing afterwards; and what
- * it does when an allocation fails. Linked with --wrap, so that every call passes through here. */
+/* System calls of the library: memory and files when opening, none afterwards; and failing
+ * allocations. Linked with --wrap, which redirects the calls to this file. */
 #include <sys/types.h>
 
 #include "test.h"
@@ -13,7 +13,7 @@
 
 #include "tests/poses.h"
 
-static size_t calls;    /* of anything wrapped */
+static size_t calls;    /* of any wrapped function */
 static size_t live;     /* blocks that are allocated and not yet freed */
 static size_t fail_at;  /* which allocation to refuse, from 1; 0: none */
 static size_t attempts; /* allocations so far */
@@ -99,7 +99,7 @@ int __wrap_close(int file) {
 }
 /* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
 
-/* Everything that may be called on an open basis. */
+/* Call every function that takes an open basis. */
 static void use_all(const supine_basis *basis, float *xyz) {
   double gravity[3];
   double weights[SUPINE_MODES_MAX];
@@ -121,7 +121,7 @@ static void use_all(const supine_basis *basis, float *xyz) {
   (void)supine_basis_pose(basis, &state, &pose, &error);
   state = supine_basis_scan(basis);
   for (state.volume.ml = 3; state.volume.ml < 1e10;
-       state.volume.ml *= 1e9) { /* the last: out of reach */
+       state.volume.ml *= 1e9) { /* the last volume is out of reach */
     if (supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK &&
         supine_basis_get_info(basis)->has_volume) {
       supine_basis_volumes(basis, &pose, scales);
@@ -178,7 +178,7 @@ static void setting_close(setting *s) {
   fixture_folder_remove(s->folder);
 }
 
-TEST(test_open_basis_asks_nothing_of_the_system) {
+TEST(test_evaluate_open_basis_no_system_calls) {
   setting s = setting_open();
   supine_basis *basis = NULL;
   calls = live = attempts = fail_at = 0;
@@ -192,7 +192,7 @@ TEST(test_open_basis_asks_nothing_of_the_system) {
   supine_basis_close(basis);
   counting = false;
   assert_int_equal(status, SUPINE_OK);
-  assert_true(opening > 5); /* the count counts */
+  assert_true(opening > 5); /* the wrapping works */
   assert_int_equal(using, 0);
   assert_int_equal(live, 0);
   setting_close(&s);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Several threads on one basis: each its own orientation, and all a share of one. */
+/* Several threads on one basis: each with its own orientation, and all sharing one. */
 #include <pthread.h>
 
 #include "test.h"
@@ -16,8 +16,8 @@ typedef struct job {
   const supine_basis *basis;
   size_t number;
   float *shared;                 /* [N, 3], of which this thread writes its share */
-  float own[3 * VERTICES];       /* its own orientation, again and again */
-  float batch[3 * 2 * VERTICES]; /* shared orientation and its own */
+  float own[3 * VERTICES];       /* its own orientation, repeatedly */
+  float batch[3 * 2 * VERTICES]; /* the shared orientation and its own */
 } job;
 
 static void frame(const supine_basis *basis, size_t number, double *weights, double *scales) {

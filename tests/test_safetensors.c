@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Safetensors files: round trips, and everything that must be refused. */
+/* Safetensors files: round trips and refused files. */
 #include <inttypes.h>
 
 #include "test.h"
@@ -11,7 +11,7 @@
 
 #include "runtime_fixture.h"
 
-/* A file in memory of exactly its size, so that the address sanitizer sees any read past it. */
+/* A file in memory of exactly its size, so that a sanitizer sees any read past its end. */
 static supine_status open_text(const char *header, size_t data_size, supine_error *error) {
   const size_t length = strlen(header);
   const size_t size = 8 + length + data_size;
@@ -86,7 +86,7 @@ TEST(test_write_then_open_same_content) {
   fixture_folder_remove(folder);
 }
 
-/* Numbers begin at a multiple of 8 bytes, however long the header's text is. */
+/* Data begins at a multiple of 8 bytes, for any length of the header. */
 TEST(test_write_header_of_any_length_is_padded_to_eight_bytes) {
   char *folder = fixture_folder();
   char path[256];
@@ -100,7 +100,7 @@ TEST(test_write_header_of_any_length_is_padded_to_eight_bytes) {
     uint64_t header = 0;
     memcpy(&header, bytes, sizeof header);
     assert_int_equal(header % 8, 0);
-    assert_memory_equal(bytes + 8 + header, two, sizeof two); /* doubles come first */
+    assert_memory_equal(bytes + 8 + header, two, sizeof two); /* doubles are stored first */
     free(bytes);
   }
   (void)remove(path);
@@ -154,7 +154,7 @@ TEST(test_write_refused_or_failing_leaves_no_file) {
   (void)snprintf(path, sizeof path, "%s/a", folder);
   assert_int_equal(supine_writer_safetensors_write(path, twice, 2, NULL, 0, NULL),
                    SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(rmdir(folder), 0); /* nothing is left in it */
+  assert_int_equal(rmdir(folder), 0); /* fails if a file is left in it */
   free(folder);
 }
 
@@ -222,7 +222,7 @@ TEST(test_open_bad_headers_refused) {
       {"{\"a\":{}}", 0},
       {"{\"a\"}", 0},
       {"{a:{}}", 0},
-      /* Sizes that overflow 64 bits, in one number and in a product. */
+      /* Sizes that overflow 64 bits, as a number and as a product. */
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[18446744073709551618],\"data_offsets\":[0,2]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,18446744073709551618]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[4294967296,4294967296],\"data_offsets\":[0,0]}}", 0},
@@ -233,7 +233,7 @@ TEST(test_open_bad_headers_refused) {
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[18446744073709551613,"
        "18446744073709551615]}}",
        2},
-      /* Strings. */
+      /* Names and metadata strings. */
       {"{\"__metadata__\":{\"k\":1}}", 0},
       {"{\"__metadata__\":{\"k\":\"v\",}}", 0},
       {"{\"__metadata__\":{\"k\":\"v\",\"k\":\"w\"}}", 0},
@@ -324,8 +324,8 @@ TEST(test_open_memory_any_alignment_same_content) {
   fixture_folder_remove(folder);
 }
 
-TEST(test_checksum_any_bit_or_order_noticed) {
-  /* Sizes around the block of 64 bytes; every bit of each. */
+TEST(test_checksum_any_changed_bit_or_order_differs) {
+  /* Sizes around one block of 64 bytes; each bit is changed. */
   for (size_t size = 1; size <= 200; size += size < 130 ? 43 : 7) {
     unsigned char data[256] = {0};
     uint64_t random = size;
@@ -358,7 +358,7 @@ TEST(test_checksum_any_bit_or_order_noticed) {
               supine_safetensors_checksum(&flat, 1, pairs, 1));
 }
 
-/* Pins the format: a change of either hash would refuse every file that exists. */
+/* Fixed values: changing either hash would invalidate all existing files. */
 TEST(test_checksum_sample_literal) {
   const supine_tensor tensor = {"four", SUPINE_F32, 2, {2, 2}, four};
   const supine_metadata pair = {"key", "value"};

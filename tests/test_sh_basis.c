@@ -75,7 +75,7 @@ TEST(test_evaluate_to_band_4_matches_closed_forms) {
   }
 }
 
-/* Largest departure of the Gram matrix under the rule from the identity. */
+/* Return the largest deviation of the Gram matrix under the quadrature rule from the identity. */
 static double gram_error(size_t band) {
   const size_t count = supine_sh_count(band);
   supine_sh_grid *grid = NULL;
@@ -119,8 +119,8 @@ TEST(test_evaluate_under_rule_orthonormal) {
   }
 }
 
-/* Band 64 in full is 7e10 products, but longitude separates the orders: the sum over a ring is
- * exact for longitudes > 2 band, so one order against itself, by latitudes alone, is the rest. */
+/* The full test at band 64 needs 7e10 products. Sums over a ring are exact for longitudes > 2 band
+ * and separate the orders, so it suffices to integrate each order over latitude. */
 TEST(test_evaluate_band_64_orthonormal_in_latitude) {
   const size_t band = SUPINE_SH_BAND_MAX;
   supine_sh_grid *grid = NULL;
@@ -195,8 +195,8 @@ TEST(test_evaluate_poles_only_zonal) {
   }
 }
 
-/* Y(l, 1) near the pole is sqrt((2 l + 1) l (l + 1) / (8 pi)) x: the slope must survive where
- * 1 - z^2 has lost every digit. */
+/* Y(l, 1) near the pole is sqrt((2 l + 1) l (l + 1) / (8 pi)) x: it must be accurate where 1 - z^2
+ * has lost all digits. */
 TEST(test_evaluate_near_pole_keeps_relative_accuracy) {
   static double y[COUNT_MAX];
   const double x = 1.2345e-11;

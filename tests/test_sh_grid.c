@@ -24,7 +24,7 @@ TEST(test_grid_five_latitudes_match_table) {
   supine_sh_grid_destroy(grid);
 }
 
-/* n nodes integrate z^p exactly for p < 2 n. Tables are kept for some n, others are computed. */
+/* n nodes integrate z^p exactly for p < 2 n. GSL has tables for some n and computes others. */
 TEST(test_grid_any_size_integrates_powers) {
   static const size_t sizes[] = {1, 2, 7, 16, 17, 20, 21, 31, 33, 63, 65, 127, 130};
   for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* States as text: every form is read, printed and read back; everything else is refused in words.
- */
+/* States as text: every form is parsed, printed and parsed again; anything else is refused with a
+ * message. */
 #include "test.h"
 
 #include <supine/state.h>
@@ -70,7 +70,7 @@ TEST(test_state_parse_volumes_by_lung_keeps_each_name) {
   assert_string_equal(text, "right side, left lung at rest + 100 mL, right lung at 2600 mL");
 }
 
-TEST(test_state_parse_bare_number_names_what_it_could_mean) {
+TEST(test_state_parse_bare_number_lists_meanings) {
   static const char *const numbers[] = {"500", "+500", "supine:500", "left=500,right=rest"};
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     supine_state parsed = unset;
@@ -82,7 +82,7 @@ TEST(test_state_parse_bare_number_names_what_it_could_mean) {
   }
 }
 
-TEST(test_state_parse_malformed_text_is_refused_and_changes_nothing) {
+TEST(test_state_parse_malformed_text_refused_state_unchanged) {
   static const char *const texts[] = {
       "",
       "sup",
@@ -120,7 +120,7 @@ TEST(test_state_parse_malformed_text_is_refused_and_changes_nothing) {
   }
 }
 
-TEST(test_state_print_short_buffer_is_cut_and_length_whole) {
+TEST(test_state_print_short_buffer_cut_full_length_returned) {
   supine_state parsed = unset;
   char text[8] = "xxxxxxx";
   assert_int_equal(supine_state_parse("left:rest+500", &parsed, NULL), SUPINE_OK);

@@ -7,7 +7,7 @@ static void write_large(const void *context, const char *name, FILE *file) {
   (void)fprintf(file, "[%s %s]", (const char *)context, name);
 }
 
-/* What a template makes of data, the other assets being fixed. */
+/* Expand a template with data; the other assets are fixed. */
 static void check(const char *text, const char *json, const char *expected) {
   const supine_asset assets[] = {{"main.html", text, strlen(text)},
                                  {"part.html", "<i>{{title}}</i>", 16},
@@ -27,29 +27,29 @@ static void check(const char *text, const char *json, const char *expected) {
   json_decref(data);
 }
 
-TEST(test_names_are_escaped_text) {
+TEST(test_template_names_escaped) {
   check("x {{title}} y", "{\"title\": \"<b a=\\\"1\\\">&'\"}",
         "x &lt;b a=&quot;1&quot;&gt;&amp;' y");
   check("{{n}} {{r}}", "{\"n\": -12, \"r\": 0.1}", "-12 0.1");
   check("é {{title}}", "{\"title\": \"ü\"}", "é ü");
 }
 
-TEST(test_other_files_are_put_in) {
+TEST(test_template_included_files_inserted) {
   check("{{part.html}}{{style.css}}", "{\"title\": \"&\"}", "<i>&amp;</i>a{{title}}");
 }
 
-TEST(test_what_is_no_data_is_asked_for) {
+TEST(test_template_unknown_name_asks_caller) {
   check("a{{tensors}}b", "{}", "a[large tensors]b");
 }
 
-TEST(test_sections_repeat_and_nest) {
+TEST(test_template_sections_repeat_and_nest) {
   check("{{#rows}}\n<r>{{name}}:{{#cells}}{{.}}{{unit}},{{/cells}}</r>\n{{/rows}}\nend",
         "{\"unit\": \"mm\", \"rows\": [{\"name\": \"a\", \"cells\": [1, 2]},"
         "{\"name\": \"b\", \"cells\": []}]}",
         "<r>a:1mm,2mm,</r>\n<r>b:</r>\nend");
 }
 
-TEST(test_sections_ask_whether_there_is_something) {
+TEST(test_template_sections_of_empty_value_skipped) {
   static const char text[] = "{{#a}}yes{{b}}{{/a}}.";
   check(text, "{\"a\": {\"b\": 3}}", "yes3.");
   check(text, "{\"a\": true, \"b\": 4}", "yes4.");
@@ -61,13 +61,13 @@ TEST(test_sections_ask_whether_there_is_something) {
   check(text, "{}", ".");
 }
 
-TEST(test_inner_names_come_first) {
+TEST(test_template_inner_names_hide_outer) {
   check("{{#a}}{{x}}{{#a}}{{x}}{{/a}}{{/a}}{{x}}",
         "{\"x\": 1, \"a\": {\"x\": 2, \"a\": {\"x\": 3}}}", "231");
 }
 
-/* What is left open goes to the end; nothing is read beyond it. */
-TEST(test_unclosed_tags_end_with_the_text) {
+/* An unclosed section extends to the end; nothing is read beyond it. */
+TEST(test_template_unclosed_tags_end_with_text) {
   check("{{#a}}x{{b}}", "{\"a\": [{\"b\": 1}, {\"b\": 2}]}", "x1x2");
   check("x{{a", "{\"a\": 1}", "x{{a");
   check("x{{/a}}y", "{\"a\": 1}", "xy");

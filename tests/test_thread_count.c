@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A basis file is the same, byte for byte, whatever the number of threads. */
+/* A basis file has the same bytes for any number of threads. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
 #include "test.h"
 
-enum { VERTICES = 9000 }; /* several blocks of every sum, the last of them short */
+enum { VERTICES = 9000 }; /* several blocks of each sum, with a short last block */
 
 static supine_lungs phantom(void) {
   supine_mesh mesh = {0};
@@ -15,7 +15,7 @@ static supine_lungs phantom(void) {
   return lungs;
 }
 
-/* The bytes of a basis made in so many threads. */
+/* Return the bytes of a basis computed with `threads` threads. */
 static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precompute_options *options,
                                const char *threads, size_t *size) {
   char path[] = "/tmp/supine-threads-XXXXXX";

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The tissue options of solve and precompute: what they accept, refuse, warn of and write. */
+/* Tissue options of solve and precompute: accepted and refused values, warnings and output. */
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "test.h"
@@ -11,7 +11,7 @@
 
 static char folder[] = "/tmp/supine-tissue-XXXXXX";
 static char lungs[64], csv[64], out[64], other[64];
-static char text[16384]; /* what the command said on stderr */
+static char text[16384]; /* stderr of the command */
 
 static int setup(void **state) {
   (void)state;
@@ -78,19 +78,19 @@ TEST(test_solve_lesion_factor_one_writes_the_same_bytes) {
   (void)unlink(ply);
 }
 
-TEST(test_solve_lesion_outside_is_warned) {
+TEST(test_solve_lesion_outside_warns) {
   assert_int_equal(solve("--lesion", "900,0,0,30,4", out), SUPINE_EXIT_OK);
   assert_non_null(strstr(text, "warning: the lesion at 900,0,0 is "));
   assert_non_null(strstr(text, "mm from the nearest vertex"));
 }
 
-TEST(test_solve_lesion_deep_inside_says_why_it_changes_nothing) {
+TEST(test_solve_lesion_deep_inside_explains_no_change) {
   assert_int_equal(solve("--lesion", "56,-111,-79,5,4", out), SUPINE_EXIT_OK);
   assert_non_null(strstr(text, "the lesion at 56,-111,-79 is"));
   assert_non_null(strstr(text, "with a radius of 5 mm it changes nothing"));
 }
 
-TEST(test_solve_bad_tissue_options_are_usage_errors) {
+TEST(test_solve_bad_tissue_options_usage_error) {
   static const char *const bad[][2] = {{"--lesion", "1,2,3,4"},
                                        {"--lesion", "1,2,3,0,4"},
                                        {"--lesion", "1,2,3,4,0"},
@@ -118,7 +118,7 @@ TEST(test_solve_bad_tissue_options_are_usage_errors) {
   }
 }
 
-TEST(test_solve_bad_expandability_file_names_vertex) {
+TEST(test_solve_bad_expandability_file_message_names_vertex) {
   test_write(csv, "expandability\n1\n1\n-3\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
   assert_non_null(strstr(text, "a.csv:4: expandability -3 of vertex 2 is not positive"));
@@ -128,7 +128,7 @@ TEST(test_solve_bad_expandability_file_names_vertex) {
   assert_int_equal(solve("--expandability", "/nowhere/a.csv", out), SUPINE_EXIT_INPUT);
 }
 
-/* A file that holds the same values as the built-in model makes the same lungs. */
+/* A file with the values of the built-in model gives the same lungs. */
 TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   char ply[80];
   (void)snprintf(ply, sizeof ply, "%s.ply", other);
@@ -148,9 +148,10 @@ TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   (void)unlink(ply);
 }
 
-/* The basis of a collapsed lung: volumes exact by lung and in all, by measuring its surfaces. */
-TEST(test_precompute_collapsed_lung_breathes_its_share_exactly) {
-  double volumes[2][2]; /* healthy and ill, by lung, at one scale */
+/* The basis of a collapsed lung: volumes measured on surfaces are exact for each lung and in total.
+ */
+TEST(test_precompute_collapsed_lung_volumes_exact) {
+  double volumes[2][2]; /* [healthy or collapsed][lung] at one scale, mL */
   double rests[2][2];
   supine_basis *healthy = NULL;
   static const char *const shares[] = {"left:1", "left:0.3"};
@@ -209,7 +210,7 @@ TEST(test_precompute_collapsed_lung_breathes_its_share_exactly) {
     free(xyz);
     if (ill == 0) {
       healthy = basis;
-    } else { /* 0.3 of what it took at this scale when it was healthy */
+    } else { /* 0.3 of its healthy volume change at this scale */
       const double was = posed_lung_volume(healthy, 0, weights, scales[0]);
       assert_true(fabs(volumes[1][0] - 0.3 * was) < 1e-4);
       supine_basis_close(basis);
@@ -218,11 +219,11 @@ TEST(test_precompute_collapsed_lung_breathes_its_share_exactly) {
   supine_basis_close(healthy);
   assert_true(fabs(rests[1][0] - 0.3 * rests[0][0]) < 0.05);
   assert_true(fabs(rests[1][1] - rests[0][1]) < 0.05);
-  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the healthy lung takes what is left */
+  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the healthy lung takes the rest */
   assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
 }
 
-TEST(test_lung_that_is_not_there_is_refused) {
+TEST(test_solve_missing_lung_refused) {
   supine_mesh mesh = {0};
   supine_mesh left = {0};
   char one[80];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Meshes and stiffnesses that no lung has: the solve answers with its residual. */
+/* Meshes and stiffnesses far from those of lungs: the solver reaches the required residual. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "test.h"
@@ -12,8 +12,8 @@ static supine_mesh phantom(void) {
   return mesh;
 }
 
-/* Solves with and without a reach: finite, the residual as asked, and without a reach positive, as
- * sums over paths are. */
+/* Solve with and without a reach: finite results, with the required residual, and positive without
+ * a reach, as they are sums over paths. */
 static void check(const char *what, supine_mesh *mesh, const double *stiffness) {
   static const double g[3] = {0.48, 0.64, -0.6};
   supine_lungs lungs = {0};
@@ -42,8 +42,8 @@ static void check(const char *what, supine_mesh *mesh, const double *stiffness) 
   supine_mesh_free(mesh);
 }
 
-/* Every third vertex moved onto a neighbour, but for a thousandth of the link. */
-TEST(test_slivers) {
+/* Move every third vertex to a thousandth of its link from a neighbour. */
+TEST(test_solve_slivers_reaches_residual) {
   supine_mesh mesh = phantom();
   for (size_t t = 0; t < mesh.triangle_count; t += 7) {
     double *a = mesh.vertices + 3 * (size_t)mesh.triangles[3 * t];
@@ -55,7 +55,7 @@ TEST(test_slivers) {
   check("slivers", &mesh, NULL);
 }
 
-TEST(test_duplicate_faces) {
+TEST(test_solve_duplicate_faces_reaches_residual) {
   supine_mesh mesh = phantom();
   const size_t count = mesh.triangle_count;
   mesh.triangles = realloc(mesh.triangles, 6 * count * sizeof *mesh.triangles);
@@ -64,7 +64,7 @@ TEST(test_duplicate_faces) {
   check("every face twice", &mesh, NULL);
 }
 
-TEST(test_ten_thousand_components) {
+TEST(test_solve_ten_thousand_components_reaches_residual) {
   enum { COUNT = 10000 };
   static const uint32_t faces[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2};
   supine_mesh mesh = {.vertex_count = 4 * COUNT, .triangle_count = 4 * COUNT};
@@ -86,7 +86,7 @@ TEST(test_ten_thousand_components) {
   check("10,000 components", &mesh, NULL);
 }
 
-TEST(test_flat_mesh) {
+TEST(test_solve_flat_mesh_reaches_residual) {
   supine_mesh mesh = phantom();
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     mesh.vertices[3 * i + 1] *= 1e-6;
@@ -94,7 +94,7 @@ TEST(test_flat_mesh) {
   check("flat to a ten-thousandth of a millimetre", &mesh, NULL);
 }
 
-TEST(test_far_off_origin) {
+TEST(test_solve_far_from_origin_reaches_residual) {
   supine_mesh mesh = phantom();
   for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
     mesh.vertices[i] += 1e7;
@@ -102,7 +102,7 @@ TEST(test_far_off_origin) {
   check("1e7 mm off", &mesh, NULL);
 }
 
-TEST(test_stiffness_over_six_decades) {
+TEST(test_solve_stiffness_over_six_decades_reaches_residual) {
   supine_mesh mesh = phantom();
   uint64_t seed = 66;
   double *stiffness = calloc(mesh.vertex_count, sizeof *stiffness);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The transform: round trips, agreement with quadrature, refusals. */
+/* The transform: round trips, comparison with quadrature, refused arguments. */
 #include <float.h>
 
 #include "sh/transform.h"
@@ -52,12 +52,12 @@ static double largest_difference(const double *a, const double *b, size_t count)
   double worst = 0;
   for (size_t i = 0; i < count; ++i) {
     const double off = fabs(a[i] - b[i]);
-    worst = off <= worst ? worst : off; /* a NaN stays */
+    worst = off <= worst ? worst : off; /* keeps NaN */
   }
   return worst;
 }
 
-/* Values on the grid of fields of known coefficients [fields, count], harmonic by harmonic. */
+/* Compute grid values of fields with known coefficients [fields, count], harmonic by harmonic. */
 static void sum_harmonics(const setup *s, size_t fields, const double *coefficients,
                           double *values) {
   double *y = make(s->count, 0);
@@ -123,7 +123,7 @@ TEST(test_forward_highest_band_one_harmonic_is_one_coefficient) {
   tear_down(&s);
 }
 
-/* Values of no band at all: the transform is then still the same sums as plain quadrature. */
+/* Values without a band limit: the transform still equals plain quadrature. */
 TEST(test_forward_any_values_equal_direct_quadrature) {
   enum { FIELDS = 5 };
   setup s = set_up(6, 9, 20);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* [Santhanam2008] III-C and IV-B on a real lung: displacement against volume, ventilation against
- * height, and what the mesh's resolution does. */
+/* [Santhanam2008] III-C and IV-B on a real lung: displacement by volume, ventilation by height, and
+ * the effect of mesh resolution. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -18,9 +18,9 @@ static bool load(const char *left, const char *right, supine_lungs *lungs) {
   return helper_real_lungs(names, 2, SUPINE_AXES_AUTO, lungs);
 }
 
-/* III-C: at one orientation every vertex moves along one line, nearly in proportion to the volume:
- * by the run-time library on a basis file. */
-TEST(test_displacement_is_linear_in_volume_along_one_direction) {
+/* III-C: in one orientation every vertex moves along a line, nearly in proportion to the volume; by
+ * the run-time library on a basis file. */
+TEST(test_deform_one_orientation_linear_in_volume) {
   char path[] = "/tmp/supine-validation-XXXXXX";
   supine_lungs lungs = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &lungs)) {
@@ -64,7 +64,7 @@ TEST(test_displacement_is_linear_in_volume_along_one_direction) {
           square[0] += a * a;
           square[1] += b * b;
         }
-        if (square[1] > 0.25) { /* 0.5 mm: enough to have a direction in single precision */
+        if (square[1] > 0.25) { /* at least 0.5 mm, to define a direction in single precision */
           turn = fmax(turn, 1.0 - dot / sqrt(square[0] * square[1]));
         }
       }
@@ -84,7 +84,7 @@ TEST(test_displacement_is_linear_in_volume_along_one_direction) {
 
 /* Kaneko et al., J. Appl. Physiol. 21, 1966, 767-777: in supine, prone and both lateral postures
  * ventilation rises from the uppermost to the lowermost zone, with much the same gradient. */
-TEST(test_ventilation_dependent_zones_ventilate_more_in_all_postures) {
+TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
   supine_lungs lungs = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &lungs)) {
     skip();
@@ -112,8 +112,8 @@ TEST(test_ventilation_dependent_zones_ventilate_more_in_all_postures) {
   supine_lungs_free(&lungs);
 }
 
-/* The same lungs at 5k and 20k vertices each: a reach takes most of the drift away. */
-TEST(test_resolution_reach_shrinks_the_drift) {
+/* The same lungs at 5k and 20k vertices each: a reach removes most of the difference. */
+TEST(test_solve_reach_less_change_with_resolution) {
   supine_lungs coarse = {0};
   supine_lungs fine = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &coarse) ||

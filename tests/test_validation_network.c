@@ -5,7 +5,7 @@
 #include "validation.h"
 
 /* Fig. 8 */
-TEST(test_plane_equals_mass_spring_damper_at_rest) {
+TEST(test_solve_plane_equals_mass_spring_damper) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
   double *force = plane_force(&f);
@@ -19,13 +19,13 @@ TEST(test_plane_equals_mass_spring_damper_at_rest) {
   printf("sheet of %zu masses: %.2e %% RMS difference to a mass-spring-damper system at rest\n", n,
          100.0 * difference);
   assert_true(difference < 1e-3);
-  assert_true(difference < 1e-6); /* nothing but the integration's error is left */
+  assert_true(difference < 1e-6); /* only the integration error is left */
   double middle = 0.0;
   double corner = ours[0];
   for (size_t i = 0; i < n; ++i) {
     middle = fmax(middle, ours[i]);
   }
-  assert_true(middle > 5.0 * corner); /* no trivial field */
+  assert_true(middle > 5.0 * corner); /* not a trivial field */
   damper_free(&system);
   frame_free(&f);
   free(force);
@@ -34,8 +34,8 @@ TEST(test_plane_equals_mass_spring_damper_at_rest) {
   free(theirs);
 }
 
-/* The same with stiffness that varies fourfold, over links of all lengths. */
-TEST(test_plane_irregular_equals_mass_spring_damper_at_rest) {
+/* With stiffness that varies fourfold, over links of all lengths. */
+TEST(test_solve_irregular_plane_equals_mass_spring_damper) {
   frame f = frame_plane(15, 7.0);
   const size_t n = f.mesh.vertex_count;
   double *stiffness = calloc(n, sizeof *stiffness);
@@ -63,7 +63,7 @@ TEST(test_plane_irregular_equals_mass_spring_damper_at_rest) {
 }
 
 /* Fig. 9 */
-TEST(test_ring_uniform_stays_a_circle) {
+TEST(test_solve_uniform_ring_stays_circle) {
   enum { COUNT = 60 };
   frame f = frame_ring(COUNT, 50.0);
   double *force = ones(COUNT);
@@ -86,7 +86,7 @@ TEST(test_ring_uniform_stays_a_circle) {
   frame_free(&f);
 }
 
-TEST(test_ring_mixed_moves_less_where_it_is_stiff) {
+TEST(test_solve_mixed_ring_stiff_part_moves_less) {
   enum { COUNT = 60 };
   static const double factors[] = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0};
   frame f = frame_ring(COUNT, 50.0);
@@ -118,8 +118,8 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Fig. 7: to 1e-6 of the converged solution, in visits of a link from one side. */
-TEST(test_pitcher_catcher_convergence_beats_mass_spring_damper) {
+/* Fig. 7: work to reach 1e-6 of the converged solution, in visits of a link from one end. */
+TEST(test_pitcher_catcher_converges_before_mass_spring_damper) {
   frame f = frame_plane(15, 10.0);
   const size_t n = f.mesh.vertex_count;
   double *force = plane_force(&f);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volumes by their forms against volumes of the surface, and the scale that gives a volume. */
+/* Volumes by their forms against volumes of the surface, and the scale for a given volume. */
 #include <float.h>
 
 #include "test.h"
@@ -91,7 +91,8 @@ TEST(test_scale_random_volumes_reached) {
   fixture_destroy(f);
 }
 
-/* A basis whose cubic is a s + b s^2 + c s^3 exactly: one mode, one constant harmonic, weight 1. */
+/* Make a basis whose volume is exactly a s + b s^2 + c s^3: one mode, one constant harmonic, weight
+ * 1. */
 static supine_basis *open_cubic(double a, double b, double c, unsigned char **bytes) {
   fixture *f = fixture_create(5, 1, 0, 1, false, true, 1, 3);
   f->mode[0] = 1 / 0.28209479177387814;
@@ -105,13 +106,13 @@ static supine_basis *open_cubic(double a, double b, double c, unsigned char **by
 
 TEST(test_scale_cubics_branch_of_rest_only) {
   static const struct {
-    double a, b, c, volume, scale; /* scale NAN: out of reach */
+    double a, b, c, volume, scale; /* scale NAN: not reachable */
   } cases[] = {
       {2, 0, 0, 10, 5},           /* linear */
       {2, 0, 0, -10, -5},         /**/
       {-2, 0, 0, 10, -5},         /* the field shrinks the lung */
       {0, 0, 0, 1, NAN},          /* nothing moves */
-      {0, 0, 1, 8, NAN},          /* no slope to begin with */
+      {0, 0, 1, 8, NAN},          /* zero slope at s = 0 */
       {0, 0, 0, 0, 0},            /**/
       {2, 1, 0, 8, 2},            /* 2 s + s^2 = 8: s = 2, not -4 */
       {2, 1, 0, -0.75, -0.5},     /* turns back at s = -1, V = -1 */
@@ -124,7 +125,7 @@ TEST(test_scale_cubics_branch_of_rest_only) {
       {3, 0, -1, 1.375, 0.5},     /**/
       {6, -4.5, 1, 2.5, 1},       /* turns at s = 1 (2.5) and at s = 2 */
       {6, -4.5, 1, 2.6, NAN},     /* reached again only beyond both turns */
-      {1e-300, 0, 0, 1e300, NAN}, /* beyond every number */
+      {1e-300, 0, 0, 1e300, NAN}, /* overflows */
       {1e-3, 0, 0, 1e3, 1e6},     /**/
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -143,7 +144,7 @@ TEST(test_scale_cubics_branch_of_rest_only) {
       assert_true(strlen(error.message) > 0);
     } else {
       assert_int_equal(status, SUPINE_OK);
-      /* Where the slope vanishes the root is known to the square root of epsilon alone. */
+      /* If the slope vanishes, the root is known only to the square root of epsilon. */
       assert_true(fabs(scale - cases[i].scale) <= 4e-8 * fabs(cases[i].scale));
     }
     supine_basis_close(basis);
@@ -164,7 +165,7 @@ TEST(test_scale_not_finite_volume_refused) {
   free(bytes);
 }
 
-TEST(test_pose_open_surface_says_so) {
+TEST(test_pose_open_surface_refused) {
   fixture *f = fixture_create(9, 3, 1, 1, false, false, 9, 5);
   unsigned char *bytes = NULL;
   supine_basis *basis = open_bytes(f, &bytes);
@@ -178,8 +179,8 @@ TEST(test_pose_open_surface_says_so) {
   fixture_destroy(f);
 }
 
-/* A lung whose volume is a product of its axes' lengths, of 3000 mL when full: at gains of -1 each
- * axis is a fifth to a third shorter. */
+/* Make a lung whose volume is the product of the lengths of its axes, 3000 mL at full inflation: at
+ * gains of -1 the axes are shorter by a fifth to a third. */
 static const supine_volume_form box_form = {{3000 * 0.2, 3000 * 0.25, 3000 * 0.3, 3000 * 0.25 * 0.3,
                                              3000 * 0.2 * 0.3, 3000 * 0.2 * 0.25,
                                              3000 * 0.2 * 0.25 * 0.3}};
@@ -189,7 +190,7 @@ static double box_volume(const double *gains) {
   return 3000 * ((1 + 0.2 * gains[0]) * (1 + 0.25 * gains[1]) * (1 + 0.3 * gains[2]) - 1);
 }
 
-TEST(test_volume_form_gains_every_volume_met_on_the_path) {
+TEST(test_volume_form_gains_any_volume_reached_on_path) {
   const double rest = box_volume((double[]){-1, -1, -1});
   double last[3] = {1, 1, 1};
   for (double part = -0.3; part < 1.5; part += 0.1) {
@@ -197,7 +198,8 @@ TEST(test_volume_form_gains_every_volume_met_on_the_path) {
     assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, part * rest, gains, NULL),
                      SUPINE_OK);
     assert_true(fabs(box_volume(gains) - part * rest) <= 1e-9);
-    /* y less z, both less x, is bend times the same: what the axes share is on one path. */
+    /* The differences between axes are those of the bend times a common factor: all poses are on
+     * one path. */
     assert_true(fabs(gains[1] + gains[2] - 2 * gains[0]) <= 1e-12);
     for (size_t axis = 0; axis < 3; ++axis) {
       assert_true(gains[axis] < last[axis]);
@@ -216,8 +218,8 @@ TEST(test_volume_form_gains_at_rest_equal_on_all_axes) {
   }
 }
 
-/* Slopes along the path as published for it: rest 1, 0.1, 1.9; full 1, 1.45, 0.55. */
-TEST(test_volume_bend_slopes_as_stated) {
+/* Slopes of the path: 1, 0.1, 1.9 at rest; 1, 1.45, 0.55 at full inflation. */
+TEST(test_volume_bend_path_has_stated_slopes) {
   static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
   for (size_t end = 0; end < 2; ++end) {
     for (int side = -1; side <= 1; side += 2) { /* value and slope are continuous at rest */
@@ -233,8 +235,8 @@ TEST(test_volume_bend_slopes_as_stated) {
   }
 }
 
-/* Full inflation and beyond, between full and rest, below rest. */
-TEST(test_volume_bend_values_as_stated) {
+/* Full inflation and beyond, between full inflation and rest, and below rest. */
+TEST(test_volume_bend_path_has_stated_values) {
   static const double at[][3] = {
       {-0.2, -0.2864, -0.1136}, {0.4, 0.5512, 0.2488}, {1.3, 1.244062423021089, 1.355937576978911}};
   for (size_t i = 0; i < 3; ++i) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The validations of [Santhanam2008] IV, as tests and the benchmark share them. */
+/* Validations of [Santhanam2008] IV, shared by tests and bench_validation. */
 #ifndef SUPINE_VALIDATION_H
 #define SUPINE_VALIDATION_H
 
@@ -18,7 +18,7 @@
 #include "precompute/precompute.h"
 #include <supine/volume.h>
 
-/* Masses and the links between them; no surface need be there. */
+/* Masses and links; triangles are optional. */
 typedef struct frame {
   supine_mesh mesh;
   supine_topology topology;
@@ -29,8 +29,8 @@ static inline void frame_free(frame *f) {
   supine_mesh_topology_free(&f->topology);
 }
 
-/* A flat sheet of side x side masses, `spacing` mm apart, links along rows, columns and one
- * diagonal. */
+/* Make a flat sheet of side x side masses, `spacing` mm apart, with links along rows, columns and
+ * one diagonal. */
 static inline frame frame_plane(size_t side, double spacing) {
   frame f = {.mesh = {.vertex_count = side * side, .triangle_count = 2 * (side - 1) * (side - 1)}};
   f.mesh.vertices = calloc(3 * f.mesh.vertex_count, sizeof *f.mesh.vertices);
@@ -54,7 +54,7 @@ static inline frame frame_plane(size_t side, double spacing) {
   return f;
 }
 
-/* A ring of masses, evenly spaced, of the given radius in mm. */
+/* Make a ring of evenly spaced masses with the given radius, mm. */
 static inline frame frame_ring(size_t count, double radius) {
   frame f = {.mesh = {.vertex_count = count}, .topology = {.edge_count = count}};
   f.mesh.vertices = calloc(3 * count, sizeof *f.mesh.vertices);
@@ -89,11 +89,9 @@ static inline supine_status frame_solve(const frame *f, const double *stiffness,
   return status;
 }
 
-/* Masses of 1 between springs and dampers, each held to the ground by a spring of its own:
+/* Unit masses between springs and dampers, each tied to the ground by a spring:
  *
- *     y_i'' = p_i - ground_i y_i - sum over links of k_ij (y_i - y_j) - damping y_i'
- *
- * This is all that the integration knows. */
+ *     y_i'' = p_i - ground_i y_i - sum over links of k_ij (y_i - y_j) - damping y_i' */
 typedef struct mass_spring_damper {
   size_t count;
   size_t links;
@@ -102,11 +100,11 @@ typedef struct mass_spring_damper {
   double *ground;       /* [count] */
   double *push;         /* [count] p */
   double damping;
-  size_t evaluations; /* of the right-hand side so far */
+  size_t evaluations; /* number of evaluations of the right-hand side so far */
 } mass_spring_damper;
 
-/* Spring constants of the equilibrium of equilibrium.h, from its formulas, for stiffness E of
- * geometric mean 1: k_ij is there; what the diagonal has beyond the sum of k_ij is the ground's. */
+/* Compute the spring constants of equilibrium.h from its formulas, for stiffness E of geometric
+ * mean 1: links have k_ij, and the ground has the excess of the diagonal over the sum of k_ij. */
 static inline mass_spring_damper damper_create(const frame *f, const double *stiffness,
                                                const double *force) {
   const size_t n = f->mesh.vertex_count;
@@ -162,8 +160,8 @@ static inline int damper_slope(double time, const double *state, double *slope, 
   return GSL_SUCCESS;
 }
 
-/* Integrates from rest; calls `seen` (optional) at `marks` even times to the end. F = y / E comes
- * out in catch_. False where GSL gave up. */
+/* Integrate from rest; call `seen` (optional) at `marks` evenly spaced times. Set catch_ to F = y /
+ * E. Return false if GSL fails. */
 static inline bool damper_integrate(mass_spring_damper *system, const double *stiffness,
                                     double seconds, size_t marks, double *catch_,
                                     void (*seen)(void *context, size_t evaluations,
@@ -193,7 +191,7 @@ static inline bool damper_integrate(mass_spring_damper *system, const double *st
   return good;
 }
 
-/* Root mean square of a - b over that of b. */
+/* Return the RMS of a - b relative to that of b. */
 static inline double relative_rms(size_t count, const double *a, const double *b) {
   double difference = 0.0;
   double norm = 0.0;
@@ -204,7 +202,7 @@ static inline double relative_rms(size_t count, const double *a, const double *b
   return sqrt(difference / norm);
 }
 
-/* A push on the middle of the sheet, wide as a fifth of it, on top of a slope. */
+/* Return a force: a peak in the middle of the sheet, a fifth of it wide, plus a slope. */
 static inline double *plane_force(const frame *f) {
   const size_t n = f->mesh.vertex_count;
   const double *last = f->mesh.vertices + 3 * (n - 1);
@@ -226,7 +224,7 @@ static inline double *ones(size_t count) {
   return values;
 }
 
-/* Scales to geometric mean 1. */
+/* Scale to geometric mean 1. */
 static inline void normalise_stiffness(size_t count, double *stiffness) {
   double sum = 0.0;
   for (size_t i = 0; i < count; ++i) {
@@ -237,7 +235,7 @@ static inline void normalise_stiffness(size_t count, double *stiffness) {
   }
 }
 
-/* A ring whose middle third has `factor` times the stiffness of the rest. */
+/* Return the stiffness of a ring whose middle third is `factor` times as stiff. */
 static inline double *ring_stiffness(size_t count, double factor) {
   double *stiffness = calloc(count, sizeof *stiffness);
   for (size_t i = 0; i < count; ++i) {
@@ -246,19 +244,18 @@ static inline double *ring_stiffness(size_t count, double factor) {
   return stiffness;
 }
 
-/* What zones along gravity do in a breath: ten slabs of equal height, 0 uppermost. */
+/* Ventilation of ten slabs of equal height along gravity; 0 is uppermost. */
 enum { ZONES = 10 };
 
 typedef struct ventilation {
-  double
-      index[ZONES]; /* displacement there against what the direction law alone would give, mean 1 */
-  double swept[ZONES]; /* share of the breath that the zone's surface sweeps, against its share of
-                          the surface */
-  double slope;        /* of the index over the height, 0 to 1, least squares */
+  double index[ZONES]; /* displacement relative to that of the direction law alone, mean 1 */
+  double swept[ZONES]; /* share of the breath swept by the zone's surface, relative to its share of
+                          the area */
+  double slope;        /* least-squares slope of the index over the height, 0 to 1 */
   double height;       /* mm from the uppermost to the lowermost point */
 } ventilation;
 
-/* Lungs that breathe `volume` mL with gravity along g. */
+/* Measure a breath of `volume` mL with gravity along g. */
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
@@ -295,7 +292,7 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
     caught[zone] += area[i] * solution.catch_[i];
   }
   for (size_t t = 0; t < lungs->mesh.triangle_count;
-       ++t) { /* volume swept, by mean of both areas */
+       ++t) { /* volume swept, by the mean of both areas */
     const uint32_t *c = lungs->mesh.triangles + 3 * t;
     double middle[3] = {0.0, 0.0, 0.0};
     double move[3] = {0.0, 0.0, 0.0};
@@ -351,7 +348,7 @@ cleanup:
   return status;
 }
 
-/* Nearest vertices, by a grid of cells `size` mm wide. */
+/* Search for nearest vertices by a grid of cells of `size` mm. */
 typedef struct nearest_grid {
   double low[3], size;
   size_t cells[3];
@@ -399,7 +396,7 @@ static inline void nearest_free(nearest_grid *grid) {
   free(grid->order);
 }
 
-/* The nearest vertex within `size` mm or a little more; SIZE_MAX where there is none. */
+/* Return the nearest vertex within about `size` mm; SIZE_MAX if there is none. */
 static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   long cell[3];
   size_t found = SIZE_MAX;
@@ -428,7 +425,7 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   return found;
 }
 
-/* Displacements of a breath [N, 3], mm. */
+/* Compute the displacements of a breath [N, 3], mm. */
 static inline supine_status breathe_at(const supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -446,7 +443,7 @@ static inline supine_status breathe_at(const supine_lungs *lungs, double reach, 
   return status;
 }
 
-/* Root mean square distance, by area, from a vertex over which a unit force on it spreads, mm. */
+/* Return the area-weighted RMS distance from a vertex over which a unit force on it spreads, mm. */
 static inline supine_status spread_of(const supine_lungs *lungs, double reach, size_t vertex,
                                       double *spread) {
   const size_t n = lungs->mesh.vertex_count;
@@ -479,8 +476,8 @@ static inline supine_status spread_of(const supine_lungs *lungs, double reach, s
   return status;
 }
 
-/* Relative root mean square difference of displacements of two meshes of one lung, at the vertices
- * of `coarse` and the nearest ones of `fine`. */
+/* Return the relative RMS difference of the displacements of two meshes of one lung, at the
+ * vertices of `coarse` and the nearest ones of `fine`. */
 static inline double drift_of(const supine_mesh *coarse, const double *coarse_moves,
                               const supine_mesh *fine, const double *fine_moves) {
   nearest_grid grid = nearest_create(fine, 5.0);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Writes a small made basis to the path given. */
+/* Write a small synthetic basis to the given path. */
 #include "runtime_fixture.h"
 
 int main(int argc, char **argv) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* positions BASIS X,Y,Z,ML...: what the run-time library makes of each gravity and volume above rest,
- * or above the scan where no rest is known. Writes, for each, the first lung's gain (float64) and
- * the positions (float32, [N, 3]) to standard output. A basis of an open surface takes a gain in
- * place of the volume. */
+/* positions BASIS X,Y,Z,ML...: write what the run-time library computes for each gravity and volume
+ * above rest (above the scan if the basis has no rest volume) to standard output: the gain of the
+ * first lung (float64) and the positions (float32, [N, 3]). For the basis of an open surface, give
+ * a gain in place of the volume. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Preloaded into a program: makes its n-th allocation, or the n-th call by which it makes files,
- * fail. Counted are the calls from the program's own code and from the libraries named.
+/* Preload this library to make the n-th allocation of a program fail, or its n-th call that makes a
+ * file. Calls count if they come from the program's own code or from the libraries in FAULT_ALSO.
  *
  *     FAULT_KIND    "memory" or "file"
- *     FAULT_NTH     which call fails, from 0; none where absent
+ *     FAULT_NTH     number of the call that fails, from 0; unset: none
  *     FAULT_ALSO    parts of names of libraries whose calls count as well: gsl,jansson
- *     FAULT_REPORT  a file that gets three numbers at the end: calls seen, calls failed, and blocks
- *                   that the program's own code took and nobody gave back
- */
+ *     FAULT_REPORT  file for three numbers at the end: calls seen, calls failed, and blocks that
+ * the program's own code allocated and did not free */
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
@@ -36,11 +35,13 @@ static long seen, failed;
 static pid_t process;
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
-/* Blocks that the program's own code took: an open hash table; 1 marks what was given back. */
+/* Blocks that the program's own code allocated and has not freed: an open hash table, in which 1
+ * marks a freed entry. */
 static uintptr_t blocks[BLOCKS];
 static long live;
 
-/* The C library's own, found once. dlsym allocates, from a few bytes that are never given back. */
+/* The functions of the C library, looked up once. dlsym allocates; it gets its memory from `few`,
+ * which is never freed. */
 static void *(*next_malloc)(size_t);
 static void *(*next_calloc)(size_t, size_t);
 static void *(*next_realloc)(void *, size_t);
@@ -238,7 +239,7 @@ void free(void *pointer) {
   next_free(pointer);
 }
 
-/* A block of the C library's own making that the program has to give back. */
+/* Replace the functions of the C library that allocate a result for the caller. */
 char *strdup(const char *text) {
   const size_t size = strlen(text) + 1;
   find_memory();

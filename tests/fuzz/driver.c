@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Runs a fuzzer where libFuzzer is not at hand (gcc), and makes its seeds.
+/* Run a fuzzer without libFuzzer (gcc), and write its seeds.
  *
- *     fuzz_X FILE...                             the files, one after the other
- *     fuzz_X -seeds FOLDER                       writes the seeds there
- *     fuzz_X -runs N [-seed S] [-dict FILE]      N inputs made from the seeds
+ *     fuzz_X FILE...                           run each file
+ *     fuzz_X -seeds FOLDER                     write the seeds
+ *     fuzz_X -runs N [-seed S] [-dict FILE]    run N mutations of the seeds
  *
- * Prints how many inputs were run, how long the slowest took and the most memory held; ends with 1
- * where an input took more than 0.5 s of this process (5 s with a sanitizer) or 2 GB. An input that crashes stays in the working folder. */
+ * Print the number of inputs, the slowest time and the largest memory. End with 1 if an input took
+ * more than 0.5 s of processor time (5 s with a sanitizer) or 2 GB. An input that crashes is left
+ * in the working folder. */
 #include <fcntl.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -40,7 +41,7 @@ static size_t seed_count;
 static uint64_t state;
 static double slowest;
 
-/* The input at hand, for the handler of a crash. */
+/* The current input, for the crash handler. */
 static const uint8_t *current;
 static size_t current_size;
 
@@ -59,7 +60,7 @@ static void keep_crasher(int number) {
   (void)raise(number);
 }
 
-/* name="word" or "word", with \\ \" and \xHH, a line each. */
+/* Read a dictionary: one name="word" or "word" a line, with escapes \\ \" and \xHH. */
 static void read_dictionary(const char *path) {
   char line[512];
   FILE *file = fopen(path, "r");
@@ -92,7 +93,7 @@ static size_t put_word(uint8_t *bytes, size_t size, size_t place, const uint8_t 
   return size;
 }
 
-/* One change: a bit, a byte, a word, a number in text, a piece cut out, doubled or from elsewhere.
+/* Apply one mutation: change a bit, byte, word or number in text; delete, double or splice a piece.
  */
 static size_t change(uint8_t *bytes, size_t size) {
   static const char *const numbers[] = {"-1",    "0",   "4294967296",
@@ -134,14 +135,14 @@ static size_t change(uint8_t *bytes, size_t size) {
   }
 }
 
-/* Of the processor: what else the machine does is no input's fault. */
+/* Processor time, which does not depend on the load of the machine. */
 static double seconds(void) {
   struct timespec now;
   (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* As a block of its very size, so that a sanitizer sees every byte read beyond it. */
+/* Copy into a block of exactly this size, so that a sanitizer sees every read past its end. */
 static void run(const uint8_t *bytes, size_t size) {
   uint8_t *copy = malloc(size + (size == 0));
   supine_fuzz_expect(copy != NULL, "memory for an input");

@@ -1,28 +1,28 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What a fuzzer of one reader gives, beside libFuzzer's own LLVMFuzzerTestOneInput. */
+/* Functions that each fuzzer defines beside LLVMFuzzerTestOneInput, and their helpers. */
 #ifndef SUPINE_FUZZ_H
 #define SUPINE_FUZZ_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/** Reads `bytes` as a file from anywhere; ends the program where what came of it is not sound. */
+/** Read `bytes` as an untrusted file; abort if the result is not valid. */
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 
-/** Seed `index` into a new block of `size` bytes; NULL where there is no such seed. */
+/** Return seed `index` in a new block of `size` bytes; NULL if there is no such seed. */
 uint8_t *supine_fuzz_seed(size_t index, size_t *size);
 
-/** A copy of a text, as a seed. */
+/** Return a copy of a text, as a seed. */
 uint8_t *supine_fuzz_text(const char *text, size_t *size);
 
-/** The bytes as a file of this ending, in a folder of memory where there is one; its name stays
- * that of the process. */
+/** Write the bytes to a file with this ending, in memory if possible; the name is the same for
+ * every call of a process. */
 const char *supine_fuzz_file(const uint8_t *bytes, size_t size, const char *ending);
 
-/** All of a file that supine_fuzz_file named, which is removed, as a seed. */
+/** Return the content of a file that supine_fuzz_file named, as a seed, and remove the file. */
 uint8_t *supine_fuzz_take(const char *path, size_t *size);
 
-/** Ends the program as a crash does, with the words, where `sound` is false. */
+/** Abort with the message if `sound` is false. */
 void supine_fuzz_expect(int sound, const char *words);
 
 #endif

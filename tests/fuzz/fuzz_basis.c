@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Basis files and their JSON headers: as they come, and again with the checksum that they should
- * state, so that what lies behind it is reached. What opens is evaluated. */
+/* Fuzz basis files and their JSON headers: unchanged, and with the checksum corrected so that the
+ * code behind the check is reached. A file that opens is evaluated. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 
 #include "tests/poses.h"
 
-/* Most numbers that an input is evaluated for: a small file may promise many modes. */
+/* Largest number of values to evaluate for an input: a small file may declare many modes. */
 enum { VERTICES_MOST = 4096 };
 
 static void evaluate(const supine_basis *basis) {
@@ -56,7 +56,7 @@ static void open_and_evaluate(const uint8_t *bytes, size_t size) {
   supine_basis_close(basis);
 }
 
-/* Writes the checksum of what is there over the one that is stated; false where none is. */
+/* Replace the stated checksum by the right one; return false if none is stated. */
 static bool state_checksum(uint8_t *bytes, size_t size) {
   supine_safetensors *file = NULL;
   if (supine_safetensors_open_memory(bytes, size, "input", &file, NULL) != SUPINE_OK) {

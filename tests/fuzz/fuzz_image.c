@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Images and label maps; FUZZ_ENDING says of which format. Small ones also become lungs. */
+/* Fuzz images and label maps of the format FUZZ_ENDING. Small ones are also converted to lungs. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 
 #include "fuzz.h"
 
-enum { SMALL = 1 << 15 }; /* voxels: more take longer than a fuzzer has */
+enum { SMALL = 1 << 15 }; /* voxels; larger inputs are too slow for a fuzzer */
 
 static void expect_words(supine_status status, const supine_error *error) {
   supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
@@ -20,7 +20,7 @@ static void expect_words(supine_status status, const supine_error *error) {
 }
 
 static void expect_lungs(const char *path) {
-  const supine_labels_options options = {.edge = 12.0}; /* few triangles: 20 times as fast */
+  const supine_labels_options options = {.edge = 12.0}; /* few triangles make it 20 times as fast */
   supine_mesh surfaces[2] = {0};
   supine_labels_report report = {0};
   supine_error error = {0};
@@ -45,7 +45,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
     const size_t count = image.size[0] * image.size[1] * image.size[2];
     double sum = 0.0;
     for (size_t i = 0; i < count * image.channels; ++i) {
-      sum += supine_image_get(&image, i); /* every number is there */
+      sum += supine_image_get(&image, i); /* read every voxel */
     }
     supine_fuzz_expect(count > 0 && (sum == sum || sum != sum), "voxels");
     if (count <= SMALL) {
@@ -57,7 +57,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   return 0;
 }
 
-/* Two boxes, of label 1 and 2, in a map whose numbers are of one kind or another. */
+/* Two boxes with labels 1 and 2, in a map of one of several voxel types. */
 uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   static const supine_image_voxel voxels[] = {SUPINE_VOXEL_U8, SUPINE_VOXEL_I16, SUPINE_VOXEL_F32};
   enum { SEEDS = sizeof voxels / sizeof *voxels, X = 16, Y = 9, Z = 10 };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Surfaces: FUZZ_ENDING says of which format. What loads must be whole, and load the same again. */
+/* Fuzz surfaces of the format FUZZ_ENDING. A mesh that loads must be valid, and the same when
+ * loaded again. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,7 +38,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   return 0;
 }
 
-/* A tetrahedron as the project writes it. */
+/* A tetrahedron as supine_mesh_save writes it. */
 static uint8_t *saved(size_t *size) {
   double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
   uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};

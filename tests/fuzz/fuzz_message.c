@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* OpenIGTLink messages: a header and a body, whose size and checksum are stated anew, so that what
- * lies behind them is reached too; and recorded poses, which are a table. */
+/* Fuzz OpenIGTLink messages, with body size and checksum corrected so that the code behind the
+ * checks is reached, and tables of recorded poses. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -38,7 +38,7 @@ static void read_message(const uint8_t *bytes, size_t size, bool mend) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   if (size >= SUPINE_STREAM_HEADER) {
-    uint8_t *copy = malloc(size); /* so that a sanitizer sees its end */
+    uint8_t *copy = malloc(size); /* so that a sanitizer sees reads past its end */
     supine_fuzz_expect(copy != NULL, "memory");
     memcpy(copy, bytes, size);
     read_message(copy, size, false);
@@ -79,7 +79,7 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   supine_fuzz_expect(bytes != NULL, "memory for a seed");
   uint8_t *body = bytes + SUPINE_STREAM_HEADER;
   for (size_t i = 0; i < BODY; i += 4) {
-    supine_stream_put32(body + i, UINT32_C(0x3F800000) >> (i % 12)); /* 1, and smaller */
+    supine_stream_put32(body + i, UINT32_C(0x3F800000) >> (i % 12)); /* 1.0F and smaller */
   }
   header.crc = supine_stream_crc64(0, body, BODY);
   supine_stream_header_write(&header, bytes);

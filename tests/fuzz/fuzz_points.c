@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lists of points; FUZZ_ENDING says of which format. */
+/* Fuzz lists of points of the format FUZZ_ENDING. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

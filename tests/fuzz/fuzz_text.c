@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Tables of numbers: expandability and directions by vertex, samples of pressure and volume, and
- * their fitted curves. The same bytes go to each reader. */
+/* Fuzz tables of numbers with each reader in turn: expandability and directions by vertex, samples
+ * of pressure and volume, and fitted curves. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

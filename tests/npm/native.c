@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What the package for JavaScript is held against, in plain C (SUPINE_SIMD_PORTABLE):
+/* Reference for the JavaScript package, in plain C (SUPINE_SIMD_PORTABLE).
  *
- *     native BASIS STATE OUT   float64: the volume of each lung; then float32: positions, normals
- * of supine_deform_lit (of supine_normals where the file has none), expected errors (0 where they
- * are not known) native BASIS STATE       nanoseconds a vertex of supine_deform, and of
- * supine_deform_lit (0 where the file has no normals), the fastest of several rounds, on stdout */
+ *     native BASIS STATE OUT    write as float64 the volume of each lung; then as float32 the
+ *                               positions, the normals of supine_deform_lit (of supine_normals if
+ *                               the file has none) and the expected errors (0 if unknown)
+ *     native BASIS STATE        print ns per vertex of supine_deform and of supine_deform_lit (0 if
+ *                               the file has no normals), the fastest of several rounds */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What the package for Python is held against:
+/* Reference for the Python package.
  *
- *     reference BASIS STATE OUT   raw float32: positions and normals of supine_deform_lit, exact
- *                                 normals, positions of a batch of that state and supine at rest
- *     reference BASIS STATE       seconds that a call of supine_deform takes, on stdout */
+ *     reference BASIS STATE OUT    write as float32 the positions and normals of supine_deform_lit,
+ *                                  exact normals, and positions of a batch of this state and supine
+ *                                  at rest
+ *     reference BASIS STATE        print the time of a call of supine_deform, s */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Postures as trackers give them, rotations that are none, and smoothing. */
+/* Postures from trackers' matrices and quaternions, refused poses, and smoothing. */
 #include "program/stream/gravity.h"
 #include "tests/test.h"
 #include <supine/posture.h>
 
-/* A few roundings of 32-bit numbers. */
+/* a few roundings of 32-bit numbers */
 static const double tolerance = 1e-6;
 
 static void expect_gravity(const double gravity[3], const char *posture) {
@@ -15,10 +15,10 @@ static void expect_gravity(const double gravity[3], const char *posture) {
   }
 }
 
-/* Written by hand. The room: z up, y from the foot end to the head end of a bed, x to the right of
- * someone who stands at the foot end and looks towards the head end. */
+/* Expected directions, written by hand. The room: z up, y from the foot end to the head end of a
+ * bed, x to the right of someone who stands at the foot end and looks towards the head end. */
 
-/* Where the body's left, back and head point in that room: the columns of a tracker's matrix. */
+/* Directions of the body's left, back and head in that room: the columns of a tracker's matrix. */
 typedef struct lie {
   const char *posture;
   double left[3], back[3], head[3];
@@ -67,7 +67,7 @@ static supine_stream_verdict take(const double r[9], double gravity[3]) {
   return verdict;
 }
 
-TEST(test_postures_as_trackers_give_them) {
+TEST(test_gravity_tracker_matrices_give_postures) {
   for (int i = 0; i < LIES; ++i) {
     double r[9];
     double gravity[3];
@@ -78,8 +78,8 @@ TEST(test_postures_as_trackers_give_them) {
   }
 }
 
-/* A quaternion of each, in every sign, as another route to the same. */
-TEST(test_quaternions_as_trackers_give_them) {
+/* A quaternion of each posture, with either sign. */
+TEST(test_gravity_tracker_quaternions_give_postures) {
   static const struct {
     const char *posture;
     double q[4]; /* W, X, Y, Z, by hand: a turn about a unit axis, cos and sin of half of it */
@@ -108,13 +108,13 @@ TEST(test_quaternions_as_trackers_give_them) {
   }
 }
 
-/* A tracker whose world has y up, and a marker whose axes are right, front, head. */
-TEST(test_setup_turns_world_and_marker) {
+/* The world of the tracker has y up; the axes of the marker are right, front, head. */
+TEST(test_gravity_setup_rotates_world_and_marker) {
   supine_stream_setup setup = {.down = {0, -1, 0}};
   const double half_turn[4] = {0, 0, 0, 1};
   supine_stream_rotation(half_turn, setup.body);
-  /* Lying on the back: the marker's front points up, which is y there; its head along the world's
-   * x; its right then along z: x cross y. */
+  /* Lying on the back: the marker's front points up, along the world's y; its head along x; its
+   * right along z: x cross y. */
   const double r[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
   double gravity[3];
   const char *why = NULL;
@@ -133,7 +133,7 @@ static void scaled(const double r[9], double x, double y, double z, double out[9
   }
 }
 
-TEST(test_rotations_that_are_none) {
+TEST(test_gravity_invalid_rotations_refused) {
   for (int i = 0; i < LIES; ++i) {
     double r[9];
     double m[9];
@@ -165,11 +165,11 @@ TEST(test_rotations_that_are_none) {
     }
     scaled(r, 1e300, 1e300, 1e300, m);
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
-    assert_memory_equal(gravity, kept, sizeof kept); /* refused poses change nothing */
+    assert_memory_equal(gravity, kept, sizeof kept); /* a refused pose changes nothing */
   }
 }
 
-TEST(test_quaternions_and_vectors_that_are_none) {
+TEST(test_gravity_invalid_quaternions_and_vectors_refused) {
   const supine_stream_setup setup = supine_stream_setup_default();
   const double good[4] = {3, -3, 0, 0};
   const double bad[3][4] = {{0, 0, 0, 0}, {NAN, 0, 0, 0}, {1, INFINITY, 0, 0}};
@@ -188,8 +188,8 @@ TEST(test_quaternions_and_vectors_that_are_none) {
   expect_gravity(gravity, "supine");
 }
 
-/* Behind a steady turn the smoothed direction stays the stated time behind. */
-TEST(test_smoothing_lags_as_stated) {
+/* The smoothed direction follows a steady turn with the stated delay. */
+TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
   const double seconds = 0.2;
   const double step = 1e-3;
   const double speed = 0.5; /* rad/s */
@@ -198,7 +198,7 @@ TEST(test_smoothing_lags_as_stated) {
     const double angle = speed * step * i;
     const double gravity[3] = {sin(angle), cos(angle), 0};
     const double left = supine_stream_gravity_smooth(gravity, step, seconds, smooth);
-    if (i == 2000) { /* after the step, which is then `step` ahead of the lag */
+    if (i == 2000) { /* the lag is measured after the step, which adds `step` */
       assert_true(fabs(left - speed * seconds) < speed * step);
       assert_true(fabs(atan2(smooth[0], smooth[1]) - (angle - left)) < 1e-12);
     }

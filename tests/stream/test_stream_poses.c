@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Poses in files, volumes in words, latencies in counts. */
+/* Recorded poses, volumes as text, and the histogram of latencies. */
 #include "program/stream/breathing.h"
 #include "program/stream/latency.h"
 #include "program/stream/poses.h"
@@ -18,7 +18,7 @@ static const char *file_of(const char *text) {
   return path;
 }
 
-TEST(test_poses_come_back_as_they_were) {
+TEST(test_poses_write_then_read_same) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/kept.csv", folder);
   FILE *file = fopen(path, "w");
@@ -43,14 +43,14 @@ TEST(test_poses_come_back_as_they_were) {
   assert_int_equal(poses.count, 500);
   for (int i = 0; i < 500; ++i) {
     assert_true(poses.pose[i].seconds == pose[i].seconds);
-    for (int k = 0; k < 3; ++k) { /* their length is taken once more */
+    for (int k = 0; k < 3; ++k) { /* they are normalised again */
       assert_true(fabs(poses.pose[i].gravity[k] - pose[i].gravity[k]) < 4e-16);
     }
   }
   supine_stream_poses_free(&poses);
 }
 
-TEST(test_files_that_are_no_poses) {
+TEST(test_poses_bad_files_refused) {
   static const struct {
     const char *text, *says;
   } bad[] = {
@@ -75,10 +75,10 @@ TEST(test_files_that_are_no_poses) {
                    SUPINE_ERROR_READ);
 }
 
-TEST(test_latencies_are_counted) {
+TEST(test_latency_added_values_have_percentiles) {
   supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
   assert_true(supine_stream_latency_share(latency, 0.5) == 0.0);
-  for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us: middles of bins */
+  for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us: centres of bins */
     supine_stream_latency_add(latency, (10.0 * i + 0.5) * 1e-6);
   }
   assert_true(fabs(supine_stream_latency_share(latency, 0.5) - 5001e-6) < 1e-12);
@@ -99,7 +99,7 @@ static void expect_volume(const supine_stream_volume *volume, const supine_basis
   assert_true(at.volume.ml == wanted.ml);
 }
 
-TEST(test_volumes_in_words) {
+TEST(test_volume_parse_each_form_literal) {
   fixture *made = fixture_create(200, 4, 2, 2, false, true, 10.0, 5);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(made, &size);
@@ -125,9 +125,9 @@ TEST(test_volumes_in_words) {
                                     "500", "+40",    "-1200", "0"};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     assert_int_equal(supine_stream_volume_fix(volume, bad[i], &error), SUPINE_ERROR_ARGUMENT);
-    expect_volume(volume, basis, gravity, 1.0, good[6].volume); /* as it was */
+    expect_volume(volume, basis, gravity, 1.0, good[6].volume); /* unchanged by refused text */
   }
-  /* The breath is the model's, between samples to a part in a thousand of it. */
+  /* The volume follows the breathing model, between samples to 1e-3. */
   const supine_pv_breath breath = supine_breath_default();
   assert_int_equal(supine_stream_volume_breathe(volume, supine_breath_normal(), &breath, &error),
                    SUPINE_OK);
@@ -138,7 +138,7 @@ TEST(test_volumes_in_words) {
         supine_breath_evaluate(supine_breath_normal(), &breath, 1, &time, &wanted, NULL, &error),
         SUPINE_OK);
     const supine_state at = supine_stream_volume_at(volume, basis, gravity, time);
-    assert_int_equal(at.volume.kind, SUPINE_VOLUME_SCAN); /* this basis knows of no rest */
+    assert_int_equal(at.volume.kind, SUPINE_VOLUME_SCAN); /* this basis has no rest volumes */
     assert_true(fabs(at.volume.ml - wanted) < 1e-3 * breath.tidal);
   }
   const supine_pv_breath none = {.tidal = -1.0, .rate = 12.0, .inhale_fraction = 0.3};

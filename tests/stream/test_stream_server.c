@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The server against peers of every kind, on this machine's loopback alone: honest, slow, stuck,
- * vanished, hostile, and many. */
+/* The server against peers on loopback: honest, slow, stuck, vanishing, hostile, and many. */
 #include "tests/test.h"
 
 #include <errno.h>
@@ -23,14 +22,15 @@
 
 enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
 
-/* Rest is 20 mL above the reference surface, and 8 more for gravity along y: harmonics by hand. */
+/* Rest is 20 mL above the reference surface, and 8 mL more if gravity is along y; coefficients of
+ * harmonics by hand. */
 static const double resting[9] = {20.0 / 0.2820947917738781, 8.0 / 0.4886025119029199};
 
 static double resting_in(const double gravity[3]) {
   return 20.0 + 8.0 * gravity[1];
 }
 
-/* A server in a thread of its own. */
+/* A server that runs in its own thread. */
 typedef struct stage {
   fixture *made;
   unsigned char *bytes;
@@ -61,13 +61,13 @@ static void *run(void *context) {
   return NULL;
 }
 
-/* The options may be changed between. */
+/* Create the server; its options may be changed before it runs. */
 static stage *stage_create(void) {
   stage *s = fixture_allocate(1, sizeof *s);
   size_t size = 0;
   supine_error error;
   s->made = fixture_create(VERTICES, MODES, 2, LUNGS, false, true, 15.0, 29);
-  /* Fields that fill the lungs whichever way gravity points: random ones fold some. */
+  /* Let the constant term dominate: with random terms some poses fold. */
   for (size_t k = 0; k < MODES; ++k) {
     double *mode = s->made->mode + 9 * k;
     for (int i = 1; i < 9; ++i) {
@@ -101,7 +101,7 @@ static int stage_run(stage *s) {
   return supine_stream_server_port(s->server);
 }
 
-/* Ends the thread; the counts may be read then. */
+/* Stop the thread; then the counts may be read. */
 static supine_stream_counts stage_end(stage *s) {
   atomic_store(&s->ending, true);
   assert_int_equal(pthread_join(s->thread, NULL), 0);
@@ -131,7 +131,7 @@ static int dial(int port) {
   const struct sockaddr_in here = {.sin_family = AF_INET,
                                    .sin_port = htons((uint16_t)port),
                                    .sin_addr = {htonl(INADDR_LOOPBACK)}};
-  const struct timeval limit = {10, 0}; /* nothing waits for ever */
+  const struct timeval limit = {10, 0}; /* no call blocks for ever */
   assert_true(s >= 0);
   assert_int_equal(setsockopt(s, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit), 0);
   assert_int_equal(setsockopt(s, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit), 0);
@@ -139,7 +139,7 @@ static int dial(int port) {
   return s;
 }
 
-/* Sends all of it; false where the server has hung up. */
+/* Send all bytes; return false if the server has closed the connection. */
 static bool put(int s, const void *bytes, size_t size) {
   for (size_t sent = 0; sent < size;) {
     const ssize_t n = send(s, (const unsigned char *)bytes + sent, size - sent, MSG_NOSIGNAL);
@@ -162,7 +162,7 @@ static bool get(int s, void *bytes, size_t size) {
   return true;
 }
 
-/* Whether the server hangs up, whatever it had sent before. */
+/* Read until the server closes the connection; return whether it does. */
 static bool hung_up(int s) {
   unsigned char waste[4096];
   ssize_t got = 0;
@@ -172,7 +172,7 @@ static bool hung_up(int s) {
   return got == 0 || errno == ECONNRESET;
 }
 
-/* A message into `bytes` (header and body); returns its size. */
+/* Write a message (header and body) into `bytes`; return its size. */
 static size_t make_message(const char *type, const char *device, uint64_t stamp, const void *body,
                            size_t size, unsigned char *bytes) {
   supine_stream_header header = {
@@ -184,7 +184,7 @@ static size_t make_message(const char *type, const char *device, uint64_t stamp,
   return SUPINE_STREAM_HEADER + size;
 }
 
-/* A direction of gravity as an NDARRAY [3] of 64-bit floats, big-endian. */
+/* Write a direction of gravity as an NDARRAY [3] of 64-bit floats, big-endian. */
 static size_t make_pose(const double down[3], uint64_t stamp, unsigned char bytes[128]) {
   unsigned char body[28] = {11, 1, 0, 3};
   for (int i = 0; i < 3; ++i) {
@@ -208,7 +208,7 @@ static bool say(int s, const char *device, const char *text) {
   return put(s, bytes, make_message("STRING", device, 0, body, 4 + strlen(text), bytes));
 }
 
-/* The next message: its body is dropped but for the first 4096 bytes; false where none comes. */
+/* Receive the next message and the first 4096 bytes of its body; return false if none comes. */
 static bool hear(int s, supine_stream_header *header, unsigned char body[4096]) {
   unsigned char raw[SUPINE_STREAM_HEADER];
   unsigned char waste[4096];
@@ -235,7 +235,8 @@ static bool hear(int s, supine_stream_header *header, unsigned char body[4096]) 
   return true;
 }
 
-/* Messages until the one of that stamp; how many were passed. Fails where it does not come. */
+/* Receive messages until the one with this stamp; return how many came before it. Fail if it does
+ * not come. */
 static int hear_stamp(int s, uint64_t stamp, supine_stream_header *header,
                       unsigned char body[4096]) {
   for (int passed = 0; passed < 100000; ++passed) {
@@ -266,7 +267,7 @@ static void expect_pose(const supine_pose *pose, const unsigned char *content) {
   }
 }
 
-/* The pose of a direction and a volume, mL above rest: one gain for all lungs. */
+/* Return the pose of a direction and a volume, mL above rest: one gain for all lungs. */
 static supine_pose pose_of(const stage *s, const double gravity[3], double above) {
   supine_pose pose = {.weights = {0}};
   double gain = 0.0;
@@ -277,7 +278,7 @@ static supine_pose pose_of(const stage *s, const double gravity[3], double above
   return pose;
 }
 
-/* Weights and gains of a direction and a volume, as they must come. */
+/* Assert the weights and gains of a direction and a volume. */
 static void expect_weights(const stage *s, const double gravity[3], double above,
                            const unsigned char *content) {
   const supine_pose pose = pose_of(s, gravity, above);
@@ -286,7 +287,7 @@ static void expect_weights(const stage *s, const double gravity[3], double above
 
 static const double poses[4][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.6, 0, -0.8}};
 
-TEST(test_weights_answer_each_pose) {
+TEST(test_server_each_pose_answered_by_weights) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   supine_stream_header header;
@@ -303,7 +304,7 @@ TEST(test_weights_answer_each_pose) {
   assert_true(send_pose(peer, poses[1], 200));
   (void)hear_stamp(peer, 200, &header, body);
   expect_weights(s, poses[1], -12.0, body);
-  unsigned char bytes[128]; /* the last byte comes later, and alone */
+  unsigned char bytes[128]; /* the last byte is sent alone, later */
   const size_t size = make_pose(poses[2], 300, bytes);
   const struct timespec later = {0, 50000000};
   assert_true(put(peer, bytes, size - 1));
@@ -322,12 +323,12 @@ TEST(test_weights_answer_each_pose) {
   stage_destroy(s);
 }
 
-TEST(test_a_bare_number_as_volume_is_refused) {
+TEST(test_server_bare_number_as_volume_refused) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   supine_stream_header header;
   unsigned char body[4096];
-  assert_true(say(peer, "VOLUME", "500")); /* what it counts from is not said */
+  assert_true(say(peer, "VOLUME", "500")); /* the reference of a bare number is unknown */
   assert_true(send_pose(peer, poses[1], 1));
   (void)hear_stamp(peer, 1, &header, body);
   expect_weights(s, poses[1], 30.0, body); /* as before */
@@ -337,7 +338,7 @@ TEST(test_a_bare_number_as_volume_is_refused) {
   stage_destroy(s);
 }
 
-TEST(test_volume_above_rest_sends_what_basis_pose_gives) {
+TEST(test_server_volume_above_rest_equals_basis_pose) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   supine_stream_header header;
@@ -353,7 +354,7 @@ TEST(test_volume_above_rest_sends_what_basis_pose_gives) {
     (void)hear_stamp(peer, 1 + i, &header, body);
     expect_pose(&pose, body);
   }
-  /* The same in an array: 50.0 as a 64-bit float, big-endian. */
+  /* The volume as an array: 50.0 as a 64-bit float, big-endian. */
   const unsigned char array[12] = {11, 1, 0, 1, 0x40, 0x49};
   unsigned char bytes[128];
   assert_true(say(peer, "VOLUME", "rest"));
@@ -367,8 +368,8 @@ TEST(test_volume_above_rest_sends_what_basis_pose_gives) {
   stage_destroy(s);
 }
 
-/* Points of a surface frame, as they must come: triangles with the first, or with all. */
-TEST(test_surfaces_and_wishes) {
+/* Assert the points of a surface frame. Its triangles come with the first frame, or with all. */
+TEST(test_server_send_request_switches_content) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
   const supine_basis_info *info = supine_basis_get_info(s->basis);
@@ -381,7 +382,7 @@ TEST(test_surfaces_and_wishes) {
                    SUPINE_OK);
   const size_t whole = points + strips.size;
   free(strips.bytes);
-  assert_true(send_pose(peer, poses[3], 1)); /* the answer to the pose before the wish */
+  assert_true(send_pose(peer, poses[3], 1)); /* the answer to the pose sent before the request */
   (void)hear_stamp(peer, 1, &header, body);
   const char *const wishes[] = {"points", "surface"};
   for (uint64_t w = 0; w < 2; ++w) {
@@ -390,7 +391,7 @@ TEST(test_surfaces_and_wishes) {
     for (uint64_t i = 0; i < 4; ++i) {
       const uint64_t stamp = 10 * (w + 1) + i;
       assert_true(send_pose(peer, poses[i], stamp));
-      do { /* a wish is answered with what there is, too */
+      do { /* a request is answered with the current pose, too */
         assert_true(hear(peer, &header, body));
         assert_int_equal(header.size, w == 1 || first ? whole : points);
         assert_string_equal(header.type, "POLYDATA");
@@ -405,7 +406,7 @@ TEST(test_surfaces_and_wishes) {
     }
   }
   assert_true(say(peer, "SEND", "nothing"));
-  assert_true(say(peer, "SEND", "everything")); /* no such thing: as before */
+  assert_true(say(peer, "SEND", "everything")); /* unknown: nothing changes */
   assert_true(send_pose(peer, poses[0], 77));
   rest(0.1);
   struct pollfd quiet = {peer, POLLIN, 0};
@@ -414,8 +415,9 @@ TEST(test_surfaces_and_wishes) {
   stage_destroy(s);
 }
 
-/* Of a thousand poses at once only the newest counts: few frames, and the last is of the last. */
-TEST(test_newest_pose_wins) {
+/* Of a thousand poses sent at once, the server answers few, and the last frame is of the last pose.
+ */
+TEST(test_server_many_poses_newest_answered) {
   enum { BURST = 1000 };
   stage *s = stage_create();
   s->options.rate = 100.0;
@@ -442,7 +444,7 @@ TEST(test_newest_pose_wins) {
   stage_destroy(s);
 }
 
-/* How many of `count` poses, sent every 2 ms, an honest peer is answered; each by its own frame. */
+/* Send `count` poses, one every 2 ms; return how many are answered by a frame of their own. */
 static int keep_rate(int peer, int count, uint64_t stamp) {
   supine_stream_header header;
   unsigned char body[4096];
@@ -456,10 +458,10 @@ static int keep_rate(int peer, int count, uint64_t stamp) {
   return count;
 }
 
-/* One that asks for surfaces and never reads, one that vanishes in the middle of a frame, one that
- * stops in the middle of a message: the honest one is answered every time, and the stuck are lost
- * after the patience that they are given. */
-TEST(test_stuck_and_vanished_peers_hold_up_nobody) {
+/* An honest peer is answered every time, while one peer asks for surfaces and never reads, one
+ * vanishes in the middle of a frame, and one stops in the middle of a message. The stuck peers are
+ * dropped after the time allowed. */
+TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   stage *s = stage_create();
   s->options.patience = 0.5;
   const int port = stage_run(s);
@@ -476,18 +478,18 @@ TEST(test_stuck_and_vanished_peers_hold_up_nobody) {
   const struct linger reset = {1, 0};
   assert_int_equal(setsockopt(vanished, SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
   (void)close(vanished);
-  assert_int_equal(keep_rate(honest, 300, 2000), 300); /* past the patience */
+  assert_int_equal(keep_rate(honest, 300, 2000), 300); /* for longer than the time allowed */
   rest(0.3);
   (void)close(honest);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.peers, 4);
-  assert_int_equal(counts.lost, 2); /* stuck, half; who vanishes is no fault */
+  assert_int_equal(counts.lost, 2); /* the two stuck ones; vanishing is no fault */
   (void)close(stuck);
   (void)close(half);
   stage_destroy(s);
 }
 
-TEST(test_fifty_peers_and_no_more_than_allowed) {
+TEST(test_server_fifty_peers_one_more_refused) {
   enum { MANY = 50 };
   stage *s = stage_create();
   s->options.peers = MANY;
@@ -507,12 +509,12 @@ TEST(test_fifty_peers_and_no_more_than_allowed) {
       (void)hear_stamp(peer[i], 500 + round, &header, body);
     }
   }
-  const int extra = dial(port); /* one too many: hung up on, without a word */
+  const int extra = dial(port); /* one too many: the server closes the connection */
   assert_true(hung_up(extra));
   (void)close(extra);
   (void)close(peer[0]);
   rest(0.2);
-  peer[0] = dial(port); /* there is a place again */
+  peer[0] = dial(port); /* a place is free again */
   assert_true(send_pose(peer[0], poses[0], 900));
   (void)hear_stamp(peer[0], 900, &header, body);
   for (int i = 0; i < MANY; ++i) {
@@ -524,15 +526,15 @@ TEST(test_fifty_peers_and_no_more_than_allowed) {
   stage_destroy(s);
 }
 
-/* Whole messages of every type, each with a few bytes changed: ten thousand. The checksum is put
- * right for half of them, so that what lies behind it is reached. */
-TEST(test_ten_thousand_mutated_messages) {
+/* Send ten thousand messages of all types, each with a few bytes changed. Half of them get the
+ * right checksum, so that the code behind the check is reached. */
+TEST(test_server_ten_thousand_mutated_messages_survives) {
   enum { COUNT = 10000 };
   static const struct {
     const char *type, *device;
     size_t size;
     unsigned char begin[12];
-    size_t one[4]; /* where 1.0 begins, as a 32-bit float; 0: nowhere */
+    size_t one[4]; /* offset of 1.0 as a 32-bit float; 0: none */
   } seed[] = {{"TRANSFORM", "Patient", 48, {0x3F, 0x80}, {16, 32}},
               {"QTDATA", "Tracker", 150, {'P', 'a', 't', 'i', 'e', 'n', 't'}, {46, 96, 146}},
               {"POSITION", "Patient", 28, {0}, {24}},
@@ -572,11 +574,11 @@ TEST(test_ten_thousand_mutated_messages) {
         supine_stream_header_write(&header, bytes);
       }
     }
-    /* One connection each: what one message leaves behind must not hide the next. */
+    /* Use a connection for each message, so that an error of one cannot hide that of the next. */
     const int peer = dial(port);
-    (void)put(peer, bytes, size); /* fails where the header alone was enough */
+    (void)put(peer, bytes, size); /* fails if the header was refused */
     (void)shutdown(peer, SHUT_WR);
-    assert_true(hung_up(peer)); /* when all of it has been read */
+    assert_true(hung_up(peer)); /* after the whole message */
     (void)close(peer);
     if (i % 1000 == 0) {
       assert_true(say(honest, "VOLUME", "rest+30"));
@@ -596,7 +598,7 @@ TEST(test_ten_thousand_mutated_messages) {
   stage_destroy(s);
 }
 
-TEST(test_absurd_sizes) {
+TEST(test_server_absurd_sizes_refused) {
   stage *s = stage_create();
   const int port = stage_run(s);
   unsigned char bytes[SUPINE_STREAM_HEADER];
@@ -609,7 +611,7 @@ TEST(test_absurd_sizes) {
   assert_true(put(peer, bytes, sizeof bytes));
   assert_true(hung_up(peer));
   (void)close(peer);
-  /* A transform of 8 MiB is passed over like an image, without being kept. */
+  /* A transform of 8 MiB is skipped like an image, without being stored. */
   header.size = 8u << 20;
   supine_stream_header_write(&header, bytes);
   peer = dial(port);
@@ -618,7 +620,7 @@ TEST(test_absurd_sizes) {
     assert_true(put(peer, piece, sizeof piece));
   }
   assert_int_equal(keep_rate(peer, 2, 1), 2);
-  header.size = 0; /* one without a body */
+  header.size = 0; /* without a body */
   supine_stream_header_write(&header, bytes);
   assert_true(put(peer, bytes, sizeof bytes));
   assert_int_equal(keep_rate(peer, 2, 11), 2);
@@ -630,8 +632,8 @@ TEST(test_absurd_sizes) {
   stage_destroy(s);
 }
 
-/* A tracker that waits to be connected to, and goes away, and comes back. */
-TEST(test_connects_and_connects_again) {
+/* A tracker that accepts a connection, closes it, and accepts another. */
+TEST(test_server_tracker_gone_reconnects) {
   supine_stream_address here;
   supine_error error;
   int port = 0;
@@ -659,7 +661,7 @@ TEST(test_connects_and_connects_again) {
   stage_destroy(s);
 }
 
-TEST(test_replay_and_record) {
+TEST(test_server_replay_recorded_poses_same) {
   enum { COUNT = 30 };
   supine_stream_pose pose[COUNT];
   for (int i = 0; i < COUNT; ++i) {
@@ -674,7 +676,7 @@ TEST(test_replay_and_record) {
   s->options.replay = &kept;
   s->options.record = record;
   supine_stream_poses_begin(record);
-  const int peer = dial(stage_run(s)); /* it begins when a peer is there */
+  const int peer = dial(stage_run(s)); /* the replay begins when a peer connects */
   supine_stream_header header;
   unsigned char body[4096];
   unsigned char last[4096];
@@ -686,7 +688,7 @@ TEST(test_replay_and_record) {
   }
   const supine_stream_counts counts = stage_end(s); /* by itself */
   assert_int_equal(counts.poses, COUNT);
-  assert_in_range(frames, 2, COUNT + 1); /* and the one before the first pose */
+  assert_in_range(frames, 2, COUNT + 1); /* and the frame before the first pose */
   expect_weights(s, pose[COUNT - 1].gravity, 30.0, last);
   (void)close(peer);
   assert_int_equal(fclose(record), 0);
@@ -703,9 +705,9 @@ TEST(test_replay_and_record) {
   stage_destroy(s);
 }
 
-/* Smoothed, the lungs go on turning after the last pose until they are there; breathing, they never
- * stop. */
-TEST(test_frames_come_while_the_lungs_move) {
+/* With smoothing, frames follow after the last pose until the lungs reach it; with breathing, they
+ * never stop. */
+TEST(test_server_moving_lungs_send_frames) {
   stage *s = stage_create();
   s->options.smooth = 0.1;
   const int peer = dial(stage_run(s));
@@ -721,7 +723,8 @@ TEST(test_frames_come_while_the_lungs_move) {
     assert_true(hear(peer, &header, body));
     ++frames;
   }
-  /* ln(1e6 pi / 2) lags of 0.1 s at 15 ms each are 95; a busy machine makes fewer. */
+  /* About 95 frames: ln(1e6 pi / 2) time constants of 0.1 s at 15 ms each; a busy machine makes
+   * fewer. */
   assert_in_range(frames, 10, 120);
   expect_weights(s, poses[2], 30.0, body);
   const supine_pv_breath breath = {60.0, 60.0, 0.5, 5.0, SUPINE_PV_COSINE};
@@ -743,15 +746,15 @@ TEST(test_frames_come_while_the_lungs_move) {
   }
   const double supine[3] = {0, 1, 0};
   const double deep = pose_of(s, supine, 60.0).gains[0][0] - pose_of(s, supine, 0.0).gains[0][0];
-  /* From rest to the peak, as far as frames of 15 ms meet them. */
+  /* From rest to the peak, within the resolution of frames of 15 ms. */
   assert_true(fabs((double)(high - low) - fabs(deep)) < 0.05 * fabs(deep));
   (void)close(other);
   stage_destroy(s);
 }
 
-/* A port alone is this machine's own: 127.0.0.1 and no other address, not even of the loopback;
- * with an address, that one. */
-TEST(test_listens_on_loopback_unless_told_otherwise) {
+/* A port alone listens on 127.0.0.1 and no other address, not even of the loopback; an address is
+ * used as given. */
+TEST(test_server_port_alone_listens_on_loopback) {
   static const struct {
     const char *listen;
     uint32_t from;
@@ -775,7 +778,7 @@ TEST(test_listens_on_loopback_unless_told_otherwise) {
   }
 }
 
-TEST(test_places_that_cannot_be_listened_on) {
+TEST(test_server_bad_address_refused) {
   stage *s = stage_create();
   supine_error error;
   supine_stream_server *server = NULL;
@@ -797,9 +800,9 @@ TEST(test_places_that_cannot_be_listened_on) {
   stage_destroy(s);
 }
 
-/* A socket that takes little at a time gets every byte once and in order, never more than a share
- * of 1 MiB at one go. */
-TEST(test_a_frame_in_parts_arrives_whole) {
+/* A socket with a small buffer gets every byte once and in order; no call writes more than its
+ * share of 1 MiB. */
+TEST(test_server_small_socket_buffer_frame_whole) {
   static const size_t sizes[3] = {3001, 1, 2500007};
   const size_t size = sizes[0] + sizes[1] + sizes[2];
   unsigned char *bytes = fixture_allocate(size, 1);
@@ -807,7 +810,7 @@ TEST(test_a_frame_in_parts_arrives_whole) {
   for (size_t i = 0; i < size; ++i) {
     bytes[i] = (unsigned char)(i * 2654435761u >> 13);
   }
-  static const int rooms[2] = {4096, 4096000}; /* bytes, asked of the kernel */
+  static const int rooms[2] = {4096, 4096000}; /* bytes, requested from the kernel */
   for (size_t r = 0; r < 2; ++r) {
     supine_stream_peer peer = {.took = 1.0};
     int ends[2];

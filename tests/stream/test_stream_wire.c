@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Bytes on the wire, against those that the protocol's public library makes. */
+/* Messages against those of the public OpenIGTLink library. */
 #include "tests/test.h"
 
 #include <igtl_header.h>
@@ -23,8 +23,8 @@ static void fill(unsigned char *bytes, size_t size, uint64_t seed) {
   }
 }
 
-/* Every length, at every alignment of 8, and cut anywhere. */
-TEST(test_crc_of_every_length_is_the_librarys) {
+/* Every length, at every alignment modulo 8, cut in two anywhere. */
+TEST(test_crc_every_length_equals_library) {
   enum { LONGEST = 3000 };
   unsigned char *bytes = fixture_allocate(LONGEST + 8, 1);
   fill(bytes, LONGEST + 8, 4711);
@@ -42,7 +42,7 @@ TEST(test_crc_of_every_length_is_the_librarys) {
   free(bytes);
 }
 
-TEST(test_crc_of_a_large_message_is_the_librarys) {
+TEST(test_crc_large_message_equals_library) {
   const size_t size = 6096012; /* 508,001 points */
   unsigned char *bytes = fixture_allocate(size, 1);
   fill(bytes, size, 99);
@@ -50,7 +50,7 @@ TEST(test_crc_of_a_large_message_is_the_librarys) {
   free(bytes);
 }
 
-TEST(test_header_is_the_librarys) {
+TEST(test_header_written_equals_library) {
   igtl_header theirs = {
       .version = 1, .timestamp = 0x0102030405060708u, .body_size = 48, .crc = 0xF0E1D2C3B4A59687u};
   memcpy(theirs.name, "TRANSFORM", 9);
@@ -71,7 +71,7 @@ TEST(test_header_is_the_librarys) {
   assert_memory_equal(bytes, &theirs, sizeof bytes);
 }
 
-/* A header for a body, its checksum by the library. */
+/* Make a header for a body; the library computes the checksum. */
 static supine_stream_header header_of(const char *type, const char *device, unsigned version,
                                       unsigned char *body, size_t size) {
   supine_stream_header header = {.version = version, .size = size, .crc = crc64(body, size, 0)};
@@ -88,14 +88,14 @@ static supine_stream_message read_ok(const supine_stream_header *header, const u
   return message;
 }
 
-/* Rows 1 2 3 / 4 5 6 / 7 8 9, in the library's order. */
+/* The matrix with rows 1 2 3 / 4 5 6 / 7 8 9, in the order of the library. */
 static void make_transform(igtl_float32 transform[12]) {
   const igtl_float32 columns[12] = {1, 4, 7, 2, 5, 8, 3, 6, 9, 10, 11, 12};
   memcpy(transform, columns, sizeof columns);
   igtl_transform_convert_byte_order(transform);
 }
 
-TEST(test_transform_is_read) {
+TEST(test_read_transform_of_library) {
   igtl_float32 transform[12];
   make_transform(transform);
   unsigned char *body = (unsigned char *)transform;
@@ -108,7 +108,7 @@ TEST(test_transform_is_read) {
       assert_true(m.number[k] == (double)(k + 1));
     }
   }
-  /* Of another device it says where that is: an observed point, maybe. */
+  /* A transform of another device gives its position, for observed points. */
   const supine_stream_message place = read_ok(&header, body, "Probe");
   assert_int_equal(place.kind, SUPINE_STREAM_PLACE);
   assert_string_equal(place.text, "Patient");
@@ -123,10 +123,10 @@ TEST(test_transform_is_read) {
   assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
 }
 
-TEST(test_transform_of_version_2_is_read) {
+TEST(test_read_transform_of_version_2) {
   igtl_float32 transform[12];
   make_transform(transform);
-  /* By hand: an extension of 14 bytes, 2 more than known; one key "a" of value "bc". */
+  /* Written by hand: an extension of 14 bytes, 2 more than known; one key "a" with value "bc". */
   unsigned char body[14 + 48 + 10 + 3] = {0, 14, 0, 10, 0, 0, 0, 3, 0, 0, 0, 77, 0xAB, 0xCD};
   const unsigned char metadata[13] = {0, 1, 0, 1, 0, 3, 0, 0, 0, 2, 'a', 'b', 'c'};
   memcpy(body + 14, transform, 48);
@@ -162,7 +162,7 @@ static void expect_quaternion(const supine_stream_message *m, double w, double x
   }
 }
 
-TEST(test_qtdata_is_read) {
+TEST(test_read_qtdata_of_library) {
   igtl_qtdata_element element[3];
   memset(element, 0, sizeof element);
   memcpy(element[0].name, "Probe", 5);
@@ -180,26 +180,26 @@ TEST(test_qtdata_is_read) {
   expect_quaternion(&m, 0.8, 0, 0.6, 0);
   m = read_ok(&header, body, "Probe");
   expect_quaternion(&m, 0.8, 0.6, 0, 0);
-  m = read_ok(&header, body, NULL); /* any: the last */
+  m = read_ok(&header, body, NULL); /* any device: the last transform */
   expect_quaternion(&m, 0.8, 0, 0, 0.6);
   assert_int_equal(read_ok(&header, body, "Nobody").kind, SUPINE_STREAM_NOTHING);
 }
 
-TEST(test_position_is_read) {
+TEST(test_read_position_of_library) {
   igtl_position position = {.position = {1, 2, 3}, .quaternion = {0.48f, -0.36f, 0.48f, 0.64f}};
   igtl_position_convert_byte_order(&position);
   unsigned char *body = (unsigned char *)&position;
   supine_stream_header header = header_of("POSITION", "Patient", 1, body, 28);
   supine_stream_message m = read_ok(&header, body, NULL);
   expect_quaternion(&m, 0.64, 0.48, -0.36, 0.48);
-  header = header_of("POSITION", "Patient", 1, body, 24); /* the fourth follows from the length */
+  header = header_of("POSITION", "Patient", 1, body, 24); /* length 1 gives the fourth */
   m = read_ok(&header, body, NULL);
   assert_true(fabs(m.number[0] - 0.64) < 1e-6);
   header = header_of("POSITION", "Patient", 1, body, 12);
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
 
-/* An array of `type`, as the library packs it. */
+/* Make an array of `type` as the library packs it. */
 static size_t make_array(int type, size_t count, const double *values, unsigned char *body) {
   igtl_ndarray_info info;
   const igtl_uint16 size[1] = {(igtl_uint16)count};
@@ -220,7 +220,7 @@ static size_t make_array(int type, size_t count, const double *values, unsigned 
   return bytes;
 }
 
-TEST(test_arrays_and_sensors_are_read) {
+TEST(test_read_arrays_and_sensors_of_library) {
   unsigned char body[256];
   const double down[4] = {0.25, -0.5, 1.5, 7.0};
   for (int type = IGTL_NDARRAY_STYPE_TYPE_FLOAT32; type <= IGTL_NDARRAY_STYPE_TYPE_FLOAT64;
@@ -239,8 +239,8 @@ TEST(test_arrays_and_sensors_are_read) {
     header = header_of("NDARRAY", "Tilt", 1, body, size);
     assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
   }
-  /* An accelerometer that lies still: 9.5 upwards along its y. By hand: 3, status, unit, doubles.
-   */
+  /* An accelerometer at rest measures 9.5 upwards, along its y. Written by hand: 3, status, unit,
+   * doubles. */
   unsigned char sensor[10 + 24] = {3, 0, 1, 2, 3, 4, 5, 6, 7, 8};
   const unsigned char nine_and_a_half[8] = {0x40, 0x23};
   memcpy(sensor + 10 + 8, nine_and_a_half, 8);
@@ -250,7 +250,7 @@ TEST(test_arrays_and_sensors_are_read) {
   assert_true(m.number[0] == 0.0 && m.number[1] == -9.5 && m.number[2] == 0.0);
 }
 
-TEST(test_strings_are_read) {
+TEST(test_read_strings_of_library) {
   igtl_string_header head = {3, 8};
   igtl_string_convert_byte_order(&head);
   unsigned char body[4 + 100] = {0};
@@ -269,7 +269,7 @@ TEST(test_strings_are_read) {
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
 
-TEST(test_points_are_read) {
+TEST(test_read_points_of_library) {
   igtl_point_element list[3];
   memset(list, 0, sizeof list);
   for (int i = 0; i < 3; ++i) {
@@ -297,8 +297,8 @@ TEST(test_points_are_read) {
   }
 }
 
-/* Contents that end before they say: every length of each, checksum right. */
-TEST(test_every_truncation_is_refused) {
+/* Bodies shorter than their content: every length of each, with the right checksum. */
+TEST(test_read_every_truncation_refused) {
   static const struct {
     const char *type, *device;
     size_t whole;
@@ -313,7 +313,7 @@ TEST(test_every_truncation_is_refused) {
                  {"STRING", "VOLUME", 34, {0, 3, 0, 30}}};
   for (size_t i = 0; i < sizeof content / sizeof *content; ++i) {
     for (size_t size = 0; size < content[i].whole; ++size) {
-      unsigned char *body = fixture_allocate(size + 1, 1); /* its end is watched by sanitizers */
+      unsigned char *body = fixture_allocate(size + 1, 1); /* a sanitizer sees reads past its end */
       unsigned char *end = body + size;
       memcpy(body, content[i].begin, size < 8 ? size : 8);
       supine_stream_header header =
@@ -330,7 +330,7 @@ TEST(test_every_truncation_is_refused) {
   }
 }
 
-TEST(test_headers_that_are_none_are_refused) {
+TEST(test_header_invalid_refused) {
   supine_stream_header good = {.version = 1};
   strcpy(good.type, "TRANSFORM");
   unsigned char bytes[SUPINE_STREAM_HEADER];
@@ -348,7 +348,7 @@ TEST(test_headers_that_are_none_are_refused) {
   assert_int_equal(supine_stream_header_read(bytes, &header, &error), SUPINE_ERROR_FORMAT);
 }
 
-/* The pieces of a message as one. */
+/* Join the pieces of a message. */
 static unsigned char *gathered(const supine_stream_parcel *parcel) {
   unsigned char *bytes = fixture_allocate(parcel->size, 1);
   size_t at = 0;
@@ -376,7 +376,7 @@ static sample sample_open(fixture *made) {
   s.moment = (supine_stream_moment){.gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu};
   assert_int_equal(supine_basis_weights(s.basis, s.moment.gravity, s.moment.pose.weights),
                    SUPINE_OK);
-  for (size_t i = 0; i < 3 * made->lungs; ++i) { /* every axis of every lung has its own gain */
+  for (size_t i = 0; i < 3 * made->lungs; ++i) { /* each axis of each lung has its gain */
     s.moment.pose.gains[i / 3][i % 3] = 0.7 - 0.17 * (double)i;
   }
   return s;
@@ -392,7 +392,7 @@ static void sample_destroy(sample *s) {
   fixture_destroy(s->made);
 }
 
-/* A message of version 1 whose body is `body`, by the library. */
+/* Make a message of version 1 with this body, by the library */
 static void expect_message(const unsigned char *bytes, const char *type, uint64_t stamp,
                            unsigned char *body, size_t size) {
   igtl_header header = {
@@ -404,7 +404,7 @@ static void expect_message(const unsigned char *bytes, const char *type, uint64_
   assert_memory_equal(bytes + sizeof header, body, size);
 }
 
-/* K weights, then the gains x, y, z of each lung; releases the sample. */
+/* Assert the K weights, then the gains x, y, z of each lung, of a message; free it. */
 static void expect_weights_frame(sample s) {
   supine_stream_frames *frames = NULL;
   supine_error error;
@@ -429,17 +429,17 @@ static void expect_weights_frame(sample s) {
   sample_destroy(&s);
 }
 
-TEST(test_weights_are_the_librarys_ndarray) {
+TEST(test_weights_written_equal_ndarray_of_library) {
   expect_weights_frame(sample_create());
 }
 
-/* The most modes and lungs that a basis may have. */
-TEST(test_weights_of_the_largest_basis_are_whole) {
+/* The largest numbers of modes and lungs of a basis. */
+TEST(test_weights_largest_basis_complete) {
   expect_weights_frame(sample_open(fixture_create(16 * SUPINE_LUNGS_MAX, SUPINE_MODES_MAX, 15,
                                                   SUPINE_LUNGS_MAX, false, false, 20.0, 23)));
 }
 
-/* The surface as the library packs it; `size` is written. */
+/* Pack the surface by the library; set `size`. */
 static unsigned char *make_polydata(const sample *s, bool triangles, double sign, size_t *size) {
   const supine_basis_info *info = supine_basis_get_info(s->basis);
   igtl_polydata_info surface;
@@ -457,7 +457,7 @@ static unsigned char *make_polydata(const sample *s, bool triangles, double sign
     surface.points[3 * i] *= (float)sign;
     surface.points[3 * i + 1] *= (float)sign;
   }
-  for (size_t i = 0; triangles && i < strips.size / 4; ++i) { /* numbers of this machine */
+  for (size_t i = 0; triangles && i < strips.size / 4; ++i) { /* in this machine's byte order */
     const unsigned char *b = strips.bytes + 4 * i;
     surface.triangle_strips[i] =
         (igtl_uint32)b[0] << 24 | (igtl_uint32)b[1] << 16 | (igtl_uint32)b[2] << 8 | b[3];
@@ -470,7 +470,7 @@ static unsigned char *make_polydata(const sample *s, bool triangles, double sign
   return body;
 }
 
-TEST(test_attribute_is_the_librarys) {
+TEST(test_attribute_written_equals_library) {
   igtl_polydata_info surface;
   igtl_polydata_init_info(&surface);
   surface.header.npoints = 2;
@@ -492,7 +492,7 @@ TEST(test_attribute_is_the_librarys) {
   assert_memory_equal(ours, theirs, size);
 }
 
-TEST(test_surface_is_the_librarys_polydata) {
+TEST(test_surface_written_equals_polydata_of_library) {
   sample s = sample_create();
   supine_error error;
   for (int ras = 0; ras < 2; ++ras) {
@@ -513,7 +513,7 @@ TEST(test_surface_is_the_librarys_polydata) {
       free(body);
     }
     supine_stream_frame_leave(frames, frame);
-    /* A frame that is used again holds the new moment's points. */
+    /* A frame that is used again holds the points of the new pose. */
     supine_stream_moment other = s.moment;
     other.pose.gains[0][1] = -0.1;
     supine_stream_frame *again = supine_stream_frame_take(frames, &other);
@@ -546,7 +546,7 @@ static int by_corners(const void *a, const void *b) {
   return (x[2] > y[2]) - (x[2] < y[2]);
 }
 
-/* As it faces: of the three ways to say that, the first. */
+/* Rotate the corners so that the least comes first; orientation is kept. */
 static triangle face(uint32_t a, uint32_t b, uint32_t c) {
   const triangle way[3] = {{{a, b, c}}, {{b, c, a}}, {{c, a, b}}};
   const triangle *first = by_corners(&way[1], &way[0]) < 0 ? &way[1] : &way[0];
@@ -557,7 +557,8 @@ static uint32_t word_at(const unsigned char *bytes) {
   return (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
 }
 
-/* The strips of `count` triangles hold each of them once, as it faces, and nothing else. */
+/* Assert that the strips hold each of the `count` triangles once, with its orientation, and nothing
+ * else. */
 static void expect_strips(const uint32_t *corner, size_t count, size_t vertices) {
   supine_stream_strips strips;
   triangle *wanted = fixture_allocate(count + 1, sizeof *wanted);
@@ -588,9 +589,9 @@ static void expect_strips(const uint32_t *corner, size_t count, size_t vertices)
   free(made);
 }
 
-/* Of a grid rolled into a tube, of triangles at random (edges that three share, corners that
- * coincide, triangles twice), of a fan, and of none. */
-TEST(test_strips_hold_each_triangle_once) {
+/* Strips of a grid rolled into a tube, of random triangles (edges of three triangles, coinciding
+ * corners, repeated triangles), of a fan, and of no triangles. */
+TEST(test_strips_any_triangles_held_once) {
   enum { AROUND = 37, ALONG = 53, COUNT = 2 * AROUND * ALONG };
   uint32_t *corner = fixture_allocate(3 * (size_t)COUNT, sizeof *corner);
   for (uint32_t i = 0; i < AROUND * ALONG; ++i) {
@@ -602,7 +603,7 @@ TEST(test_strips_hold_each_triangle_once) {
   supine_stream_strips strips;
   assert_int_equal(supine_stream_strips_make(corner, COUNT, AROUND * (ALONG + 1), &strips),
                    SUPINE_OK);
-  assert_true(strips.size < 16 * (size_t)COUNT / 3); /* a quarter is the least */
+  assert_true(strips.size < 16 * (size_t)COUNT / 3); /* optimum: a quarter */
   free(strips.bytes);
   uint64_t dice = 31;
   for (size_t i = 0; i < 3 * (size_t)COUNT; ++i) {
@@ -610,7 +611,7 @@ TEST(test_strips_hold_each_triangle_once) {
   }
   expect_strips(corner, COUNT, 501);
   expect_strips(corner, 0, 501);
-  for (uint32_t i = 0; i < COUNT; ++i) { /* round one vertex, more than are looked at */
+  for (uint32_t i = 0; i < COUNT; ++i) { /* a long fan about vertex 0 */
     const uint32_t fan[3] = {0, i + 1, i + 2};
     memcpy(corner + 3 * i, fan, sizeof fan);
   }
