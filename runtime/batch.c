@@ -29,7 +29,7 @@ static void batch_tiles(const supine_basis *basis, size_t count, block *scratch,
     const size_t here = tiles - t < step ? tiles - t : step;
     basis->kernels->widen(&basis->tiles, first + t, here, wide);
     for (size_t j = 0; j < count; ++j) {
-      const supine_target target = {.x = positions + j * apart + t * TILE_NUMBERS,
+      const supine_target target = {.xyz = positions + j * apart + t * TILE_NUMBERS,
                                     .rest = true,
                                     .stream = stream,
                                     .held = scratch->held[j],
@@ -83,6 +83,6 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const supine_p
   supine_stream_fence(stream);
   for (size_t j = 0; j < count && basis->rigid_count > 0; ++j) {
     supine_deform_rigid(basis, &poses[j], begin, end,
-                        &(supine_target){.x = xyz + j * apart, .rest = true});
+                        &(supine_target){.xyz = xyz + j * apart, .rest = true});
   }
 }

@@ -17,11 +17,7 @@ void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung
 
 supine_target supine_target_after(const supine_target *target, size_t count) {
   supine_target moved = *target;
-  moved.x += target->y == NULL ? 3 * count : count;
-  if (target->y != NULL) {
-    moved.y += count;
-    moved.z += count;
-  }
+  moved.xyz += 3 * count;
   return moved;
 }
 
@@ -30,21 +26,9 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
-  const bool joined = target->y == NULL;
-  const supine_target whole = {.x = aside,
-                               .y = joined ? NULL : aside + TILE,
-                               .z = joined ? NULL : aside + (size_t)2 * TILE,
-                               .rest = target->rest};
+  const supine_target whole = {.xyz = aside, .rest = target->rest};
   kernel(tiles, folded, begin / TILE, 1, &whole);
-  const size_t first = begin % TILE;
-  const size_t count = end - begin;
-  if (joined) {
-    memcpy(target->x, aside + 3 * first, 3 * count * sizeof *aside);
-  } else {
-    memcpy(target->x, aside + first, count * sizeof *aside);
-    memcpy(target->y, whole.y + first, count * sizeof *aside);
-    memcpy(target->z, whole.z + first, count * sizeof *aside);
-  }
+  memcpy(target->xyz, aside + 3 * (begin % TILE), 3 * (end - begin) * sizeof *aside);
 }
 
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
@@ -85,17 +69,16 @@ void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
     for (size_t at = first; at < last; at += RIGID_BLOCK) {
       float x[3 * RIGID_BLOCK];
       const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
-      const supine_target block = {.x = x, .rest = true};
+      const supine_target block = {.xyz = x, .rest = true};
       supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, at, next, &block);
       supine_rigid_add(&m, basis->info.vertices + 3 * at, x, next - at);
     }
     supine_rigid_finish(&m);
     for (size_t i = first > begin ? first : begin; i < last && i < end; ++i) {
       const float *p = basis->info.vertices + 3 * i;
-      float *const to[3] = {target->x, target->y, target->z};
       for (size_t a = 0; a < 3; ++a) {
         const double value = supine_rigid_move(&m, p, a) - (target->rest ? 0 : (double)p[a]);
-        *(target->y == NULL ? target->x + 3 * (i - begin) + a : to[a] + (i - begin)) = (float)value;
+        target->xyz[3 * (i - begin) + a] = (float)value;
       }
     }
   }
@@ -121,21 +104,16 @@ static void deform_lungs(const supine_basis *basis, const supine_pose *pose, siz
 
 void supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, float *xyz) {
-  deform_lungs(basis, pose, begin, end, (supine_target){.x = xyz, .rest = true});
+  deform_lungs(basis, pose, begin, end, (supine_target){.xyz = xyz, .rest = true});
 }
 
 void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz) {
   supine_deform_range(basis, pose, 0, basis->info.vertex_count, xyz);
 }
 
-void supine_deform_separate(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                            size_t end, float *x, float *y, float *z) {
-  deform_lungs(basis, pose, begin, end, (supine_target){.x = x, .y = y, .z = z, .rest = true});
-}
-
 void supine_displace_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                            size_t end, float *xyz) {
-  deform_lungs(basis, pose, begin, end, (supine_target){.x = xyz});
+  deform_lungs(basis, pose, begin, end, (supine_target){.xyz = xyz});
 }
 
 void supine_step(size_t count, const float *restrict step, float *restrict xyz) {

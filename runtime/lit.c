@@ -8,9 +8,6 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-/* Bytes of the tiles that a batch evaluates at once, which stay in the first-level cache. */
-enum { BATCH_BYTES = 32768 };
-
 /* Pack the normals of 16 vertices, the modes of each of which begin at its `row`. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
                                     unsigned char *to) {
@@ -109,8 +106,9 @@ static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose
 /* Compute the normals of vertices begin <= i < end, of any lungs. */
 static void light(const supine_basis *basis, const supine_pose *pose, size_t begin, size_t end,
                   bool stream, float *normals) {
-  const supine_target target = {
-      .x = normals, .stream = stream, .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
+  const supine_target target = {.xyz = normals,
+                                .stream = stream,
+                                .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
   float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* weights 0 for missing modes of the words */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
@@ -139,28 +137,4 @@ supine_status supine_deform_lit_range(const supine_basis *basis, const supine_po
 supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose, float *xyz,
                                 float *normals) {
   return supine_deform_lit_range(basis, pose, 0, basis->info.vertex_count, xyz, normals);
-}
-
-supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
-                                      const supine_pose *poses, size_t begin, size_t end,
-                                      float *xyz, float *normals) {
-  if (basis->info.normal_count == 0) {
-    return SUPINE_ERROR_UNSUPPORTED;
-  }
-  if (xyz != NULL) {
-    supine_deform_batch(basis, count, poses, begin, end, xyz);
-  }
-  const bool stream =
-      3.0 * (double)(end - begin) * (double)count * sizeof *normals > STREAM_BATCH_BYTES;
-  const size_t fit = BATCH_BYTES / basis->lit.stride;
-  const size_t step = TILE * (fit > 0 ? fit : 1);
-  for (size_t at = begin; at < end;) { /* block by block of tiles, each for every pose */
-    const size_t next = (at / step + 1) * step;
-    const size_t last = next < end ? next : end;
-    for (size_t j = 0; j < count; ++j) {
-      light(basis, &poses[j], at, last, stream, normals + 3 * (j * (end - begin) + at - begin));
-    }
-    at = last;
-  }
-  return SUPINE_OK;
 }

@@ -161,40 +161,10 @@ TEST(test_lit_range_same_bits_as_whole) {
   }
 }
 
-TEST(test_lit_batch_equals_single_calls) {
-  opened o = open_lit(6, SUPINE_SIMD_AUTO);
-  enum { BEGIN = 7, END = VERTICES - 5, COUNT = END - BEGIN };
-  float *xyz = fixture_allocate(3 * BATCH * COUNT, sizeof *xyz);
-  float *lit = fixture_allocate(3 * BATCH * COUNT, sizeof *lit);
-  float *positions = fixture_allocate(3 * BATCH * COUNT, sizeof *positions);
-  float one[3 * COUNT];
-  assert_int_equal(supine_deform_lit_batch(o.basis, BATCH,
-                                           posed_batch(o.basis, BATCH, o.weights, o.scales), BEGIN,
-                                           END, xyz, lit),
-                   SUPINE_OK);
-  supine_deform_batch(o.basis, BATCH, posed_batch(o.basis, BATCH, o.weights, o.scales), BEGIN, END,
-                      positions);
-  assert_memory_equal(xyz, positions, 3 * BATCH * COUNT * sizeof *xyz);
-  for (size_t j = 0; j < BATCH; ++j) {
-    assert_int_equal(
-        supine_deform_lit_range(o.basis, POSED(o.basis, o.weights + j * MODES, o.scales + 2 * j),
-                                BEGIN, END, NULL, one),
-        SUPINE_OK);
-    assert_memory_equal(lit + 3 * j * COUNT, one, sizeof one);
-  }
-  free(xyz);
-  free(lit);
-  free(positions);
-  drop(&o);
-}
-
 TEST(test_lit_without_normals_refused) {
   float xyz[3 * VERTICES];
   opened o = open_lit(0, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_deform_lit(o.basis, POSED(o.basis, o.weights, o.scales), xyz, xyz),
-                   SUPINE_ERROR_UNSUPPORTED);
-  assert_int_equal(supine_deform_lit_batch(o.basis, 1, posed_batch(o.basis, 1, o.weights, o.scales),
-                                           0, VERTICES, xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
   drop(&o);
   o = open_lit(8, SUPINE_SIMD_AUTO);

@@ -138,14 +138,11 @@ static void use_all(const supine_basis *basis, float *xyz) {
   scales[0] = scales[1] = 0.5;
   supine_deform(basis, POSED(basis, weights, scales), xyz);
   supine_deform_range(basis, POSED(basis, weights, scales), 3, n - 1, xyz);
-  supine_deform_separate(basis, POSED(basis, weights, scales), 0, n, xyz, xyz + n, xyz + 2 * n);
   supine_displace_range(basis, POSED(basis, weights, scales), 0, n, xyz + 3 * n);
   supine_deform_batch(basis, 1, posed_batch(basis, 1, weights, scales), 0, n, xyz);
   supine_step(n, xyz + 3 * n, xyz);
   supine_normals(basis, xyz, xyz + 3 * n);
   (void)supine_deform_lit(basis, POSED(basis, weights, scales), xyz, xyz + 3 * n);
-  (void)supine_deform_lit_batch(basis, 1, posed_batch(basis, 1, weights, scales), 0, n, xyz,
-                                xyz + 3 * n);
   (void)supine_gl_pack(basis, 0, n, xyz);
   (void)supine_gl_weights(basis, POSED(basis, weights, scales), xyz, xyz + n);
   (void)supine_gl_pack_normals(basis, 0, n, (uint32_t *)(void *)xyz);

@@ -76,7 +76,7 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
 }
 
 /* The constants for which the compiler specialises a loop. If `modes` is not 0, the loop evaluates
- * that number of modes and writes positions into one array. */
+ * that number of modes and writes positions. */
 typedef struct form {
   supine_storage storage;
   size_t modes; /* 0: any number */
@@ -181,8 +181,8 @@ typedef struct writer {
   bool stream;
 } writer;
 
-INLINE writer writer_open(float *to, const supine_target *target) {
-  return (writer){to, target->stream};
+INLINE writer writer_open(const supine_target *target) {
+  return (writer){target->xyz, target->stream};
 }
 
 INLINE void writer_put(writer *w, vf v) {
@@ -199,21 +199,9 @@ INLINE void writer_close(const writer *w, const supine_target *target) {
 }
 #endif
 
-/* SEPARATE(a) is coordinate a of the vertices in three pieces of x y z x y z ... */
-#define FROM_01(a, i) ((3 * (i) + (a)) % (2 * LANES))
-#define FROM_2(a, i) (3 * (i) + (a) < 2 * LANES ? (i) : 3 * (i) + (a)-LANES)
-#define SEPARATE(a)                                                                                \
-  __builtin_shufflevector(__builtin_shufflevector(t->v[3 * q], t->v[3 * q + 1], EACH(FROM_01, a)), \
-                          t->v[3 * q + 2], EACH(FROM_2, a))
-
-INLINE void put_tile(writer *out, const triples *t, bool joined) {
-  for (size_t j = 0; j < PIECES && joined; ++j) {
-    writer_put(&out[0], t->v[j]);
-  }
-  for (size_t q = 0; q < GROUPS && !joined; ++q) {
-    writer_put(&out[0], SEPARATE(0));
-    writer_put(&out[1], SEPARATE(1));
-    writer_put(&out[2], SEPARATE(2));
+INLINE void put_tile(writer *out, const triples *t) {
+  for (size_t j = 0; j < PIECES; ++j) {
+    writer_put(out, t->v[j]);
   }
 }
 
@@ -242,7 +230,6 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
 INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t first, size_t count,
                          const supine_target *target, form f) {
   const bool rest = f.modes > 0 || target->rest;
-  const bool joined = f.modes > 0 || target->y == NULL;
   supine_tiles tiles = *any;
   if (f.modes > 0) {
     supine_tiles_layout(&tiles, f.storage, f.modes, f.vector, any->count);
@@ -251,8 +238,7 @@ INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t fi
   const float *g = folded + tiles.modes;
 #define GAIN(j, i) g[AXIS(j, i)]
   const vf gain[3] = {{EACH(GAIN, 0)}, {EACH(GAIN, 1)}, {EACH(GAIN, 2)}};
-  writer out[3] = {writer_open(target->x, target), writer_open(target->y, target),
-                   writer_open(target->z, target)}; /* joined: the first alone */
+  writer out = writer_open(target);
   weights w = {.at = folded};
   for (size_t k = 0; k < KNOWN_MODES; ++k) {
     w.v[k] = splat(k < f.modes ? folded[k] : 0);
@@ -260,10 +246,10 @@ INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t fi
   for (size_t t = 0; t < count; ++t, tile += tiles.stride) {
     supine_prefetch_tile(tile, tiles.stride, target->prefetch);
     const triples xyz = deform_tile(&tiles, tile, &w, gain, rest, f);
-    put_tile(out, &xyz, joined);
+    put_tile(&out, &xyz);
   }
-  for (size_t a = 0; a < (joined ? 1 : 3) && count > 0; ++a) {
-    writer_close(&out[a], target);
+  if (count > 0) {
+    writer_close(&out, target);
   }
 }
 
@@ -291,7 +277,7 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_
 
 static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
                    const supine_target *target) {
-  const bool registers = LANES == 16 && target->rest && target->y == NULL;
+  const bool registers = LANES == 16 && target->rest;
   if (registers && tiles->modes == 4) { /* as bases of the default law have */
     deform_storage(tiles, folded, first, count, target, 4);
   } else if (registers && tiles->modes == KNOWN_MODES) {
@@ -318,7 +304,7 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
                         const supine_target *target, size_t words) {
   const size_t axis_bytes = 64 * words;
   const unsigned char *tile = tiles->bytes + first * 3 * axis_bytes;
-  writer out = writer_open(target->x, target);
+  writer out = writer_open(target);
   for (size_t t = 0; t < count; ++t, tile += 3 * axis_bytes) {
     row n[3];
     supine_prefetch_tile(tile, 3 * axis_bytes, target->prefetch);
@@ -338,7 +324,7 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
       }
     }
     const triples xyz = interleave(&n[0], &n[1], &n[2]);
-    put_tile(&out, &xyz, true);
+    put_tile(&out, &xyz);
   }
   if (count > 0) {
     writer_close(&out, target);

@@ -17,8 +17,8 @@ typedef struct writer {
   bool shared; /* the next line begins with numbers that are not part of the array */
 } writer;
 
-static inline __attribute__((always_inline)) writer writer_open(float *to,
-                                                                const supine_target *target) {
+static inline __attribute__((always_inline)) writer writer_open(const supine_target *target) {
+  float *to = target->xyz;
   const bool resume = target->held != NULL && target->continues;
   const size_t offset = (uintptr_t)to / sizeof *to % 16;
   const __m512i count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);

@@ -114,10 +114,9 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
   }
 }
 
-/** Where and how a kernel writes: into one array of triples (x, with y NULL) or into three arrays.
- */
+/** Where and how a kernel writes. */
 typedef struct supine_target {
-  float *x, *y, *z;
+  float *xyz;  /**< [16 tiles, 3] */
   bool rest;   /**< write positions; false: displacements */
   bool stream; /**< use stores that bypass the caches */
   supine_prefetch prefetch;

@@ -69,8 +69,9 @@ supine_status supine_safetensors_verify(const supine_safetensors *file, supine_e
                             file->name);
   }
   char found[CHECKSUM_SIZE];
-  supine_safetensors_checksum_text(stated, file->tensors, file->tensor_count, file->metadata,
-                                   file->metadata_count, found);
+  (void)snprintf(found, sizeof found, CHECKSUM_FORMAT,
+                 supine_safetensors_checksum(file->tensors, file->tensor_count, file->metadata,
+                                             file->metadata_count));
   return strcmp(stated, found) == 0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,

@@ -4,13 +4,15 @@
 #ifndef SUPINE_SAFETENSORS_FILE_H
 #define SUPINE_SAFETENSORS_FILE_H
 
+#include <inttypes.h>
 #include <stdbool.h>
 
 #include <supine/safetensors.h>
 
 #include "runtime/safetensors/platform.h"
 
-/** Bytes of a stated checksum, with its NUL. */
+/** How the metadata "checksum" states a checksum: format, and bytes with the NUL. */
+#define CHECKSUM_FORMAT "xxh64:%016" PRIx64
 enum { CHECKSUM_SIZE = 23 };
 
 struct supine_safetensors {
@@ -39,11 +41,8 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size);
  * @retval SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
 supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *error);
 
-/** Compute the text that metadata "checksum" must hold. If `stated` is NULL or begins with
- * "xxh64:", this is "xxh64:" and 16 hexadecimal digits; else the 16 digits of a file of version 1.
- */
-void supine_safetensors_checksum_text(const char *stated, const supine_tensor *tensors,
-                                      size_t tensor_count, const supine_metadata *metadata,
-                                      size_t metadata_count, char text[CHECKSUM_SIZE]);
+/** Compute the checksum that supine/safetensors.h describes. */
+uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
+                                     const supine_metadata *metadata, size_t metadata_count);
 
 #endif

@@ -141,8 +141,8 @@ supine_status supine_safetensors_write(FILE *file, const char *name, const supin
   if (status != SUPINE_OK) {
     return status;
   }
-  supine_safetensors_checksum_text(NULL, tensors, tensor_count, metadata, metadata_count,
-                                   c.checksum);
+  (void)snprintf(c.checksum, sizeof c.checksum, CHECKSUM_FORMAT,
+                 supine_safetensors_checksum(tensors, tensor_count, metadata, metadata_count));
   const uint64_t length = (put_header(&c, NULL) + 7) / 8 * 8;
   (void)fwrite(&length, sizeof length, 1, file);
   const size_t written = put_header(&c, file);

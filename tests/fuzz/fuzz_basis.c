@@ -64,11 +64,10 @@ static bool state_checksum(uint8_t *bytes, size_t size) {
   }
   const char *stated = supine_safetensors_metadata(file, "checksum");
   const size_t length = stated == NULL ? 0 : strlen(stated);
-  char text[CHECKSUM_SIZE] = "";
-  if (stated != NULL) {
-    supine_safetensors_checksum_text(stated, file->tensors, file->tensor_count, file->metadata,
-                                     file->metadata_count, text);
-  }
+  char text[CHECKSUM_SIZE];
+  (void)snprintf(text, sizeof text, CHECKSUM_FORMAT,
+                 supine_safetensors_checksum(file->tensors, file->tensor_count, file->metadata,
+                                             file->metadata_count));
   uint8_t *place =
       length == 0 || length != strlen(text) ? NULL : memmem(bytes, size, stated, length);
   if (place != NULL) {

@@ -109,17 +109,6 @@ SUPINE_API supine_status supine_breath_curve_evaluate(const supine_pv_curve *cur
                                                       const double *pressures, double *volumes,
                                                       double *compliances, supine_error *error);
 
-/** Compute the pressure P(V), the inverse of supine_breath_curve_evaluate; it exists for every
- * limb.
- *
- * @param volumes    [count] mL within the limb's range, in any order
- * @param pressures  [count] cmH2O, written
- * @retval SUPINE_ERROR_ARGUMENT   a volume outside the range, or not finite; a bad curve
- * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
-SUPINE_API supine_status supine_breath_invert(const supine_pv_curve *curve, size_t count,
-                                              const double *volumes, double *pressures,
-                                              supine_error *error);
-
 /** The course of pressure from rest to its peak and back. */
 typedef enum supine_pv_course {
   SUPINE_PV_COSINE = 0,    /**< half a cosine each way: quiet breathing */

@@ -102,8 +102,8 @@ enum { SUPINE_SLABS_MAX = 64 };
  *
  * The part of the surface is exact, so that the slabs of a lung sum to the volume that it gains. A
  * cut inside the lung has no vertices: after the breath it is the fan of triangles from the mean of
- * its outline to its outline. This is exact for displacements that are linear in position: the gains
- * are 0 for a rotation, and gain / volume is the same in all slabs for a uniform expansion.
+ * its outline to its outline. This is exact for displacements that are linear in position: the
+ * gains are 0 for a rotation, and gain / volume is the same in all slabs for a uniform expansion.
  *
  * @param gravity  [3], any length but 0
  * @param from     [N, 3] positions before the breath; NULL: the reference surface

@@ -245,10 +245,6 @@ SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose
 SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose *pose,
                                     size_t begin, size_t end, float *xyz);
 
-/** Compute supine_deform_range into three arrays [end - begin]. */
-SUPINE_API void supine_deform_separate(const supine_basis *basis, const supine_pose *pose,
-                                       size_t begin, size_t end, float *x, float *y, float *z);
-
 /** Compute supine_deform_range for many poses at once, at about the speed of a matrix product, as
  * each vertex is read from memory only once.
  *
@@ -306,11 +302,6 @@ SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supi
 SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, const supine_pose *pose,
                                                  size_t begin, size_t end, float *xyz,
                                                  float *normals);
-
-/** Compute supine_deform_batch and normals [count, end - begin, 3]. */
-SUPINE_API supine_status supine_deform_lit_batch(const supine_basis *basis, size_t count,
-                                                 const supine_pose *poses, size_t begin, size_t end,
-                                                 float *xyz, float *normals);
 
 /** Compute the unit normals of a deformed surface from its triangles: at each vertex the mean of
  * its triangles' normals, weighted by area.

@@ -6,8 +6,20 @@
  *     header    JSON: name -> {dtype, shape, data_offsets [begin, end)}, __metadata__ -> strings
  *     data      the tensors, one after the other without gaps
  *
- * Files that Supine writes have a checksum of names, shapes, numbers and metadata in the metadata
- * key "checksum". */
+ * Files that Supine writes have the metadata "checksum", which does not depend on the layout of the
+ * file. It detects accidents, not forgery. It is the sum, modulo 2^64, over
+ *
+ *     tensors   h(data, h("F32 [20000,3]", h(name, 0)))    with the element type and shape as text
+ *     metadata  h(value, h(key, 1))                        without the key "checksum"
+ *
+ * where h(bytes, seed) is XXH64, text is UTF-8 and numbers are little-endian. In Python, with
+ * `import xxhash`:
+ *
+ *     h = xxhash.xxh64_intdigest
+ *     total = sum(h(data, h(f"{dtype} [{','.join(map(str, shape))}]", h(name, 0)))
+ *                 for name, dtype, shape, data in tensors)
+ *     total += sum(h(value, h(key, 1)) for key, value in metadata if key != "checksum")
+ *     checksum = f"xxh64:{total % 2**64:016x}" */
 #ifndef SUPINE_SAFETENSORS_H
 #define SUPINE_SAFETENSORS_H
 
@@ -50,26 +62,6 @@ typedef struct supine_metadata {
   const char *value;
 } supine_metadata;
 
-/** Compute a 64-bit checksum that does not depend on the layout of the file: the sum, modulo 2^64,
- * over
- *
- *     tensors   h(data, h("F32 [20000,3]", h(name, 0)))    with the element type and shape as text
- *     metadata  h(value, h(key, 1))                        without the key "checksum"
- *
- * where h(bytes, seed) is XXH64, text is UTF-8 and numbers are little-endian. In Python, with
- * `import xxhash`:
- *
- *     h = xxhash.xxh64_intdigest
- *     total = sum(h(data, h(f"{dtype} [{','.join(map(str, shape))}]", h(name, 0)))
- *                 for name, dtype, shape, data in tensors)
- *     total += sum(h(value, h(key, 1)) for key, value in metadata if key != "checksum")
- *     checksum = f"xxh64:{total % 2**64:016x}"
- *
- * It detects accidents, not forgery. Cost: one pass at about the speed of memory. */
-SUPINE_API uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
-                                                const supine_metadata *metadata,
-                                                size_t metadata_count);
-
 /** An open file. */
 typedef struct supine_safetensors supine_safetensors;
 
@@ -102,8 +94,7 @@ SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *fil
 SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
                                                                   size_t *count);
 
-/** Check the content against the metadata "checksum": "xxh64:" and 16 hexadecimal digits; in basis
- * files of version 1, only the 16 digits, of another hash.
+/** Check the content against the metadata "checksum". Cost: one pass at about the speed of memory.
  * @retval SUPINE_ERROR_FORMAT  the file states no checksum, or one that differs from its content's:
  *                              it is corrupted */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
