@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <jansson.h>
-
 #include "sh/base/output.h"
 #include "sh/base/vec3.h"
 
@@ -15,160 +13,100 @@
 
 /* Displacements of all names in all postures. */
 typedef struct comparison {
+  const supine_basis *basis;
   const supine_posture_list *postures;
   supine_command_names names;
+  float *step;    /* [N, 3] displacement of each vertex in one posture */
   double *moves;  /* [postures, names, 3] mm from the reference surface */
-  double *errors; /* [postures, postures, names] expected, mm RMS; 0 where they are not known */
+  double *errors; /* [names] expected errors between two postures, mm RMS; 0: unknown */
 } comparison;
 
-/* Compute the mean displacement of each name's vertices in one state. */
-static supine_status find_moves(const supine_basis *basis, const supine_state *state,
-                                const supine_command_names *names, float *step, double *moves,
-                                supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  supine_pose pose;
-  const supine_status status = supine_basis_pose(basis, state, &pose, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  supine_displace_range(basis, &pose, 0, info->vertex_count, step);
-  for (size_t begin = 0; begin < info->vertex_count;) { /* a name's vertices follow each other */
+/* Average `width` numbers of each vertex over the vertices of each name. */
+static void average(const comparison *c, size_t width, const float *values, double *mean) {
+  const supine_command_names *names = &c->names;
+  const size_t n = supine_basis_get_info(c->basis)->vertex_count;
+  for (size_t begin = 0; begin < n;) { /* in this order a name's vertices follow each other */
     const size_t name = names->part[names->order[begin]];
-    double sum[3] = {0.0, 0.0, 0.0};
     size_t end = begin;
-    for (; end < info->vertex_count && names->part[names->order[end]] == name; ++end) {
-      for (size_t k = 0; k < 3; ++k) {
-        sum[k] += (double)step[3 * names->order[end] + k];
-      }
+    while (end < n && names->part[names->order[end]] == name) {
+      ++end;
     }
-    for (size_t k = 0; k < 3; ++k) {
-      moves[3 * name + k] = sum[k] / (double)(end - begin);
+    for (size_t k = 0; k < width; ++k) {
+      double sum = 0.0;
+      for (size_t i = begin; i < end; ++i) {
+        sum += (double)values[width * names->order[i] + k];
+      }
+      mean[width * name + k] = sum / (double)(end - begin);
     }
     begin = end;
   }
-  return SUPINE_OK;
+}
+
+/* Compute the mean displacement of each name's vertices in posture i. */
+static supine_status find_moves(const comparison *c, const supine_state *state, size_t i,
+                                supine_error *error) {
+  supine_pose pose;
+  const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
+  if (status == SUPINE_OK) {
+    supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
+                          c->step);
+    average(c, 3, c->step, c->moves + 3 * i * c->names.count);
+  }
+  return status;
 }
 
 /* Compute the root mean square of the expected errors of each name's vertices. */
-static supine_status find_errors(const supine_basis *basis, const supine_state *to,
-                                 const supine_state *from, const supine_command_names *names,
-                                 double *errors, supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
+static supine_status find_errors(const comparison *c, const supine_state *to,
+                                 const supine_state *from, supine_error *error) {
+  const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   supine_expected expected = {0};
-  const supine_status status = supine_options_expected_find(basis, to, from, &expected, error);
-  for (size_t begin = 0; expected.sigma != NULL && begin < info->vertex_count;) {
-    const size_t name = names->part[names->order[begin]];
-    double sum = 0.0;
-    size_t end = begin;
-    for (; end < info->vertex_count && names->part[names->order[end]] == name; ++end) {
-      sum += pow((double)expected.sigma[names->order[end]], 2.0);
-    }
-    errors[name] = sqrt(sum / (double)(end - begin));
-    begin = end;
+  const supine_status status = supine_options_expected_find(c->basis, to, from, &expected, error);
+  for (size_t i = 0; i < n && expected.sigma != NULL; ++i) {
+    expected.sigma[i] *= expected.sigma[i];
+  }
+  if (expected.sigma != NULL) {
+    average(c, 1, expected.sigma, c->errors);
   }
   supine_options_expected_free(&expected);
   return status;
 }
 
-static double error_of(const comparison *c, size_t from, size_t to, size_t name) {
-  return c->errors[(from * c->postures->count + to) * c->names.count + name];
-}
-
-/* Compute the displacement from posture `from` to posture `to` and return its length. */
-static double move_between(const comparison *c, size_t from, size_t to, size_t name,
-                           double move[3]) {
-  for (size_t k = 0; k < 3; ++k) {
-    move[k] = c->moves[3 * (to * c->names.count + name) + k] -
-              c->moves[3 * (from * c->names.count + name) + k];
-  }
-  return supine_length(move);
-}
-
-static void print_table(const comparison *c, size_t from, size_t to) {
-  static const char *const ways[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
-  (void)printf("%s to %s:\n", supine_options_posture_label(c->postures->item[from].name),
-               supine_options_posture_label(c->postures->item[to].name));
+/* Add the displacements from one posture to another to a list, and write them to a CSV file where
+ * it is open. */
+static void add_pair(const comparison *c, size_t from, size_t to, json_t *list, FILE *csv) {
   for (size_t name = 0; name < c->names.count; ++name) {
-    double move[3];
-    const double length = move_between(c, from, to, name, move);
-    (void)printf("  %-16s moved %5.1f mm", c->names.text[name], length);
-    if (error_of(c, from, to, name) > 0.0) {
-      (void)printf(" (expected error %.1f)", error_of(c, from, to, name));
+    const char *const text[] = {c->postures->item[from].name, c->postures->item[to].name,
+                                c->names.text[name]};
+    const double *before = c->moves + 3 * (from * c->names.count + name);
+    const double *after = c->moves + 3 * (to * c->names.count + name);
+    const double move[3] = {after[0] - before[0], after[1] - before[1], after[2] - before[2]};
+    const double length = supine_length(move);
+    const double sigma = sqrt(c->errors[name]);
+    (void)json_array_append_new(list,
+                                json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from", text[0],
+                                          "to", text[1], "name", text[2], "move", move[0], move[1],
+                                          move[2], "mm", length, "expected_error_mm", sigma));
+    if (csv != NULL) {
+      (void)fprintf(csv, "%s,%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f\n", text[0], text[1], text[2], move[0],
+                    move[1], move[2], length, sigma);
     }
-    (void)putchar(':');
-    for (int k = 0; k < 3; ++k) {
-      (void)printf("%s %4.1f to the %s", k > 0 ? "," : "", fabs(move[k]), ways[k][move[k] > 0.0]);
-    }
-    (void)putchar('\n');
   }
 }
 
-static void write_csv(const comparison *c, size_t from, size_t to, FILE *file) {
-  for (size_t name = 0; name < c->names.count; ++name) {
-    double move[3];
-    const double length = move_between(c, from, to, name, move);
-    (void)fprintf(file, "%s,%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f\n", c->postures->item[from].name,
-                  c->postures->item[to].name, c->names.text[name], move[0], move[1], move[2],
-                  length, error_of(c, from, to, name));
+/* Compute the displacements between every two postures. */
+static supine_status find_pairs(const comparison *c, const supine_state *volume, json_t *list,
+                                FILE *csv, supine_error *error) {
+  supine_state state[SUPINE_POSTURE_LIST_MAX];
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < c->postures->count && status == SUPINE_OK; ++i) {
+    state[i] = *volume;
+    memcpy(state[i].gravity, c->postures->item[i].gravity, sizeof state[i].gravity);
+    status = find_moves(c, &state[i], i, error);
   }
-}
-
-static bool add_json(const comparison *c, size_t from, size_t to, json_t *list) {
-  for (size_t name = 0; name < c->names.count; ++name) {
-    double move[3];
-    const double length = move_between(c, from, to, name, move);
-    if (json_array_append_new(
-            list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from",
-                            c->postures->item[from].name, "to", c->postures->item[to].name, "name",
-                            c->names.text[name], "move", move[0], move[1], move[2], "mm", length,
-                            "expected_error_mm", error_of(c, from, to, name))) != 0) {
-      return false;
-    }
-  }
-  return true;
-}
-
-/* Write the displacements between every two postures to `csv`; else add them to `list`; else print
- * a table. */
-static supine_status write_pairs(const comparison *c, json_t *list, FILE *csv) {
-  if (csv != NULL) {
-    (void)fputs("from,to,name,dx,dy,dz,moved_mm,expected_error_mm\n", csv);
-  }
-  for (size_t from = 0; from < c->postures->count; ++from) {
-    for (size_t to = from + 1; to < c->postures->count; ++to) {
-      if (csv != NULL) {
-        write_csv(c, from, to, csv);
-      } else if (list == NULL) {
-        print_table(c, from, to);
-      } else if (!add_json(c, from, to, list)) {
-        return SUPINE_ERROR_MEMORY;
-      }
-    }
-  }
-  return SUPINE_OK;
-}
-
-static supine_status write_all(const comparison *c, bool json, const char *csv,
-                               supine_error *error) {
-  supine_output output = {0};
-  json_t *list = json ? json_array() : NULL;
-  supine_status status = json && list == NULL ? SUPINE_ERROR_MEMORY : write_pairs(c, list, NULL);
-  if (!json) {
-    (void)puts("Expected error: " SUPINE_EXPECTED_MEANING ".\n" SUPINE_EXPECTED_SUPPORT);
-  }
-  if (status == SUPINE_OK && json) {
-    status = json_dumpf(list, stdout, JSON_INDENT(2)) == 0 ? SUPINE_OK : SUPINE_ERROR_WRITE;
-    (void)putchar('\n');
-  }
-  json_decref(list);
-  if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "cannot print JSON");
-  }
-  if (csv != NULL) {
-    status = supine_output_open(csv, &output, error);
-    if (status == SUPINE_OK) {
-      (void)write_pairs(c, NULL, output.file);
-      status = supine_output_commit(&output, error);
+  for (size_t i = 0; i < c->postures->count; ++i) {
+    for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
+      status = find_errors(c, &state[j], &state[i], error);
+      add_pair(c, i, j, list, csv);
     }
   }
   return status;
@@ -179,32 +117,36 @@ supine_status supine_command_compare_content(const supine_basis *basis,
                                              const supine_state *volume, bool json, const char *csv,
                                              supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  comparison c = {.postures = postures};
+  comparison c = {.basis = basis, .postures = postures};
+  supine_output output = {0};
+  json_t *list = json_array();
   supine_status status = supine_command_names_open(basis, &c.names, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  float *step = malloc(3 * n * sizeof *step);
-  c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
-  c.errors = calloc(postures->count * postures->count * c.names.count, sizeof *c.errors);
-  if (step == NULL || c.moves == NULL || c.errors == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
-  }
-  for (size_t i = 0; i < postures->count && status == SUPINE_OK; ++i) {
-    supine_state state = *volume;
-    memcpy(state.gravity, postures->item[i].gravity, sizeof state.gravity);
-    status = find_moves(basis, &state, &c.names, step, c.moves + 3 * i * c.names.count, error);
-    for (size_t j = i + 1; j < postures->count && status == SUPINE_OK; ++j) {
-      supine_state other = *volume;
-      memcpy(other.gravity, postures->item[j].gravity, sizeof other.gravity);
-      status = find_errors(basis, &other, &state, &c.names,
-                           c.errors + (i * postures->count + j) * c.names.count, error);
-    }
+  if (status == SUPINE_OK && csv != NULL) {
+    status = supine_output_open(csv, &output, error);
   }
   if (status == SUPINE_OK) {
-    status = write_all(&c, json, csv, error);
+    c.step = malloc(3 * n * sizeof *c.step);
+    c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
+    c.errors = calloc(c.names.count, sizeof *c.errors);
+    if (c.step == NULL || c.moves == NULL || c.errors == NULL) {
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+    }
   }
-  free(step);
+  if (status == SUPINE_OK && csv != NULL) {
+    (void)fputs("from,to,name,dx,dy,dz,moved_mm,expected_error_mm\n", output.file);
+  }
+  if (status == SUPINE_OK) {
+    status = find_pairs(&c, volume, list, output.file, error);
+  }
+  if (status == SUPINE_OK) {
+    supine_options_print(json_incref(list), json);
+  }
+  if (status == SUPINE_OK && csv != NULL) {
+    status = supine_output_commit(&output, error);
+  }
+  supine_output_abandon(&output);
+  json_decref(list);
+  free(c.step);
   free(c.moves);
   free(c.errors);
   supine_command_names_close(&c.names);

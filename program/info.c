@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <jansson.h>
-
 #include "sh/base/findings.h"
 #include "sh/base/text.h"
 
@@ -36,220 +34,22 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
   return SUPINE_OK;
 }
 
-static const char *const shown[] = {"assumed",
-                                    "patient",
-                                    "scanned",
-                                    "resting_shares",
-                                    "law",
-                                    "force",
-                                    "direction",
-                                    "direction_constants",
-                                    "stiffness",
-                                    "midline_mm",
-                                    "reference_volume_ml",
-                                    "lung_share",
-                                    "lesions",
-                                    "reach_mm",
-                                    "made_by"};
+/* Metadata that is printed as it stands. */
+static const char *const facts[] = {"content",        "assumed",
+                                    "patient",        "scanned",
+                                    "resting_shares", "law",
+                                    "force",          "direction",
+                                    "stiffness",      "direction_constants",
+                                    "midline_mm",     "reference_volume_ml",
+                                    "lung_share",     "lesions",
+                                    "reach_mm",       "made_by",
+                                    "error_method",   "turned_over_percent"};
+/* Metadata that is printed in the object "error", without "error_". */
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rest_part",
                                      "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
-static const char *const error_lists[] = {"error_harmonics", "error_modes"};
 
-static const char turned_over[] = "turned_over_percent";
-
-static const char *text_or(const supine_basis *basis, const char *key, const char *missing) {
-  const char *value = supine_basis_metadata(basis, key);
-  return value != NULL ? value : missing;
-}
-
-static const char *text_of(const supine_basis *basis, const char *key) {
-  return text_or(basis, key, "?");
-}
-
-/* Describe the state for which errors are given in mm. */
-static void state_words(const supine_basis *basis, char *words, size_t size) {
-  const char *part = supine_basis_metadata(basis, "error_rest_part");
-  const char *volume = supine_basis_metadata(basis, "error_volume_ml");
-  if (part != NULL && strcmp(part, "1") != 0) {
-    (void)snprintf(words, size, "at %s of the way to rest", part);
-  } else if (volume != NULL) {
-    (void)snprintf(words, size, "at %s mL", volume);
-  } else {
-    (void)snprintf(words, size, part != NULL ? "at rest" : "of the fields as given");
-  }
-}
-
-/* Print how many embedded vertices lie in each lung, and how deep. */
-static void print_content(const supine_basis *basis, const char *content) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const supine_tensor *tensor = supine_basis_tensor(basis, "depth");
-  const bool well = tensor != NULL && tensor->dtype == SUPINE_F32 && tensor->rank == 1 &&
-                    tensor->shape[0] == info->vertex_count;
-  const float *depth = well ? tensor->data : NULL;
-  size_t outside = 0;
-  (void)printf("  %zu %s", info->vertex_count,
-               strcmp(content, "grid") == 0   ? "nodes"
-               : strcmp(content, "mesh") == 0 ? "vertices and points"
-                                              : "points");
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    (void)printf("%s%zu %s", lung == 0 ? ": " : ", ",
-                 info->lung_begin[lung + 1] - info->lung_begin[lung], info->lung_names[lung]);
-  }
-  for (size_t i = 0; depth != NULL && i < info->vertex_count; ++i) {
-    outside += depth[i] < 0.0F;
-  }
-  if (depth != NULL) {
-    (void)printf("; %zu of them outside", outside);
-  }
-  (void)printf("; %zu triangles; %s\n", info->triangle_count,
-               info->has_volume ? "volumes are the lungs'" : "no volumes");
-  const supine_tensor *rigid = supine_basis_tensor(basis, "rigid");
-  if (rigid != NULL) {
-    (void)printf("  rigid parts, moved and turned, never deformed: %zu\n", rigid->shape[0]);
-  }
-}
-
-/* Print the expected error of a displacement from the scan to the default state, supine and prone.
- */
-static supine_status print_expected(const supine_basis *basis, supine_error *error) {
-  const supine_state scan = supine_basis_scan(basis);
-  supine_status status = SUPINE_OK;
-  bool first = true;
-  for (int prone = 0; prone < 2 && status != SUPINE_ERROR_MEMORY; ++prone) {
-    const supine_state state = {.gravity = {0.0, prone == 1 ? -1.0 : 1.0, 0.0},
-                                .volume = supine_basis_default_volume(basis)};
-    supine_expected expected = {0};
-    char text[160];
-    status = supine_options_expected_find(basis, &state, &scan, &expected, error);
-    if (status == SUPINE_OK && expected.largest > 0.0) {
-      (void)supine_state_describe(&state, text, sizeof text);
-      (void)printf("%s  %s, counted from the scan: ",
-                   first ? "\nExpected error, " SUPINE_EXPECTED_MEANING
-                           ".\n" SUPINE_EXPECTED_SUPPORT "\n"
-                         : "",
-                   text);
-      supine_options_expected_print(&expected, stdout);
-      first = false;
-    }
-    supine_options_expected_free(&expected);
-  }
-  return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK; /* others: no error is stated */
-}
-
-/* Print how the basis was made, and the findings about its input. */
-static void print_facts(const supine_basis *basis) {
-  for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
-    if (supine_basis_metadata(basis, shown[i]) != NULL) {
-      (void)printf("  %-20s %s\n", shown[i], supine_basis_metadata(basis, shown[i]));
-    }
-  }
-  const char *at = text_or(basis, "warnings", "");
-  size_t length;
-  for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
-    (void)printf("  %-20s %.*s\n", "warnings", (int)length, line);
-  }
-}
-
-static supine_status print_text(const char *path, const supine_basis *basis, const double *energy,
-                                supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const char *content = supine_basis_metadata(basis, "content");
-  char state[64];
-  state_words(basis, state, sizeof state);
-  (void)printf("%s: basis of %s%s%zu lung%s (%s), %s field\n", path, content != NULL ? content : "",
-               content != NULL ? " inside " : "", info->lung_count,
-               info->lung_count == 1 ? "" : "s", text_of(basis, "lungs"),
-               info->vector ? "vector" : "scalar");
-  if (content != NULL) {
-    print_content(basis, content);
-  } else {
-    (void)printf("  %zu vertices, %zu triangles, %s\n", info->vertex_count, info->triangle_count,
-                 info->has_volume ? "closed: volumes are exact" : "open: no volumes");
-  }
-  (void)printf(
-      "  %zu %s of band %zu: %zu multiplications and %zu additions per vertex at run time\n",
-      info->mode_count, strcmp(text_of(basis, "modes"), "harmonics") == 0 ? "harmonics" : "modes",
-      info->band, info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3),
-      info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 2));
-  print_facts(basis);
-  const supine_status status = print_expected(basis, error);
-  if (supine_basis_metadata(basis, "error_rms_percent") != NULL) {
-    (void)printf(
-        "\nCompression error%s against the full fields, on %s directions%s:\n"
-        "             RMS   95th percentile   largest\n"
-        "  %%   %10s   %15s   %7s   of the RMS displacement\n",
-        content != NULL ? " of the lungs' surface" : "", text_of(basis, "error_directions"),
-        supine_basis_metadata(basis, "error_method") != NULL ? ", each predicted from the others"
-                                                             : " that no grid used",
-        text_of(basis, "error_rms_percent"), text_of(basis, "error_p95_percent"),
-        text_of(basis, "error_max_percent"));
-    if (supine_basis_metadata(basis, "error_rms_mm") != NULL) {
-      (void)printf("  mm  %10s   %15s   %7s   %s\n", text_of(basis, "error_rms_mm"),
-                   text_of(basis, "error_p95_mm"), text_of(basis, "error_max_mm"), state);
-    }
-  }
-  if (supine_basis_metadata(basis, turned_over) != NULL) {
-    (void)printf("\nTriangles that are turned over %s, in the worst of six postures: %s %%\n",
-                 state, text_of(basis, turned_over));
-  }
-  if (info->triangle_count == 0) {
-    return status; /* energy is defined on the surface */
-  }
-  (void)puts("\nEnergy per band:");
-  double odd = 0.0;
-  double even = 0.0;
-  for (size_t l = 0; l <= info->band; ++l) {
-    odd += l % 2 == 1 ? energy[l] : 0.0;
-    even += l % 2 == 0 && l > 0 ? energy[l] : 0.0;
-    if (energy[l] >= 5e-8) {
-      (void)printf("  l = %-3zu %10.5f %%\n", l, 100.0 * energy[l]);
-    }
-  }
-  (void)printf("  odd    %10.5f %%   even beyond l = 0: %.5f %%\n", 100.0 * odd, 100.0 * even);
-  return status;
-}
-
-static const double *error_list(const supine_basis *basis, const char *key, size_t *count) {
-  const supine_tensor *tensor = supine_basis_tensor(basis, key);
-  if (tensor == NULL || tensor->dtype != SUPINE_F64 || tensor->rank != 1) {
-    *count = 0;
-    return NULL;
-  }
-  *count = tensor->shape[0];
-  return tensor->data;
-}
-
-/* Print the error against the number of functions of orientation. */
-static void print_table(const supine_basis *basis) {
-  size_t bands;
-  size_t modes;
-  const double *harmonics = error_list(basis, error_lists[0], &bands);
-  const double *best = error_list(basis, error_lists[1], &modes);
-  if (harmonics == NULL || best == NULL) {
-    return;
-  }
-  (void)puts("\nRMS error against the number of multiplications:\n"
-             "             first harmonics     best modes");
-  for (size_t k = 1, l = 0; k <= modes || (l < bands && (l + 1) * (l + 1) <= 64); ++k) {
-    const bool square = l < bands && (l + 1) * (l + 1) == k;
-    if (square || k <= modes) {
-      (void)printf("  %4zu + 3  ", k);
-      if (square) {
-        (void)printf("  %8.3f %% (l <= %zu)", 100.0 * harmonics[l], l);
-        ++l;
-      } else {
-        (void)printf("%22s", "");
-      }
-      if (k <= modes) {
-        (void)printf("  %7.3f %%", 100.0 * best[k - 1]);
-      }
-      (void)putchar('\n');
-    }
-  }
-}
-
-/* Add a fact of the metadata, where the basis has it, as a number where it is one. */
+/* Add an entry of the metadata, where the basis has it; as a number where it is one. */
 static void add_fact(json_t *object, const char *name, const supine_basis *basis, const char *key) {
   const char *text = supine_basis_metadata(basis, key);
   double value;
@@ -268,41 +68,103 @@ static json_t *list_numbers(const double *values, size_t count) {
   return list;
 }
 
-/* Print JSON; a failure of standard output is reported when the command ends. */
-static void print_json(const char *path, const supine_basis *basis, const double *energy) {
+/* Add the number of embedded vertices in each lung, outside, and in rigid parts. */
+static void add_content(json_t *root, const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  json_t *error = json_object();
+  const supine_tensor *depth = supine_basis_tensor(basis, "depth");
+  const supine_tensor *rigid = supine_basis_tensor(basis, "rigid");
+  json_t *counts = json_object();
+  size_t outside = 0;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)json_object_set_new(
+        counts, info->lung_names[lung],
+        json_integer((json_int_t)(info->lung_begin[lung + 1] - info->lung_begin[lung])));
+  }
+  if (depth != NULL && depth->dtype == SUPINE_F32 && depth->rank == 1 &&
+      depth->shape[0] == info->vertex_count) {
+    for (size_t i = 0; i < info->vertex_count; ++i) {
+      outside += ((const float *)depth->data)[i] < 0.0F;
+    }
+    (void)json_object_set_new(counts, "outside", json_integer((json_int_t)outside));
+  }
+  if (rigid != NULL) {
+    (void)json_object_set_new(counts, "rigid_parts", json_integer((json_int_t)rigid->shape[0]));
+  }
+  (void)json_object_set_new(root, "embedded", counts);
+}
+
+/* Add the expected errors of displacements from the scan to the default state, supine and prone.
+ * @retval SUPINE_ERROR_MEMORY  other failures add nothing */
+static supine_status add_expected(json_t *root, const supine_basis *basis, supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  json_t *rows = json_array();
+  supine_status status = SUPINE_OK;
+  for (int prone = 0; prone < 2 && status != SUPINE_ERROR_MEMORY; ++prone) {
+    const supine_state state = {.gravity = {0.0, prone == 1 ? -1.0 : 1.0, 0.0},
+                                .volume = supine_basis_default_volume(basis)};
+    supine_expected expected = {0};
+    char text[160];
+    status = supine_options_expected_find(basis, &state, &scan, &expected, error);
+    if (status == SUPINE_OK && expected.largest > 0.0) {
+      (void)supine_state_describe(&state, text, sizeof text);
+      (void)json_array_append_new(rows, json_pack("{s:s, s:f, s:f, s:b}", "state", text, "rms_mm",
+                                                  expected.rms, "largest_mm", expected.largest,
+                                                  "extrapolated", (int)expected.turned));
+    }
+    supine_options_expected_free(&expected);
+  }
+  (void)json_object_set_new(root, "expected_error", rows);
+  return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK;
+}
+
+/* Add the error with the first 1, 4, 9, ... harmonics, or with the first 1, 2, ... modes. */
+static void add_errors(json_t *root, const supine_basis *basis, const char *key) {
+  const supine_tensor *tensor = supine_basis_tensor(basis, key);
+  const bool well = tensor != NULL && tensor->dtype == SUPINE_F64 && tensor->rank == 1;
+  (void)json_object_set_new(root, key,
+                            well ? list_numbers(tensor->data, tensor->shape[0]) : json_array());
+}
+
+static supine_status describe(const char *path, const supine_basis *basis, const double *energy,
+                              json_t **described, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t products = info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3);
+  const char *lungs = supine_basis_metadata(basis, "lungs");
+  const char *at = supine_basis_metadata(basis, "warnings");
+  json_t *of = json_object();
   json_t *warnings = json_array();
-  const char *at = text_or(basis, "warnings", "");
   size_t length;
-  for (size_t i = 0; i < sizeof errors / sizeof *errors; ++i) {
-    add_fact(error, errors[i] + strlen("error_"), basis, errors[i]);
-  }
-  for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
-    (void)json_array_append_new(warnings, json_stringn(line, length));
-  }
   char printable[PATH_MAX] = "";
   supine_text_add(printable, sizeof printable, "%s", path);
-  (void)supine_text_make_utf8(printable);
-  json_t *root = json_pack(
-      "{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:o, s:o, s:o}", "file", printable, "lungs",
-      text_of(basis, "lungs"), "vertices", (json_int_t)info->vertex_count, "triangles",
-      (json_int_t)info->triangle_count, "modes", (json_int_t)info->mode_count, "band",
-      (json_int_t)info->band, "lung_count", (json_int_t)info->lung_count, "has_volume",
-      (int)info->has_volume, "kind", info->vector ? "vector" : "scalar", "energy_per_band",
-      list_numbers(energy, info->band + 1), "error", error, "warnings", warnings);
-  for (size_t i = 0; i < sizeof shown / sizeof *shown; ++i) {
-    add_fact(root, shown[i], basis, shown[i]);
+  json_t *root =
+      json_pack("{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:I, s:I}", "file",
+                supine_text_make_utf8(printable), "lungs", lungs != NULL ? lungs : "?", "vertices",
+                (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
+                "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "lung_count",
+                (json_int_t)info->lung_count, "has_volume", (int)info->has_volume, "kind",
+                info->vector ? "vector" : "scalar", "multiplications", (json_int_t)products,
+                "additions", (json_int_t)(info->vector ? products : products - 1));
+  for (size_t i = 0; i < sizeof facts / sizeof *facts; ++i) {
+    add_fact(root, facts[i], basis, facts[i]);
   }
-  add_fact(root, turned_over, basis, turned_over);
-  for (size_t i = 0; i < 2; ++i) {
-    size_t count;
-    const double *values = error_list(basis, error_lists[i], &count);
-    (void)json_object_set_new(root, error_lists[i], list_numbers(values, count));
+  if (supine_basis_metadata(basis, "content") != NULL) {
+    add_content(root, basis);
   }
-  (void)json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
-  (void)putchar('\n');
-  json_decref(root);
+  for (const char *line; at != NULL && (line = supine_findings_next(&at, &length)) != NULL;) {
+    (void)json_array_append_new(warnings, json_stringn(line, length));
+  }
+  (void)json_object_set_new(root, "warnings", warnings);
+  for (size_t i = 0; i < sizeof errors / sizeof *errors; ++i) {
+    add_fact(of, errors[i] + strlen("error_"), basis, errors[i]);
+  }
+  (void)json_object_set_new(root, "error", of);
+  const supine_status status = add_expected(root, basis, error);
+  (void)json_object_set_new(root, "energy_per_band",
+                            list_numbers(energy, info->triangle_count > 0 ? info->band + 1 : 0));
+  add_errors(root, basis, "error_harmonics");
+  add_errors(root, basis, "error_modes");
+  *described = root;
+  return status;
 }
 
 typedef struct request {
@@ -317,16 +179,19 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const char *path = given->operand[0];
   supine_basis *basis = NULL;
   double *energy = NULL;
+  json_t *described = NULL;
   supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error);
   if (status == SUPINE_OK) {
     energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
     status = energy != NULL ? band_energy(basis, energy, error) : SUPINE_ERROR_MEMORY;
   }
-  if (status == SUPINE_OK && wanted->json) {
-    print_json(path, basis, energy);
-  } else if (status == SUPINE_OK) {
-    status = print_text(path, basis, energy, error);
-    print_table(basis);
+  if (status == SUPINE_OK) {
+    status = describe(path, basis, energy, &described, error);
+  }
+  if (status == SUPINE_OK) {
+    supine_options_print(described, wanted->json);
+  } else {
+    json_decref(described);
   }
   free(energy);
   supine_basis_close(basis);
@@ -338,13 +203,21 @@ const supine_command supine_command_info = {
     "describe a basis file and its accuracy",
     .usage = "BASIS [--json]",
     .about =
-        "Describes a basis file: lungs, functions of orientation, the model it was made with, and "
-        "its error against the full solve, measured on held-out directions.\n"
-        "\n"
-        "Energy per band is the share of the squared displacement, over the surface and all "
+        "Describes a basis file: its lungs, its functions of orientation, the model it was made "
+        "with, and its accuracy.",
+    .options = table,
+    .notes =
+        "multiplications and additions are counted per vertex at run time.\n"
+        "error is that of the compression against the full solve, on held-out directions: in "
+        "percent of the RMS displacement; in mm at the volume volume_ml, or at the share rest_part "
+        "of the way from full inflation to rest. error_harmonics lists it, as a share, for the "
+        "bands up to 0, 1, 2, ...; error_modes for the best 1, 2, 3, ... modes.\n"
+        "turned_over_percent counts the triangles that turn over in the worst of six postures.\n"
+        "expected_error is that of a displacement from the scan: " SUPINE_EXPECTED_MEANING
+        ". " SUPINE_EXPECTED_SUPPORT "\n"
+        "energy_per_band is the share of the squared displacement, over the surface and all "
         "orientations, that the harmonics of each band l carry. Odd bands change sign when gravity "
         "does; the even bands beyond l = 0 make prone differ from the exact reverse of supine.",
-    .options = table,
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

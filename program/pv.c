@@ -49,38 +49,6 @@ static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *r
                    report->rms, "rms_percent", report->rms_percent, "condition", report->condition);
 }
 
-static void print_json(const supine_pv *pv, const supine_pv_report *reports, double confidence) {
-  json_t *root = json_pack("{s:f}", "confidence", confidence);
-  for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    if (reports[limb].samples > 0) {
-      (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
-                                json_limb(&pv->limb[limb], &reports[limb]));
-    }
-  }
-  (void)json_dumpf(root, stdout, JSON_REAL_PRECISION(17));
-  (void)putchar('\n');
-  json_decref(root);
-}
-
-static void print_limb(const char *name, const supine_pv_curve *curve,
-                       const supine_pv_report *report) {
-  if (report->samples == 0) {
-    (void)printf("%s: no samples; the curve is the other limb's\n", name);
-    return;
-  }
-  (void)printf("%s: %zu samples, %g to %g cmH2O\n", name, report->samples, curve->pressure[0],
-               curve->pressure[1]);
-  (void)printf("  misfit     %.4g mL RMS, %.3g %% of the volume range\n", report->rms,
-               report->rms_percent);
-  (void)printf("  condition  %.3g\n", report->condition);
-  (void)printf("  V_low      %12.6g +- %.3g mL\n  V_high     %12.6g +- %.3g mL\n", curve->volume[0],
-               report->volume_interval[0], curve->volume[1], report->volume_interval[1]);
-  for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
-    (void)printf("  c%d         %12.6g +- %.3g\n", i + 1, curve->control[i],
-                 report->control_interval[i]);
-  }
-}
-
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
@@ -97,14 +65,14 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
                          supine_breath_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
     }
   }
-  if (chosen->json) {
-    print_json(&pv, reports, chosen->confidence);
-    return SUPINE_OK;
-  }
-  (void)printf("intervals at %g %% confidence\n", 100.0 * chosen->confidence);
+  json_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    print_limb(supine_breath_limb_name((supine_pv_limb)limb), &pv.limb[limb], &reports[limb]);
+    if (reports[limb].samples > 0) { /* else the curve is the other limb's */
+      (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
+                                json_limb(&pv.limb[limb], &reports[limb]));
+    }
   }
+  supine_options_print(root, chosen->json);
   return SUPINE_OK;
 }
 

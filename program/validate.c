@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <jansson.h>
-
 #include "sh/base/text.h"
 
 #include "program/options/surface_options.h"
@@ -89,79 +87,12 @@ static bool draws(const char *path) {
   return supine_text_ends_in(path, ".png");
 }
 
-static void print_distances(const char *title, const char *largest,
-                            const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]) {
-  (void)printf("%s, mm:\n  %-12s %7s %7s %7s %10s   explained\n", title, "", "mean", "RMS", "95 %",
-               largest);
-  for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
-    (void)printf("  %-12s %7.2f %7.2f %7.2f %10.2f", supine_patient_map_names[k], of[k].mean,
-                 of[k].rms, of[k].p95, of[k].largest);
-    if (isnan(of[k].explained)) {
-      (void)puts("         -");
-    } else {
-      (void)printf("   %7.1f %%\n", 100.0 * of[k].explained);
-    }
-  }
-  if (isnan(of[0].explained)) {
-    (void)puts("  nothing moved between the two states: there is nothing to explain");
-  }
-}
-
-static void print_line(const supine_command_subject *s) {
-  if (s->count < 2) {
-    return;
-  }
-  (void)puts("linearity in volume: breath scale by volume, and that nearest to each state\n"
-             "          mL    by volume    nearest    residual, mm RMS");
-  for (size_t i = 0; i < s->count; ++i) {
-    const supine_command_outcome *of = &s->outcome[i];
-    if (of->has_best) {
-      (void)printf("  %10.0f %12.3f %10.3f %12.2f   %s\n", of->millilitres,
-                   of->scale - s->from_scale, of->best_scale - s->from_scale, of->best_rms,
-                   s->state[i].path);
-    }
-  }
-  if (s->line_count > 1) {
-    (void)printf(
-        "a straight line from the start of motion differs from the %zu in one posture by up to "
-        "%.1f %% of the largest\n",
-        s->line_count, 100.0 * s->line_off);
-  } else {
-    (void)puts("no two states in one posture: no line can be fitted");
-  }
-}
-
-static void print_text(const supine_command_subject *s) {
-  bool points = false;
-  for (size_t i = 0; i < s->count; ++i) {
-    const supine_command_outcome *of = &s->outcome[i];
-    if (s->count > 1) {
-      (void)printf("%s%s%s\n", s->state[i].posture, s->state[i].posture[0] != '\0' ? ": " : "",
-                   s->state[i].path);
-    }
-    if (of->has_surface) {
-      print_distances("distance between the surfaces, both ways", "Hausdorff", of->surface);
-    }
-    if (of->has_points) {
-      print_distances("distance of the landmarks", "largest", of->points);
-      points = true;
-    }
-  }
-  print_line(s);
-  (void)puts("translation, rigid+scale and affine are fitted to the other state itself\n"
-             "for comparison, the paper: surfaces within 2 mm, constants within 1 %");
-  if (!points) {
-    (void)puts("a small distance between surfaces does not prove the motion inside: give "
-               "--landmarks to measure it");
-  }
-}
-
 static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]) {
   json_t *all = json_object();
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
                             "p95_mm", of[k].p95, "largest_mm", of[k].largest);
-    (void)json_object_set_new(row, "explained_percent",
+    (void)json_object_set_new(row, "explained_percent", /* unknown where nothing moved */
                               isnan(of[k].explained) ? json_null()
                                                      : json_real(100.0 * of[k].explained));
     (void)json_object_set_new(all, supine_patient_map_names[k], row);
@@ -171,14 +102,15 @@ static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]
 
 static json_t *encode_state(const supine_command_state *state,
                             const supine_command_outcome *outcome) {
-  json_t *root =
-      json_pack("{s:[f, f, f], s:f}", "gravity", state->state.gravity[0], state->state.gravity[1],
-                state->state.gravity[2], "scale", outcome->scale);
+  json_t *root = json_object();
   if (state->path != NULL) {
     char file[PATH_MAX] = "";
     supine_text_add(file, sizeof file, "%s", state->path);
     (void)json_object_set_new(root, "file", json_string(supine_text_make_utf8(file)));
   }
+  (void)json_object_update_new(root, json_pack("{s:[f, f, f], s:f}", "gravity",
+                                               state->state.gravity[0], state->state.gravity[1],
+                                               state->state.gravity[2], "scale", outcome->scale));
   if (outcome->has_millilitres) {
     (void)json_object_set_new(root, "volume_ml", json_real(outcome->millilitres));
   }
@@ -195,7 +127,7 @@ static json_t *encode_state(const supine_command_state *state,
   return root;
 }
 
-static void print_json(const supine_command_subject *s) {
+static void print(const supine_command_subject *s, bool json) {
   json_t *states = json_array();
   for (size_t i = 0; i < s->count; ++i) {
     (void)json_array_append_new(states, encode_state(&s->state[i], &s->outcome[i]));
@@ -208,9 +140,7 @@ static void print_json(const supine_command_subject *s) {
                                         "scale_per_litre", 1e3 * s->line_slope, "off_percent",
                                         100.0 * s->line_off));
   }
-  (void)json_dumpf(root, stdout, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
-  (void)putchar('\n');
-  json_decref(root);
+  supine_options_print(root, json);
 }
 
 /* Set the states: each gets a posture, and a volume or scale where one was given. */
@@ -305,7 +235,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     status = validate(wanted, &s, error);
   }
   if (status == SUPINE_OK) {
-    (wanted->json ? print_json : print_text)(&s);
+    print(&s, wanted->json);
   }
   supine_command_subject_free(&s);
   return status;
@@ -321,10 +251,21 @@ const supine_command supine_command_validate = {
              "explained, beside what no motion, a translation, a similarity and an affine map "
              "leave; and, of several states, how linear displacement is with volume.",
     .options = table,
-    .notes = "Examples:\n"
-             "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
-             "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
-             "      --state supine:full:full.ply --landmarks pairs.csv",
+    .notes =
+        "Distances are between the surfaces, both ways (largest: Hausdorff), and between the "
+        "landmarks. none is the distance without motion; translation, rigid+scale and affine "
+        "are fitted to the other state itself. explained is the part of the squared distance "
+        "without motion that is gone. A small distance between surfaces does not prove the "
+        "motion inside: landmarks measure it. Santhanam 2008 found surfaces within 2 mm, and "
+        "constants within 1 %.\n"
+        "With several states: nearest_scale is the breath scale that comes nearest to a "
+        "state's surface; off_percent is how far a straight line of scale over volume, through "
+        "the start of motion, misses those in one posture, in percent of the largest.\n"
+        "\n"
+        "Examples:\n"
+        "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
+        "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
+        "      --state supine:full:full.ply --landmarks pairs.csv",
     .operands_least = 1,
     .operands_most = 1,
     .operands_missing = "name one basis file (made by 'supine precompute')",

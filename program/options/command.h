@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include <jansson.h>
+
 #include <supine/status.h>
 
 #include "program/options/option.h"
@@ -38,6 +40,11 @@ int supine_options_fail(const char *command, supine_status status, const supine_
 
 /* Flush standard output; return SUPINE_EXIT_OUTPUT where the disk is full or the pipe closed. */
 int supine_options_finish(const char *command);
+
+/* Print an object, or a list of rows, to standard output, and release it: as JSON; or as text, with
+ * a line per member and a table per list of rows. A failed output is reported when the command
+ * ends. */
+void supine_options_print(json_t *value, bool json);
 
 /* Write the command line into `text` [size], for the metadata of a file; of each path only the part
  * after its last slash. */
