@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read observed points, and find them by name among the points that 'supine embed' made. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -86,30 +87,30 @@ supine_status supine_command_observed_load(const char *path, const supine_basis 
 }
 
 supine_status supine_command_observed_names(const char *path, const supine_basis *inside,
-                                            const supine_command_names *names,
-                                            supine_stream_sensor_list *list, supine_error *error) {
+                                            const supine_command_names *names, double noise,
+                                            supine_stream_sensors *sensors, supine_error *error) {
   const size_t n = supine_basis_get_info(inside)->vertex_count;
-  list->names = calloc(SUPINE_LOCATE_POINTS_MAX, sizeof *list->names);
-  list->vertices = calloc(SUPINE_LOCATE_POINTS_MAX, sizeof *list->vertices);
-  if (list->names == NULL || list->vertices == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-  }
   size_t count = 0;
   for (size_t i = 0; i < n; ++i) { /* the vertices of a name are contiguous */
     const uint32_t part = names->part[names->order[i]];
     const bool first = i == 0 || names->part[names->order[i - 1]] != part;
     const bool last = i + 1 == n || names->part[names->order[i + 1]] != part;
     if (first && last && count++ < SUPINE_LOCATE_POINTS_MAX) {
-      list->names[count - 1] = names->text[part];
-      list->vertices[count - 1] = names->order[i];
+      sensors->name[count - 1] = names->text[part];
+      sensors->last[count - 1] = (supine_observation){
+          .vertex = names->order[i], .position = {(double)NAN}, .noise = noise};
     }
   }
   if (count == 0 || count > SUPINE_LOCATE_POINTS_MAX) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points: give 1 to %d", path, count,
                             (int)SUPINE_LOCATE_POINTS_MAX);
   }
-  list->count = count;
-  return SUPINE_OK;
+  sensors->inside = inside;
+  sensors->count = count;
+  sensors->space = calloc(supine_locate_space(count), sizeof *sensors->space);
+  return sensors->space != NULL
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
 }
 
 void supine_command_observed_free(supine_command_observed *observed) {

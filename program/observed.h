@@ -22,14 +22,14 @@ supine_status supine_command_observed_load(const char *path, const supine_basis 
                                            const supine_command_names *names, double noise,
                                            supine_command_observed *observed, supine_error *error);
 
-/* List the names of single points, whose positions messages may set. The caller frees names and
- * vertices.
- * @param list  its `inside` set
+/* List the single points, whose positions messages may set, as not seen yet.
+ * @param noise    standard deviation of a coordinate, mm
+ * @param sensors  zeroed; the caller frees its space
  * @retval SUPINE_ERROR_FORMAT  none, or more than SUPINE_LOCATE_POINTS_MAX
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_observed_names(const char *path, const supine_basis *inside,
-                                            const supine_command_names *names,
-                                            supine_stream_sensor_list *list, supine_error *error);
+                                            const supine_command_names *names, double noise,
+                                            supine_stream_sensors *sensors, supine_error *error);
 
 void supine_command_observed_free(supine_command_observed *observed);
 

@@ -3,17 +3,16 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "program/breath/pv.h"
+#include "program/export/export.h"
 #include "program/inside.h"
 #include "program/observed.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
 #include "program/options/state_options.h"
 #include "program/stream/address.h"
-#include "program/stream/live_page.h"
-#include "program/stream/server.h"
+#include "program/stream/tracked_patient.h"
 #include "sh/base/output.h"
 
 static const char name[] = "stream";
@@ -128,15 +127,6 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
-/* Print the counts on a terminal, over the previous line. */
-static void show(void *context, supine_stream_server *server) {
-  const supine_stream_counts *counts = supine_stream_server_counts(server);
-  (void)context;
-  (void)fprintf(stderr, "\r%llu poses, %llu frames sent, %zu peers\033[K",
-                (unsigned long long)counts->poses, (unsigned long long)counts->sent,
-                counts->present);
-}
-
 static void report(const supine_stream_server *server, const request *wanted) {
   const supine_stream_counts *n = supine_stream_server_counts(server);
   if (wanted->points != NULL) {
@@ -173,32 +163,45 @@ static void report(const supine_stream_server *server, const request *wanted) {
 typedef struct observed_points {
   supine_basis *inside;
   supine_command_names names;
-  supine_stream_sensor_list list;
+  supine_stream_sensors sensors;
 } observed_points;
 
 static supine_status open_points(const supine_basis *basis, const request *wanted,
-                                 observed_points *points, supine_stream_sensors **sensors,
-                                 supine_error *error) {
-  if (wanted->points == NULL) {
-    return SUPINE_OK;
-  }
-  supine_status status =
+                                 observed_points *points, supine_error *error) {
+  points->sensors.ras = wanted->space == 1;
+  const supine_status status =
       supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error);
-  if (status == SUPINE_OK) {
-    points->list = (supine_stream_sensor_list){
-        .inside = points->inside, .noise = wanted->noise, .ras = wanted->space == 1};
-    status = supine_command_observed_names(wanted->points, points->inside, &points->names,
-                                           &points->list, error);
-  }
-  return status == SUPINE_OK ? supine_stream_sensors_create(&points->list, sensors, error) : status;
+  return status == SUPINE_OK
+             ? supine_command_observed_names(wanted->points, points->inside, &points->names,
+                                             wanted->noise, &points->sensors, error)
+             : status;
 }
 
-static void close_points(observed_points *points, supine_stream_sensors *sensors) {
-  supine_stream_sensors_destroy(sensors);
-  free(points->list.names);
-  free(points->list.vertices);
+static void close_points(observed_points *points) {
+  free(points->sensors.space);
   supine_command_names_close(&points->names);
   supine_basis_close(points->inside);
+}
+
+/* Make the page of a basis file; the caller frees it. */
+static supine_status make_page(const char *path, export_page *shown, char **page, size_t *size,
+                               supine_error *error) {
+  export_source source = {0};
+  supine_status status = supine_export_source_open(path, &source, error);
+  if (status == SUPINE_OK) {
+    status = supine_export_breath_set(&source, shown->breath.volume, 20.0, &shown->breath, error);
+  }
+  if (status == SUPINE_OK) {
+    FILE *file = open_memstream(page, size);
+    status =
+        file == NULL ? SUPINE_ERROR_MEMORY : supine_export_html_print(file, &source, shown, error);
+    const bool whole = file != NULL && ferror(file) == 0;
+    if ((file != NULL && fclose(file) != 0) || !whole) {
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the page");
+    }
+  }
+  supine_export_source_close(&source);
+  return status;
 }
 
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
@@ -215,11 +218,12 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
     status = supine_options_reference(basis, &wanted->from, true, &from, error);
   }
   if (status == SUPINE_OK) {
-    const export_page shown = {.breath.volume = wanted->breath.tidal,
-                               .from = &from.pose,
-                               .from_name = from.name,
-                               .title = "Lungs, live"};
-    status = supine_stream_live_page(path, &shown, page, &site.page_size, error);
+    export_page shown = {.breath.volume = wanted->breath.tidal,
+                         .from = &from.pose,
+                         .from_name = from.name,
+                         .title = "Lungs, live",
+                         .live = true};
+    status = make_page(path, &shown, page, &site.page_size, error);
   }
   if (status == SUPINE_OK) {
     site.address = address.host;
@@ -259,8 +263,9 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   observed_points points = {0};
   supine_status status = set_volume(wanted, &volume, error);
   options.volume = &volume;
-  if (status == SUPINE_OK) {
-    status = open_points(basis, wanted, &points, &options.sensors, error);
+  if (status == SUPINE_OK && wanted->points != NULL) {
+    status = open_points(basis, wanted, &points, error);
+    options.sensors = &points.sensors;
   }
   if (status == SUPINE_OK && wanted->replay != NULL) {
     status = supine_stream_poses_load(wanted->replay, &poses, error);
@@ -286,7 +291,6 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
     (void)fflush(stdout);
     supine_options_signals_catch(true);
     status = supine_stream_server_run(server, error);
-    (void)fputs(options.shown != NULL ? "\n" : "", stderr);
     report(server, wanted);
   }
   if (status == SUPINE_OK && wanted->record != NULL) {
@@ -296,7 +300,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   supine_stream_server_destroy(server);
   supine_stream_web_destroy(options.web);
   supine_stream_poses_free(&poses);
-  close_points(&points, options.sensors);
+  close_points(&points);
   free(page);
   return status;
 }
@@ -304,10 +308,8 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
 static void begin(void *chosen) {
   request *wanted = chosen;
   wanted->breath = supine_breath_default();
-  wanted->options = (supine_stream_options){.setup = supine_stream_setup_default(),
-                                            .warn = warn,
-                                            .stop = stop,
-                                            .shown = isatty(STDERR_FILENO) ? show : NULL};
+  wanted->options =
+      (supine_stream_options){.setup = supine_stream_setup_default(), .warn = warn, .stop = stop};
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
@@ -356,9 +358,9 @@ const supine_command supine_command_stream = {
     .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
     .about = "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
              "and sends the lungs in that pose to any number of peers. Poses are TRANSFORM, QTDATA "
-             "or POSITION messages, or those of a tilt sensor: an NDARRAY [3], the direction of "
-             "gravity, or a SENSOR [3], an accelerometer at rest. Only the newest pose counts: "
-             "nothing queues, and a slow peer misses frames without delaying the others. At the "
+             "or POSITION messages, or an NDARRAY [3], the direction of gravity that a tilt sensor "
+             "measures. Only the newest pose counts: nothing queues, and a slow peer misses frames "
+             "without delaying the others. At the "
              "end the time from a pose received to its frame sent is printed.",
     .options = table,
     .notes =

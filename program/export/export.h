@@ -113,6 +113,7 @@ typedef struct export_page {
   const export_source
       *inside;               /**< content of the same lungs, as in export_glb_options; NULL: none */
   const export_parts *parts; /**< names of the parts of `inside`; NULL without it */
+  bool live;                 /**< also show the states that the page's server sends (stream) */
 } export_page;
 
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a

@@ -325,8 +325,8 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
   find_units(&p);
   json_t *description = describe(&p);
   char *text = json_dumps(description, JSON_COMPACT);
-  json_t *data =
-      json_pack("{s:O, s:s}", "title", json_object_get(description, "title"), "basis", text);
+  json_t *data = json_pack("{s:O, s:s, s:b}", "title", json_object_get(description, "title"),
+                           "basis", text, "live", (int)shown->live);
   const supine_template page_template = {supine_export_assets, data, write_tensors, &p};
   supine_template_fill(&page_template, "page.html", file);
   free(text);

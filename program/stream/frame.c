@@ -1,13 +1,22 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute frames, and build their messages. */
+#include <endian.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <meshoptimizer.h>
+
 #include "program/stream/crc64.h"
 #include "program/stream/frame.h"
-#include "program/stream/strips.h"
+#include "sh/base/library.h"
 #include "sh/base/parallel.h"
+
+/* clang-format off */
+#define FUNCTIONS(EACH)                                                                            \
+  EACH(meshopt_, optimizeVertexCacheStrip) EACH(meshopt_, stripify) EACH(meshopt_, stripifyBound)
+/* clang-format on */
+static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
 /* PIECE: number of vertices whose positions, bytes and checksum are computed together, within the
  * L1 cache. GRAIN: least number of vertices for which a thread is worth starting. */
@@ -19,15 +28,50 @@ struct supine_stream_frames {
   char device[21];
   bool ras;
   uint64_t number;
-  supine_stream_strips triangles;
-  uint64_t triangles_crc;
-  uint64_t triangles_power, points_power; /* supine_stream_crc64_power of their sizes */
-  supine_stream_frame *unused;            /* list of frames without users */
+  uint32_t *strips;    /* big-endian: the number of corners of each triangle strip, its corners */
+  size_t strips_size;  /* bytes */
+  size_t strips_count; /* number of strips */
+  uint64_t strips_crc;
+  uint64_t strips_power, points_power; /* supine_stream_crc64_power of their sizes */
+  supine_stream_frame *unused;         /* list of frames without users */
 };
 
 const char *supine_stream_what_name(supine_stream_what what) {
   static const char *const names[] = {"weights", "points", "surface", "nothing"};
   return (size_t)what < SUPINE_STREAM_WHAT_COUNT ? names[what] : NULL;
+}
+
+/* Make strips of the triangles. Corners i, i + 1, i + 2 of a strip are a triangle, of the opposite
+ * orientation where i is odd, or two of them are equal. */
+static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
+  static const uint32_t restart = UINT32_MAX; /* separates strips */
+  const size_t corners = 3 * f->info->triangle_count;
+  const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  uint32_t *order = malloc(corners * sizeof *order);
+  f->strips = malloc((meshopt.stripifyBound(corners) + 1) * sizeof *f->strips);
+  if (order == NULL || f->strips == NULL) {
+    free(order);
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  meshopt.optimizeVertexCacheStrip(order, supine_basis_triangles(f->basis), corners,
+                                   f->info->vertex_count);
+  const size_t end =
+      1 + meshopt.stripify(f->strips + 1, order, corners, f->info->vertex_count, restart);
+  free(order);
+  for (size_t i = 1, head = 0; i <= end; ++i) {
+    if (i == end || f->strips[i] == restart) {
+      f->strips[head] = htobe32((uint32_t)(i - head - 1));
+      head = i;
+      ++f->strips_count;
+    } else {
+      f->strips[i] = htobe32(f->strips[i]);
+    }
+  }
+  f->strips_size = end * sizeof *f->strips;
+  return SUPINE_OK;
 }
 
 supine_status supine_stream_frames_create(const supine_basis *basis, const char *device, bool ras,
@@ -43,13 +87,13 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   f->points_power = supine_stream_crc64_power(12 * f->info->vertex_count);
   /* Compute the strips now: at the first request of a surface, their 0.1 s for a million triangles
    * would delay every peer. */
-  if (supine_stream_strips_make(supine_basis_triangles(basis), f->info->triangle_count,
-                                f->info->vertex_count, &f->triangles) != SUPINE_OK) {
-    free(f);
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  const supine_status status = make_strips(f, error);
+  if (status != SUPINE_OK) {
+    supine_stream_frames_destroy(f);
+    return status;
   }
-  f->triangles_crc = supine_stream_crc64(0, f->triangles.bytes, f->triangles.size);
-  f->triangles_power = supine_stream_crc64_power(f->triangles.size);
+  f->strips_crc = supine_stream_crc64(0, f->strips, f->strips_size);
+  f->strips_power = supine_stream_crc64_power(f->strips_size);
   *frames = f;
   return SUPINE_OK;
 }
@@ -65,7 +109,7 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
     free(frame->errors);
     free(frame);
   }
-  free(frames->triangles.bytes);
+  free(frames->strips);
   free(frames);
 }
 
@@ -203,8 +247,8 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
   unsigned char *body = parcel->front + SUPINE_STREAM_HEADER;
   const size_t size = weights ? put_weights(frames, &frame->moment, body)
                               : supine_stream_polydata_head(frames->info->vertex_count,
-                                                            triangles ? frames->triangles.count : 0,
-                                                            triangles ? frames->triangles.size : 0,
+                                                            triangles ? frames->strips_count : 0,
+                                                            triangles ? frames->strips_size : 0,
                                                             located ? 1 : 0, body);
   parcel->count = 0;
   parcel->size = 0;
@@ -215,8 +259,8 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
     crc = supine_stream_crc64_join(crc, frame->points_crc, frames->points_power);
   }
   if (!weights && triangles) {
-    add_piece(parcel, frames->triangles.bytes, frames->triangles.size);
-    crc = supine_stream_crc64_join(crc, frames->triangles_crc, frames->triangles_power);
+    add_piece(parcel, frames->strips, frames->strips_size);
+    crc = supine_stream_crc64_join(crc, frames->strips_crc, frames->strips_power);
   }
   if (located) {
     const size_t bytes = SUPINE_STREAM_ATTRIBUTE + 4 * frames->info->vertex_count;

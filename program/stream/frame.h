@@ -33,8 +33,9 @@ typedef struct supine_stream_moment {
   double volume;     /**< mL of all lungs together, gas and tissue */
   double above;      /**< mL above rest in the posture, or above the scan where rest is unknown */
   uint64_t stamp;    /**< time of the pose, as in headers */
-  double received;   /**< s of supine_clock_seconds, when the newest pose was received; < 0: neither
-                          pose nor volume since the previous frame */
+  double received;   /**< s of supine_clock_seconds, when the newest pose or volume was received;
+                          < 0: none since the previous frame */
+  double posed;      /**< the same of the newest pose; < 0: none */
   supine_pose pose;
   const supine_location *location; /**< NULL: no points were observed */
 } supine_stream_moment;

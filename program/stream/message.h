@@ -70,8 +70,8 @@ void supine_stream_message_point(const supine_stream_message *message, size_t po
 /** Return whether the type of a message is one of those that supine_stream_message_read reads. */
 int supine_stream_message_wanted(const supine_stream_header *header);
 
-/** Read a body: TRANSFORM, QTDATA, POSITION, POINT; NDARRAY [3] (the direction of gravity) or
- * SENSOR [3] (an accelerometer at rest, which shows the opposite direction), all of device `device`
+/** Read a body: TRANSFORM, QTDATA, POSITION, POINT; NDARRAY [3] (the direction of gravity), all of
+ * device `device`
  * (QTDATA: of that instrument; TRANSFORM and POINT also of other devices, as places); NDARRAY [1]
  * and STRING of device "VOLUME"; STRING of device "SEND". Numbers may be not-a-number.
  * @param device  NULL: any

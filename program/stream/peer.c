@@ -18,18 +18,16 @@ static const uint64_t body_most = 256u << 20;
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_what what, double now, supine_error *error) {
   const int yes = 1;
+  const unsigned patience = 20000; /* ms */
   unsigned char *body = malloc(SUPINE_STREAM_BODY_MAX);
   if (body == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
-  memset(peer, 0, sizeof *peer);
-  peer->socket = socket;
-  peer->connecting = connecting;
-  peer->took = peer->said = peer->heard = now;
-  peer->body = body;
-  peer->what = what;
+  (void)setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &patience, sizeof patience);
+  *peer = (supine_stream_peer){
+      .socket = socket, .connecting = connecting, .heard = now, .body = body, .what = what};
   return SUPINE_OK;
 }
 
@@ -105,7 +103,6 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
         return SUPINE_STREAM_DONE;
       }
       share -= (size_t)got;
-      peer->said = now;
     }
     if (peer->skip > 0) {
       peer->skip -= (uint64_t)got;
@@ -135,7 +132,7 @@ bool supine_stream_peer_ready(const supine_stream_peer *peer) {
 }
 
 bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
-                             supine_stream_frame *frame, double now) {
+                             supine_stream_frame *frame) {
   const bool triangles = peer->what == SUPINE_STREAM_SURFACE ||
                          (peer->what == SUPINE_STREAM_POINTS && !peer->knows_triangles);
   if (!supine_stream_frame_wrap(frames, frame, peer->what, triangles, &peer->parcel)) {
@@ -145,12 +142,11 @@ bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *fra
   peer->begun = frame->number;
   peer->frame = frame;
   peer->sent = 0;
-  peer->took = now;
   ++frame->users;
   return true;
 }
 
-supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer, double now) {
+supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer) {
   size_t share = 1u << 20;
   while (peer->sent < peer->parcel.size && share > 0) {
     struct iovec rest[SUPINE_STREAM_PIECES];
@@ -178,7 +174,6 @@ supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer, double n
     }
     peer->sent += (size_t)sent;
     share -= (size_t)sent;
-    peer->took = now;
   }
   return peer->sent == peer->parcel.size ? SUPINE_STREAM_DONE : SUPINE_STREAM_MORE;
 }

@@ -10,9 +10,8 @@
 #include "program/stream/message.h"
 
 typedef struct supine_stream_peer {
-  int socket;        /**< socket; -1: no peer */
-  bool connecting;   /**< not yet connected */
-  double took, said; /**< when the peer last received and last sent data, s of the clock */
+  int socket;      /**< socket; -1: no peer */
+  bool connecting; /**< not yet connected */
   /* received data */
   unsigned char raw[SUPINE_STREAM_HEADER];
   size_t got; /**< bytes received of the header, or where in_body of the body */
@@ -38,7 +37,8 @@ typedef enum supine_stream_outcome {
   SUPINE_STREAM_LOST      /**< the peer is gone, or sent something that is not a message */
 } supine_stream_outcome;
 
-/** Begin a peer, which owns the socket from then on.
+/** Begin a peer, which owns the socket from then on. The kernel closes the connection when the peer
+ * has read nothing of what was sent for 20 s.
  * @retval SUPINE_ERROR_MEMORY  the caller still owns the socket */
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_what what, double now, supine_error *error);
@@ -61,10 +61,10 @@ bool supine_stream_peer_ready(const supine_stream_peer *peer);
 
 /** Begin to send a frame; false where memory is short. */
 bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
-                             supine_stream_frame *frame, double now);
+                             supine_stream_frame *frame);
 
 /** Send as much as the socket accepts, up to 1 MiB, so that no peer delays the others.
  * `peer->frame` remains when the frame is sent; the caller releases it. */
-supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer, double now);
+supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer);
 
 #endif

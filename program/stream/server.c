@@ -34,7 +34,6 @@ struct supine_stream_server {
   supine_stream_address target;
   double connect_at; /* when to connect next, s of the clock; INFINITY: not */
   double accept_at;  /* when to accept peers again, s of the clock */
-  double shown;      /* when `shown` was last called, s of the clock */
   supine_stream_peer *connected;
   supine_stream_peer *peer;       /* [options->peers] */
   struct pollfd *polled;          /* [peers + 2] */
@@ -109,7 +108,6 @@ static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
     return;
   }
   peer->connecting = false;
-  peer->took = peer->said = s->woke;
   ++s->counts.peers;
 }
 
@@ -207,23 +205,42 @@ static bool make_frame(supine_stream_server *s) {
   return true;
 }
 
+static void add_latency(supine_stream_latency *latency, double seconds) {
+  const double last = SUPINE_STREAM_LATENCY_BINS - 1;
+  ++latency->bin[(size_t)fmin(last, fmax(0.0, 1e6 * seconds))];
+  ++latency->count;
+  latency->worst = fmax(latency->worst, seconds);
+}
+
+double supine_stream_latency_share(const supine_stream_latency *latency, double share) {
+  const double wanted = ceil(share * (double)latency->count);
+  double passed = 0.0;
+  for (size_t i = 0; i + 1 < SUPINE_STREAM_LATENCY_BINS; ++i) {
+    passed += (double)latency->bin[i];
+    if (passed >= wanted && passed > 0.0) {
+      return fmin(latency->worst, 1e-6 * (double)(i + 1));
+    }
+  }
+  return latency->worst;
+}
+
 /* Send a peer the newest frame where it is ready, or the rest of an older one. */
 static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (lagging(s, peer) && supine_stream_peer_ready(peer) &&
-      !supine_stream_peer_give(peer, s->frames, s->latest, s->woke)) {
+      !supine_stream_peer_give(peer, s->frames, s->latest)) {
     return false;
   }
   if (peer->frame == NULL) {
     return true;
   }
-  const supine_stream_outcome outcome = supine_stream_peer_send(peer, s->woke);
+  const supine_stream_outcome outcome = supine_stream_peer_send(peer);
   if (outcome == SUPINE_STREAM_LOST) {
     end_peer(s, peer);
   } else if (outcome == SUPINE_STREAM_DONE) {
     const double received = peer->frame->moment.received;
     if (received >= 0.0) {
-      supine_stream_latency_add(&s->latency[peer->what != SUPINE_STREAM_WEIGHTS],
-                                supine_clock_seconds() - received);
+      add_latency(&s->latency[peer->what != SUPINE_STREAM_WEIGHTS],
+                  supine_clock_seconds() - received);
     }
     ++s->counts.sent;
     supine_stream_frame_leave(s->frames, peer->frame);
@@ -244,27 +261,6 @@ static bool send_peers(supine_stream_server *s) {
     }
   }
   return true;
-}
-
-/* Drop peers that leave a message or frame unfinished for too long. */
-static void lose_stuck(supine_stream_server *s) {
-  const double patience = s->options->patience > 0.0 ? s->options->patience : 20.0;
-  for (size_t i = 0; i < s->options->peers; ++i) {
-    supine_stream_peer *peer = &s->peer[i];
-    if (peer->socket < 0) {
-      continue;
-    }
-    const bool takes = peer->frame != NULL || (lagging(s, peer) && !supine_stream_peer_ready(peer));
-    const bool says = peer->connecting || peer->got > 0 || peer->in_body || peer->skip > 0;
-    if ((takes && s->woke - peer->took > patience) || (says && s->woke - peer->said > patience)) {
-      if (!peer->connecting) {
-        ++s->counts.lost;
-        supine_stream_patient_warn(&s->patient, s->woke,
-                                   "a peer is lost: it has finished nothing for %.3g s", patience);
-      }
-      end_peer(s, peer);
-    }
-  }
 }
 
 /* Compute the timeout of poll. */
@@ -350,14 +346,9 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     s->woke = supine_clock_seconds();
     if (s->woke - asked >= asked_time) {
       asked = s->woke;
-      lose_stuck(s);
       if (options->stop(options->context)) {
         break;
       }
-    }
-    if (s->woke - s->shown >= 1.0 && options->shown != NULL) {
-      s->shown = s->woke;
-      options->shown(options->context, s);
     }
     if (s->woke >= s->connect_at) {
       connect_peer(s);
@@ -391,7 +382,7 @@ supine_status supine_stream_server_create(const supine_basis *basis,
   }
   s->patient = supine_stream_patient_begin(basis, options, &s->counts, now);
   s->connect_at = options->connect != NULL ? now : (double)INFINITY;
-  s->shown = s->woke = now;
+  s->woke = now;
   supine_stream_address here;
   supine_status status =
       supine_stream_frames_create(basis, options->name, options->ras, &s->frames, error);

@@ -7,9 +7,7 @@
 #ifndef SUPINE_STREAM_SERVER_H
 #define SUPINE_STREAM_SERVER_H
 
-#include "program/stream/breathing.h"
 #include "program/stream/gravity.h"
-#include "program/stream/latency.h"
 #include "program/stream/poses.h"
 #include "program/stream/sensors.h"
 #include "program/stream/web.h"
@@ -26,12 +24,25 @@ typedef struct supine_stream_counts {
   uint64_t frames;
   uint64_t sent;        /**< frames sent, to all peers together */
   uint64_t peers;       /**< peers accepted */
-  uint64_t lost;        /**< peers dropped: invalid messages, or no progress for too long */
+  uint64_t lost;        /**< peers dropped: invalid messages */
   uint64_t turned_away; /**< peers turned away: too many */
   size_t present;       /**< peers now */
 } supine_stream_counts;
 
+enum { SUPINE_STREAM_LATENCY_BINS = 65536 }; /**< of 1 us each; the last also counts longer ones */
+
+typedef struct supine_stream_latency {
+  uint64_t count;
+  double worst; /**< s */
+  uint32_t bin[SUPINE_STREAM_LATENCY_BINS];
+} supine_stream_latency;
+
+/** Return the quantile `share` (0 to 1), s, rounded up to a microsecond; beyond the last bin the
+ * worst latency; 0 where there is none. */
+double supine_stream_latency_share(const supine_stream_latency *latency, double share);
+
 typedef struct supine_stream_server supine_stream_server;
+typedef struct supine_stream_volume supine_stream_volume; /* tracked_patient.h */
 
 typedef struct supine_stream_options {
   const char *listen;  /**< "PORT" (this machine alone) or "ADDRESS:PORT"; port 0: any; NULL: do not
@@ -40,22 +51,19 @@ typedef struct supine_stream_options {
   const char *device;  /**< device whose poses are followed; NULL: any */
   const char *name;    /**< device name of messages sent */
   supine_stream_setup setup;
-  supine_stream_volume *volume;   /**< messages may change it */
-  supine_stream_sensors *sensors; /**< points that messages may place; NULL: none */
-  supine_stream_what what;        /**< content sent to peers that have not chosen */
-  bool ras;                       /**< points in RAS */
-  double rate;                    /**< largest number of frames a second */
-  size_t peers;                   /**< largest number of peers, up to 1000 */
-  double smooth;                  /**< s of lag; 0: none */
-  double seconds;                 /**< duration; 0: until `stop` */
-  double patience; /**< s that a peer may leave a message or frame unfinished; 0: 20 */
+  supine_stream_volume *volume;      /**< messages may change it */
+  supine_stream_sensors *sensors;    /**< points that messages may set; NULL: none */
+  supine_stream_what what;           /**< content sent to peers that have not chosen */
+  bool ras;                          /**< points in RAS */
+  double rate;                       /**< largest number of frames a second */
+  size_t peers;                      /**< largest number of peers, up to 1000 */
+  double smooth;                     /**< s of lag; 0: none */
+  double seconds;                    /**< duration; 0: until `stop` */
   const supine_stream_poses *replay; /**< recorded poses, from the first peer on; or NULL */
   FILE *record;                      /**< each pose is written to it; NULL: none */
   supine_stream_web *web;            /**< NULL: none */
   void (*warn)(void *context, const char *text);
   bool (*stop)(void *context); /**< called about every 100 ms; true ends the run */
-  void (*shown)(void *context,
-                supine_stream_server *server); /**< called each second; NULL: never */
   void *context;
 } supine_stream_options;
 
@@ -80,7 +88,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
 const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);
 
 /** Return the times from a pose received to its frame passed to the kernel, for weights or for
- * surfaces (and SUPINE_STREAM_POINTS). Frames without a new pose do not count. Where a pose may
+ * surfaces (and SUPINE_STREAM_POINTS). Frames without a new message do not count. Where a pose may
  * have waited unread, its time starts when its peer's socket was last found empty, so that no time
  * is underestimated. */
 const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,

@@ -8,6 +8,41 @@
 
 #include "program/stream/tracked_patient.h"
 
+supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
+                                           const supine_pv_breath *breath, supine_error *error) {
+  const double start = 0.0;
+  double above = 0.0;
+  const supine_status status =
+      supine_breath_evaluate(pv, breath, 1, &start, &above, NULL, error); /* checks both */
+  if (status == SUPINE_OK) {
+    *volume = (supine_stream_volume){.breathes = true, .pv = *pv, .breath = *breath};
+  }
+  return status;
+}
+
+supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
+                                       supine_error *error) {
+  supine_state state = {.gravity = {0.0, 1.0, 0.0}};
+  const supine_status status = supine_state_parse_volume(text, &state, error);
+  if (status == SUPINE_OK) {
+    *volume = (supine_stream_volume){.fixed = state};
+  }
+  return status;
+}
+
+supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
+                                     const double gravity[3], double time) {
+  double above = 0.0;
+  if (volume->breathes) {
+    (void)supine_breath_evaluate(&volume->pv, &volume->breath, 1, &time, &above, NULL,
+                                 NULL); /* was checked */
+    return supine_breath_state(basis, gravity, above);
+  }
+  supine_state state = volume->fixed;
+  memcpy(state.gravity, gravity, sizeof state.gravity);
+  return state;
+}
+
 supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
                                                   const supine_stream_options *options,
                                                   supine_stream_counts *counts, double now) {
@@ -18,6 +53,7 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
                                  .gravity = {0, 1, 0},
                                  .smooth = {0, 1, 0},
                                  .smoothed = now,
+                                 .posed = -1.0,
                                  .received = -1.0,
                                  .warned = now - 1.0};
 }
@@ -42,16 +78,22 @@ void supine_stream_patient_warn(supine_stream_patient *patient, double now, cons
   patient->options->warn(patient->options->context, text);
 }
 
+/* Note that a message of the patient was received: the next frame answers it. */
+static void refresh(supine_stream_patient *p, double received) {
+  p->fresh = true;
+  p->received = received;
+}
+
 static void take_pose(supine_stream_patient *p, const double gravity[3], double received,
                       uint64_t stamp) {
   memcpy(p->gravity, gravity, sizeof p->gravity);
-  if (!p->posed) { /* first pose: nothing to smooth from */
+  if (p->posed < 0.0) { /* first pose: nothing to smooth from */
     memcpy(p->smooth, gravity, sizeof p->smooth);
     p->smoothed = received;
     p->first = received;
   }
-  p->posed = p->fresh = true;
-  p->received = received;
+  refresh(p, received);
+  p->posed = received;
   p->stamp = stamp;
   ++p->counts->poses;
   if (p->options->record != NULL) {
@@ -75,15 +117,23 @@ static void judge(supine_stream_patient *p, supine_stream_verdict verdict, const
   take_pose(p, gravity, received, stamp);
 }
 
-/* Store the position of a sensor; false where no sensor has that name. */
+/* Store the position of a sensor, not-a-number where it is not seen; return false where no sensor
+ * has that name. */
 static bool place(supine_stream_patient *p, const char *name, const double position[3],
                   double received, uint64_t stamp) {
-  if (p->options->sensors == NULL ||
-      !supine_stream_sensors_take(p->options->sensors, name, position)) {
+  supine_stream_sensors *sensors = p->options->sensors;
+  size_t at = 0;
+  while (sensors != NULL && at < sensors->count && strcmp(sensors->name[at], name) != 0) {
+    ++at;
+  }
+  if (sensors == NULL || at == sensors->count) {
     return false;
   }
-  p->fresh = true;
-  p->received = received;
+  for (size_t i = 0; i < 3; ++i) {
+    sensors->last[at].position[i] = sensors->ras && i < 2 ? -position[i] : position[i];
+  }
+  refresh(p, received);
+  p->posed = received;
   p->stamp = stamp;
   ++p->counts->places;
   return true;
@@ -136,7 +186,7 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     if (isfinite(message->number[0])) {
       *volume =
           (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_REST, message->number[0]}}};
-      patient->fresh = true;
+      refresh(patient, received);
     } else {
       supine_stream_patient_warn(patient, received, "a volume is refused: it is not finite");
     }
@@ -145,7 +195,7 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     if (supine_stream_volume_fix(volume, message->text, &error) != SUPINE_OK) {
       supine_stream_patient_warn(patient, received, "%s", error.message);
     } else {
-      patient->fresh = true;
+      refresh(patient, received);
     }
     break;
   case SUPINE_STREAM_NOTHING:
@@ -206,26 +256,38 @@ static void find_gains(supine_stream_patient *patient, double now, supine_stream
   moment->above += moment->volume;
 }
 
-/* Fit the lungs to the observed points; the volume too unless it is fixed. */
+/* Fit the lungs to the observed points, where any is seen; the volume too unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
                           supine_stream_moment *moment) {
   const supine_stream_volume *volume = patient->options->volume;
-  supine_state state = {.volume = {SUPINE_VOLUME_DEFAULT, 0.0}};
+  supine_stream_sensors *sensors = patient->options->sensors;
+  supine_observation seen[SUPINE_LOCATE_POINTS_MAX];
+  supine_locate_residual residuals[SUPINE_LOCATE_POINTS_MAX];
+  supine_locate_task task = {.inside = sensors->inside, .observed = seen};
   supine_pose pose = moment->pose;
   supine_error error;
   if (!volume->breathes) {
-    state = volume->fixed;
+    task.state = volume->fixed;
   }
-  memcpy(state.gravity, moment->gravity, sizeof state.gravity);
+  memcpy(task.state.gravity, moment->gravity, sizeof task.state.gravity);
+  for (size_t i = 0; i < sensors->count; ++i) {
+    const double *p = sensors->last[i].position;
+    if (isfinite(p[0] + p[1] + p[2])) {
+      seen[task.count++] = sensors->last[i];
+    }
+  }
+  if (task.count == 0) {
+    return;
+  }
   supine_status status =
-      supine_stream_sensors_locate(patient->options->sensors, &state, &moment->location, &error);
-  if (status == SUPINE_OK && moment->location != NULL) {
-    status = supine_basis_gains(patient->basis, &moment->location->state, &pose, &error);
+      supine_locate(&task, residuals, sensors->space, &sensors->location, &error);
+  if (status == SUPINE_OK) {
+    status = supine_basis_gains(patient->basis, &sensors->location.state, &pose, &error);
   }
   if (status != SUPINE_OK) {
-    moment->location = NULL;
     supine_stream_patient_warn(patient, now, "no lungs fit the points: %s", error.message);
-  } else if (moment->location != NULL) {
+  } else {
+    moment->location = &sensors->location;
     moment->pose = pose;
     moment->above += moment->location->volume - moment->volume;
     moment->volume = moment->location->volume;
@@ -242,6 +304,7 @@ void supine_stream_patient_moment(supine_stream_patient *patient, double now,
   patient->turning = left > 1e-6; /* a smaller angle moves points by less than 1 um */
   memcpy(moment->gravity, patient->smooth, sizeof moment->gravity);
   moment->received = patient->fresh ? patient->received : -1.0;
+  moment->posed = patient->posed;
   moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
   (void)supine_basis_weights(patient->basis, moment->gravity, moment->pose.weights);
   find_gains(patient, now, moment);

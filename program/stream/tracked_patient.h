@@ -4,17 +4,40 @@
 #ifndef SUPINE_STREAM_PATIENT_H
 #define SUPINE_STREAM_PATIENT_H
 
+#include "program/breath/breath_frames.h"
 #include "program/stream/server.h"
+
+/** How the volume is determined. */
+struct supine_stream_volume {
+  bool breathes;      /**< else the volume of `fixed` */
+  supine_state fixed; /**< its gravity is ignored */
+  supine_pv pv;
+  supine_pv_breath breath;
+};
+
+/** Set the volume to that of a breath, which starts at time 0. Statuses as supine_breath_evaluate.
+ */
+supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
+                                           const supine_pv_breath *breath, supine_error *error);
+
+/** Set a fixed volume, in the form of supine_state_parse_volume: rest+500, full-300, 2600mL.
+ * @retval SUPINE_ERROR_ARGUMENT  none of these; `volume` is unchanged */
+supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
+                                       supine_error *error);
+
+/** Return the state at `time` s in the posture of `gravity` (unit). */
+supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
+                                     const double gravity[3], double time);
 
 typedef struct supine_stream_patient {
   const supine_basis *basis;
   const supine_stream_options *options;
   supine_stream_counts *counts;
   double begun;                      /* s of the clock; time 0 of the breath */
-  bool posed;                        /* at least one pose was received */
-  bool fresh;                        /* no frame has the newest pose or volume yet */
+  bool fresh;                        /* no frame has the newest message yet */
   double first;                      /* s of the clock, of the first pose: time 0 of a record */
-  double received;                   /* s of the clock, of the newest pose */
+  double posed;                      /* s of the clock, of the newest pose; < 0: none */
+  double received;                   /* s of the clock, of the newest message */
   uint64_t stamp;                    /* of the newest pose; 0: none */
   double gravity[3];                 /* of the newest pose */
   double smooth[3];                  /* smoothed gravity, as shown */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Serve the page and its WebSocket by libwebsockets, in a thread of their own. */
+#include <fcntl.h>
 #include <jansson.h>
 #include <libwebsockets.h>
 #include <math.h>
@@ -7,7 +8,6 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include "program/stream/web.h"
@@ -36,7 +36,7 @@ struct supine_stream_web {
   supine_stream_site site;
   struct lws_context *context;
   int port;
-  int event; /* readable when a pose was received */
+  int poses[2]; /* pipe of the poses received */
   pthread_t thread;
   bool running;
   atomic_bool ending;
@@ -44,11 +44,14 @@ struct supine_stream_web {
   pthread_mutex_t lock; /* for the fields below */
   uint64_t number;      /* of the state in `text` */
   char text[TEXT];      /* JSON of the state; its age and the final brace are added when sent */
-  double posed_at;      /* s of the clock, when the newest pose was received; 0: none */
-  bool posed;           /* a pose was received that is not taken yet */
-  double gravity[3];    /* of that pose */
-  double received;      /* s of the clock, of that pose */
+  double posed_at;      /* s of the clock, when the newest pose was received; < 0: none */
 };
+
+/* A pose in the pipe. */
+typedef struct web_pose {
+  double gravity[3];
+  double received; /* s of the clock */
+} web_pose;
 
 /* A connection: of a browser that loads the page, or of a viewer. */
 typedef struct session {
@@ -81,22 +84,16 @@ static bool is_ours(struct lws *wsi) {
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
-  double number[3];
+  web_pose taken = {.received = supine_clock_seconds()};
   bool good = json_array_size(gravity) == 3;
   for (size_t i = 0; i < 3 && good; ++i) {
     const json_t *value = json_array_get(gravity, i);
-    number[i] = json_number_value(value);
-    good = json_is_number(value) && isfinite(number[i]);
+    taken.gravity[i] = json_number_value(value);
+    good = json_is_number(value) && isfinite(taken.gravity[i]);
   }
   json_decref(pose);
-  if (good) {
-    const uint64_t one = 1;
-    (void)pthread_mutex_lock(&web->lock);
-    memcpy(web->gravity, number, sizeof number);
-    web->received = supine_clock_seconds();
-    web->posed = true;
-    (void)pthread_mutex_unlock(&web->lock);
-    (void)!write(web->event, &one, sizeof one);
+  if (good) { /* where the pipe is full, newer poses follow */
+    (void)!write(web->poses[1], &taken, sizeof taken);
   }
 }
 
@@ -106,7 +103,7 @@ static int send_state(supine_stream_web *web, struct lws *wsi, session *s) {
   unsigned char bytes[LWS_PRE + TEXT + AGE];
   (void)pthread_mutex_lock(&web->lock);
   const uint64_t number = web->number;
-  const double age = web->posed_at > 0 ? supine_clock_seconds() - web->posed_at : -1;
+  const double age = web->posed_at >= 0 ? supine_clock_seconds() - web->posed_at : -1;
   const int size =
       snprintf((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
   (void)pthread_mutex_unlock(&web->lock);
@@ -225,7 +222,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   }
   w->site = *site;
   (void)pthread_mutex_init(&w->lock, NULL);
-  w->event = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+  const bool piped = pipe2(w->poses, O_NONBLOCK | O_CLOEXEC) == 0;
   lws.set_log_level(0, NULL);
   struct lws_context_creation_info info = {0};
   info.port = site->port;
@@ -246,7 +243,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
     info.ssl_private_key_filepath = site->key;
     info.alpn = "http/1.1";
   }
-  w->context = w->event < 0 ? NULL : lws.create_context(&info);
+  w->context = piped ? lws.create_context(&info) : NULL;
   struct lws_vhost *host = w->context == NULL ? NULL : lws.get_vhost_by_name(w->context, "default");
   w->port = host == NULL ? 0 : lws.get_vhost_listen_port(host);
   w->running = w->port > 0 && pthread_create(&w->thread, NULL, run, w) == 0;
@@ -273,8 +270,8 @@ void supine_stream_web_destroy(supine_stream_web *web) {
   if (web->context != NULL) {
     lws.context_destroy(web->context);
   }
-  if (web->event >= 0) {
-    (void)close(web->event);
+  for (size_t i = 0; i < 2 && web->poses[1] > 0; ++i) {
+    (void)close(web->poses[i]);
   }
   (void)pthread_mutex_destroy(&web->lock);
   free(web);
@@ -285,18 +282,17 @@ int supine_stream_web_port(const supine_stream_web *web) {
 }
 
 int supine_stream_web_descriptor(const supine_stream_web *web) {
-  return web->event;
+  return web->poses[0];
 }
 
 bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *received) {
-  uint64_t count = 0;
-  (void)!read(web->event, &count, sizeof count);
-  (void)pthread_mutex_lock(&web->lock);
-  const bool posed = web->posed;
-  web->posed = false;
-  memcpy(gravity, web->gravity, sizeof web->gravity);
-  *received = web->received;
-  (void)pthread_mutex_unlock(&web->lock);
+  web_pose pose;
+  bool posed = false;
+  while (read(web->poses[0], &pose, sizeof pose) == sizeof pose) {
+    memcpy(gravity, pose.gravity, sizeof pose.gravity);
+    *received = pose.received;
+    posed = true;
+  }
   return posed;
 }
 
@@ -305,7 +301,7 @@ void supine_stream_web_send(supine_stream_web *web, const supine_stream_moment *
   (void)snprintf(web->text, sizeof web->text,
                  "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g", moment->gravity[0],
                  moment->gravity[1], moment->gravity[2], moment->volume, moment->above);
-  web->posed_at = moment->received >= 0 ? moment->received : web->posed_at;
+  web->posed_at = moment->posed;
   ++web->number;
   (void)pthread_mutex_unlock(&web->lock);
   if (atomic_load(&web->viewers) > 0) {

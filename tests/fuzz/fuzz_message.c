@@ -62,9 +62,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
 }
 
 uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
-  static const char *const types[] = {"TRANSFORM", "QTDATA", "POSITION", "NDARRAY",
-                                      "SENSOR",    "STRING", "STRING"};
-  static const char *const devices[] = {"Patient", "Patient", "Patient", "Patient",
+  static const char *const types[] = {"TRANSFORM", "QTDATA", "POSITION",
+                                      "NDARRAY",   "STRING", "STRING"};
+  static const char *const devices[] = {"Patient", "Patient", "Patient",
                                         "Patient", "VOLUME",  "SEND"};
   enum { MESSAGES = sizeof types / sizeof *types, BODY = 64 };
   if (index >= MESSAGES) {

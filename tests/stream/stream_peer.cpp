@@ -16,7 +16,6 @@
 #include <igtlPolyDataMessage.h>
 #include <igtlPositionMessage.h>
 #include <igtlQuaternionTrackingDataMessage.h>
-#include <igtlSensorMessage.h>
 #include <igtlStringMessage.h>
 #include <igtlTransformMessage.h>
 
@@ -127,8 +126,10 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   for (unsigned i = 0; i < message->GetTriangleStrips()->GetNumberOfCells(); ++i) {
     std::vector<igtlUint32> strip(message->GetTriangleStrips()->GetCellSize(i));
     message->GetTriangleStrips()->GetCell(i, strip.data());
-    for (size_t j = 0; j + 2 < strip.size(); ++j) { // every other one faces the other way round
-      received.push_back(face(strip[j], strip[j + 1 + j % 2], strip[j + 2 - j % 2]));
+    for (size_t j = 0; j + 2 < strip.size(); ++j) { // every other one has the opposite orientation
+      if (strip[j] != strip[j + 1] && strip[j + 1] != strip[j + 2] && strip[j] != strip[j + 2]) {
+        received.push_back(face(strip[j], strip[j + 1 + j % 2], strip[j + 2 - j % 2]));
+      }
     }
   }
   const uint32_t *corner = supine_basis_triangles(basis);
@@ -205,14 +206,6 @@ int main(int count, char **word) {
   send(tracked, "Tracker");
   const double prone[3] = {0, -1, 0};
   expect_weights(basis, pose_of(basis, prone, 400.0));
-  // An accelerometer at rest shows upwards.
-  igtl::SensorMessage::Pointer sensor = igtl::SensorMessage::New();
-  igtlFloat64 up[3] = {-9.81, 0, 0};
-  sensor->SetLength(3);
-  sensor->SetValue(up);
-  send(sensor, "Patient");
-  const double left[3] = {1, 0, 0};
-  expect_weights(basis, pose_of(basis, left, 400.0));
   // Other volumes; what a number alone counts from is not said, and it changes nothing.
   for (const char *text : {"rest+500", "500"}) {
     say("VOLUME", text);

@@ -88,8 +88,10 @@ def corners(words):
     while begin < len(words):
         strip = words[begin + 1:begin + 1 + words[begin]]
         begin += 1 + len(strip)
-        for i in range(len(strip) - 2):  # every other one faces the other way round
-            yield from (strip[i], strip[i + 1 + i % 2], strip[i + 2 - i % 2])
+        for i in range(len(strip) - 2):  # every other one has the opposite orientation
+            triangle = (strip[i], strip[i + 1 + i % 2], strip[i + 2 - i % 2])
+            if len(set(triangle)) == 3:  # others only turn the strip
+                yield from triangle
 
 
 def unpack(kind, content):
