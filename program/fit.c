@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "sh/base/text.h"
+#include "sh/base/vec3.h"
 
 #include "precompute/inside/surface.h"
 #include "precompute/patient/patient_file.h"
@@ -17,9 +18,8 @@ static const char name[] = "fit";
 typedef struct request {
   const char *path, *name;
   supine_landmark_options landmarks;
-  bool has_law, has_gain, expandability, json;
+  bool has_law, expandability, json;
   int law;
-  double gain, reach;
   supine_source_options source; /* for all surfaces */
 
   supine_state rest, state; /* states of the first and of the second scan */
@@ -71,10 +71,6 @@ static supine_status read_further(const char *text, void *field, supine_error *e
   return read_state(state, &wanted->further[wanted->count++], error);
 }
 
-static bool is_landmarks(const char *path) {
-  return supine_text_ends_in(path, ".csv");
-}
-
 #define FILLS(member) SUPINE_FILLS(request, member)
 
 static const supine_option table[] = {
@@ -95,25 +91,16 @@ static const supine_option table[] = {
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
     {"name", 0, "TEXT", "name of the person; default: the landmarks' file", FILLS(name),
      .more = true},
-    {"gain", 0, "G",
-     "gravity-dependent part of the force, which two scans in one posture cannot determine; "
-     "default 0.4, as in the law deep",
-     FILLS(gain), SUPINE_SAYS_GIVEN(request, has_gain), .range = {0.0, 2.0}, .more = true},
     {"state", 0, "STATE:FILE",
      "further state: its surface, or landmarks from the first scan (.csv); may be repeated, up "
-     "to 8. In a posture other than the fitted ones it determines --gain, else how far that "
-     "breath went; the other constants of the law stay those of the two states. Without a "
-     "second scan or landmarks, the first further state takes its place",
-     .read = read_further, .alias = "third",
-     .wants = "(at most 8) a state, as prone:rest, a colon and a file"},
+     "to 8. In a posture other than the fitted ones it determines the gravity-dependent part of "
+     "the force (the gain), else how far that breath went; the other constants of the law stay "
+     "those of the two states",
+     .read = read_further, .wants = "(at most 8) a state, as prone:rest, a colon and a file"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline), .wants = "an x in mm",
      .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
-    {"reach", 0, "MM",
-     "for surfaces: length over which forces spread, as in 'supine precompute --reach'",
-     FILLS(reach), .standard = "10", SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0",
-     .more = true},
     {"expandability", 0, NULL,
      "for surfaces: fit the expandability of regions about 45 mm wide, with the paper law and "
      "the force of the law deep, instead of kriging; report the regions that cannot be "
@@ -122,45 +109,47 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* Gain of the law deep: with its base, the force on the lowest parts is 1.4 times that on the
- * uppermost. */
-static const double usual_gain = 0.4;
-
 static void print_scores(const supine_patient_record *record) {
+  static const char *const names[] = {"nothing moved", "translation", "affine map", "law",
+                                      "law + kriging"};
   const supine_patient_fit_report *report = &record->report;
-  const char *law = supine_patient_law_names[record->patient.law];
   const bool corrected = record->patient.centre_count > 0;
-  (void)printf("residual displacement, mm RMS:\n                             fitted  held-out\n");
+  (void)printf("%.0f %s in %.0f blocks of 40 mm; law %s\n"
+               "residual displacement, mm RMS:\n                             fitted  held-out\n",
+               report->points, report->components == 3 ? "landmarks" : "measurements",
+               report->blocks, supine_patient_law_names[record->patient.law]);
   for (size_t k = 0; k < (corrected ? SUPINE_PATIENT_SCORES : SUPINE_PATIENT_SCORE_CORRECTED);
        ++k) {
-    static const char *const names[] = {"nothing moved", "translation", "affine map", "law %s",
-                                        "law %s + kriging"};
-    char text[64];
-    (void)snprintf(text, sizeof text, names[k], law);
-    (void)printf("  %-24s %7.2f   %7.2f%s\n", text, report->fitted[k], report->held_out[k],
-                 k == SUPINE_PATIENT_SCORE_CORRECTED ? "   <- kept" : "");
+    (void)printf("  %-24s %7.2f   %7.2f\n", names[k], report->fitted[k], report->held_out[k]);
   }
   if (corrected) {
     (void)printf("expected error at held-out points %.2f mm RMS; %.0f %% of them lie within "
                  "the 95 %% band\n",
-                 report->expected, 100.0 * report->band);
+                 report->expected, report->band);
   }
-  (void)printf("held-out: %d folds of blocks of 40 mm, repeated %d times\n", SUPINE_PATIENT_FOLDS,
-               SUPINE_PATIENT_SEEDS);
+  (void)printf("held-out: %d folds of blocks of 40 mm, repeated %d times\n"
+               "explained share of the squared displacement: %.0f %% held-out (%.0f %% fitted)\n",
+               SUPINE_PATIENT_FOLDS, SUPINE_PATIENT_SEEDS, report->explained,
+               report->explained_fitted);
 }
 
-static void print_paper_law(const supine_patient *patient,
-                            const supine_patient_fit_report *report) {
-  double c[SUPINE_PATIENT_CONSTANTS];
-  supine_patient_constants(&patient->power, c);
+static void print_paper_law(const supine_patient_record *record) {
   (void)printf("paper law, force 1 at the centre of the box (95 %% intervals):\n");
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
-    const double half = 1.96 * report->error[k];
-    (void)printf("  c%zu %8.3f   %8.3f to %8.3f\n", k + 1, c[k], c[k] - half, c[k] + half);
+    (void)printf("  c%zu %8.3f +- %.3f\n", k + 1, record->patient.power.c[k],
+                 1.96 * record->report.error[k]);
   }
 }
 
-static void print_surface(const supine_patient_surface_report *surface, bool landmarks) {
+static void print_motion(const double motion[6]) {
+  (void)printf("motion between the scans: %.1f,%.1f,%.1f mm, turned by %.1f degrees\n", motion[0],
+               motion[1], motion[2], supine_length(motion + 3) * 57.29577951308232);
+}
+
+static void print_surfaces(const supine_patient_record *record, bool landmarks) {
+  const supine_patient_surface_report *surface = &record->surface;
+  const supine_patient_expand_report *expand = &record->expand;
+  const supine_patient_applied *applied = &record->applied;
   (void)printf("surface: %zu vertices, %.0f %% of them matched; distance along the normals to "
                "the emptier surface\n  %.2f mm RMS before, %.2f mm after the fit\n",
                surface->vertices, 100.0 * surface->matched, surface->before, surface->after);
@@ -169,77 +158,23 @@ static void print_surface(const supine_patient_surface_report *surface, bool lan
                "have been off by\n  14 mm where surfaces were 5 mm apart. Give --landmarks to "
                "measure it");
   }
-}
-
-static void print_region(const char *before, const supine_patient_mode *mode) {
-  (void)printf("%s%s lung, %.0f mm about %.0f,%.0f,%.0f", before, mode->side > 0 ? "left" : "right",
-               0.5 * mode->radius, mode->centre[0], mode->centre[1], mode->centre[2]);
-}
-
-/* Print the determined region with the least (`sign` -1) or greatest expandability. */
-static void print_extreme(const supine_patient_stiffness *stiffness, const char *what,
-                          double sign) {
-  const supine_patient_mode *found = NULL;
-  for (size_t k = 0; k < stiffness->count; ++k) {
-    const supine_patient_mode *mode = &stiffness->mode[k];
-    if (mode->seen >= SUPINE_PATIENT_SEEN &&
-        (found == NULL || sign * mode->value > sign * found->value)) {
-      found = mode;
-    }
-  }
-  if (found != NULL) {
-    print_region(what, found);
-    (void)printf(", %.2f\n", found->value);
-  }
-}
-
-/* Print the regions whose expandability is not determined: they move too little, or along the
- * surface. */
-static void print_unseen(const supine_patient_stiffness *stiffness,
-                         const supine_patient_expand_report *expand) {
-  (void)printf("  not determined: %zu of %zu regions; they take their neighbours' values%s\n",
-               expand->unseen, expand->regions, expand->unseen > 0 ? ":" : "");
-  for (size_t k = 0; k < stiffness->count; ++k) {
-    if (stiffness->mode[k].seen < SUPINE_PATIENT_SEEN) {
-      print_region("    ", &stiffness->mode[k]);
-      (void)putchar('\n');
-    }
-  }
-}
-
-static void print_expandability(const supine_patient_expand_report *expand,
-                                const supine_patient_stiffness *stiffness) {
   if (expand->tried) {
     (void)printf("expandability: surface residual %.2f mm RMS with it, %.2f without; held-out "
-                 "%.2f and %.2f:\n  ",
+                 "%.2f and %.2f: ",
                  expand->fitted[1], expand->fitted[0], expand->held_out[1], expand->held_out[0]);
-    if (expand->kept) {
-      (void)printf(
-          "kept; 90 %% of the determined regions have %.2f to %.2f times the mean stiffness\n",
-          expand->softest, expand->stiffest);
-      print_extreme(stiffness, "  least expandable: ", -1.0);
-      print_extreme(stiffness, "  most expandable: ", 1.0);
-      print_unseen(stiffness, expand);
-    } else {
-      (void)puts("not kept, as the held-out residual is not lower: stiffness stays uniform");
-    }
+    (void)(expand->kept ? printf("kept\n  not determined: %zu of %zu regions, which take their "
+                                 "neighbours' values\n",
+                                 expand->unseen, record->stiffness.count)
+                        : printf("not kept, as the held-out residual is not lower\n"));
   }
-}
-
-static void print_applied(const supine_patient_record *record) {
-  const supine_patient_applied *applied = &record->applied;
-  const double *c = record->patient.power.powers + 3;
   (void)printf(
-      "force that explains the displacement (by the inverse of the operator), means of %zu "
-      "blocks:\n"
-      "  correlation with height along gravity %.2f; it varies by %.0f %% RMS, of which "
-      "(18) of Santhanam 2008 does not explain %.0f %%\n"
-      "  c7 to c9 of that force %.2f %.2f %.2f, of the displacement %.2f %.2f %.2f\n",
-      applied->blocks, applied->correlation, 100.0 * applied->spread, 100.0 * applied->left,
-      applied->slopes[0], applied->slopes[1], applied->slopes[2], c[0], c[1], c[2]);
+      "force that explains the displacement (by the inverse of the operator), means of %.0f "
+      "blocks:\n  correlation with height along gravity %.2f; it varies by %.0f %% RMS, of which "
+      "(18) of Santhanam 2008 does not explain %.0f %%\n",
+      applied->blocks, applied->correlation, 100.0 * applied->spread, 100.0 * applied->left);
 }
 
-static void print_gain(const supine_patient_record *record, bool given) {
+static void print_gain(const supine_patient_record *record) {
   for (size_t k = 0; k < record->told_count; ++k) {
     const supine_patient_told *told = &record->told[k];
     char text[SUPINE_PATIENT_STATE_TEXT];
@@ -252,14 +187,13 @@ static void print_gain(const supine_patient_record *record, bool given) {
     (void)printf(
         "gain not determined by the states in other postures: %.2g is that of the law deep\n",
         record->force.gain);
-  } else if (record->gain_told) {
+  } else if (record->gain_error > 0.0) {
     (void)printf("gain %.2f +- %.2f (gravity-dependent part), from the states in other postures\n",
                  record->force.gain, record->gain_error);
-  } else if (!given) {
-    (void)printf(
-        "scans in one posture do not determine the gravity-dependent part of the force:\n"
-        "gain %.2g is that of the law deep. Give a --state in another posture, or --gain\n",
-        record->force.gain);
+  } else {
+    (void)printf("scans in one posture do not determine the gravity-dependent part of the force:\n"
+                 "gain %.2g is that of the law deep. Give a --state in another posture\n",
+                 record->force.gain);
   }
 }
 
@@ -274,32 +208,6 @@ static void print_states(const supine_patient_record *record) {
     }
     (void)putchar('\n');
   }
-}
-
-static void print_text(const supine_patient_record *record, const request *wanted) {
-  const supine_patient *patient = &record->patient;
-  const supine_patient_fit_report *report = &record->report;
-  const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
-  print_states(record);
-  (void)printf("%zu %s in %zu blocks of 40 mm\n", report->count,
-               report->components == 3 ? "landmarks" : "measurements", report->blocks);
-  print_scores(record);
-  if (moved) {
-    const double *t = patient->power.motion;
-    (void)printf("motion between the scans: %.1f,%.1f,%.1f mm", t[0], t[1], t[2]);
-    if (wanted->landmarks.rigid) {
-      (void)printf(", turned by %.1f degrees",
-                   sqrt(t[3] * t[3] + t[4] * t[4] + t[5] * t[5]) * 57.29577951308232);
-    }
-    (void)putchar('\n');
-  }
-  if (patient->law == SUPINE_PATIENT_PAPER) {
-    print_paper_law(patient, report);
-  }
-  (void)printf("explained share of the squared displacement%s: %.0f %% held-out (%.0f %% "
-               "fitted)\n",
-               moved ? " about the motion between the scans" : "", 100.0 * report->explained,
-               100.0 * report->explained_fitted);
 }
 
 static void evidence_free(evidence *of) {
@@ -336,15 +244,18 @@ static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs 
   return status;
 }
 
-static supine_status load_evidence(const request *wanted, evidence *of, supine_error *error) {
+static supine_status load_pairs(const request *wanted, const char *path,
+                                supine_patient_pairs *pairs, supine_error *error) {
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
+  const supine_status status =
+      supine_patient_pairs_load(path, wanted->landmarks.reverse, pairs, error);
+  return status == SUPINE_OK ? supine_patient_pairs_check(pairs, moved, error) : status;
+}
+
+static supine_status load_evidence(const request *wanted, evidence *of, supine_error *error) {
   supine_status status = SUPINE_OK;
   if (wanted->landmarks.path != NULL) {
-    status = supine_patient_pairs_load(wanted->landmarks.path, wanted->landmarks.reverse,
-                                       &of->pairs, error);
-    if (status == SUPINE_OK) {
-      status = supine_patient_pairs_check(&of->pairs, moved, error);
-    }
+    status = load_pairs(wanted, wanted->landmarks.path, &of->pairs, error);
   }
   if (status == SUPINE_OK && wanted->rest_path != NULL) {
     status =
@@ -405,9 +316,7 @@ static supine_status order_states(const request *wanted, evidence *of, supine_er
 static supine_status fit_surfaces(const request *wanted, const evidence *of,
                                   const supine_patient_fit_options *options,
                                   supine_patient_record *record, supine_error *error) {
-  supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  model.reach = wanted->reach;
-  model.force.gain = wanted->has_gain ? wanted->gain : usual_gain; /* fixed for --expandability */
+  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const supine_patient_surface_task task = {.rest = &of->lungs[0],
                                             .state = &of->lungs[1].mesh,
                                             .model = &model,
@@ -434,61 +343,47 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
-/* Pairs and surfaces of the further states. */
-typedef struct further_work {
-  supine_patient_pairs pairs[SUPINE_PATIENT_OTHERS_MAX];
-  supine_lungs lungs[SUPINE_PATIENT_OTHERS_MAX];
-} further_work;
-
-/* Load further states into the record. Landmarks start in the first scan: move them to the fuller
- * state where the first is the emptier one. */
-static supine_status load_further(const request *wanted, const evidence *of,
-                                  supine_patient_record *record, further_work *work,
-                                  supine_error *error) {
+/* Fit a further state. Its landmarks start in the first scan: move them to the fuller state where
+ * the first is the emptier one. */
+static supine_status fit_further(const request *wanted, const evidence *of, size_t which,
+                                 const supine_lungs *from, supine_patient_record *record,
+                                 supine_error *error) {
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
-  supine_status status = SUPINE_OK;
-  for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
-    const char *path = wanted->further_path[k];
-    supine_patient_pairs *pairs = &work->pairs[k];
-    const bool landmarks = is_landmarks(path);
-    record->told[record->told_count++] =
-        (supine_patient_told){.state = wanted->further[k],
-                              .pairs = landmarks ? pairs : NULL,
-                              .surface = landmarks ? NULL : &work->lungs[k].mesh};
-    if (!landmarks) {
-      status = supine_command_load_lungs(name, path, &wanted->source, &work->lungs[k], error);
-      continue;
-    }
-    status = supine_patient_pairs_load(path, wanted->landmarks.reverse, pairs, error);
-    if (status == SUPINE_OK) {
-      status = supine_patient_pairs_check(pairs, moved, error);
-    }
-    if (status == SUPINE_OK && of->swapped) {
-      supine_patient_refer(&record->patient, pairs->count, pairs->from);
-    }
+  const char *path = wanted->further_path[which];
+  const bool landmarks = supine_text_ends_in(path, ".csv");
+  supine_patient_pairs pairs = {0};
+  supine_lungs lungs = {0};
+  supine_patient_told *told = &record->told[record->told_count++];
+  *told = (supine_patient_told){.state = wanted->further[which]};
+  supine_status status =
+      landmarks ? load_pairs(wanted, path, &pairs, error)
+                : supine_command_load_lungs(name, path, &wanted->source, &lungs, error);
+  if (status == SUPINE_OK && landmarks && of->swapped) {
+    supine_patient_refer(&record->patient, pairs.count, pairs.from);
   }
+  if (status == SUPINE_OK) {
+    status = supine_patient_gain_fit(record, from, landmarks ? &pairs : NULL,
+                                     landmarks ? NULL : &lungs.mesh, moved, told, error);
+  }
+  supine_patient_pairs_free(&pairs);
+  supine_lungs_free(&lungs);
   return status;
 }
 
 /* Fit the gravity-dependent share of the force to the further states. */
 static supine_status find_gain(const request *wanted, evidence *of, supine_patient_record *record,
                                supine_error *error) {
-  further_work work = {.pairs = {{.count = 0}}};
   supine_lungs *from = &of->lungs[0];
-  supine_status status = load_further(wanted, of, record, &work, error);
+  supine_status status = SUPINE_OK;
   if (from->mesh.vertex_count == 0) { /* only the emptier scan has a surface */
     from = &of->lungs[1];
     supine_patient_refer(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_mesh_box(&from->mesh, from->minimum, from->maximum);
   }
-  if (status == SUPINE_OK) {
-    status = supine_patient_gain_fit(
-        record, from, wanted->landmarks.translation || wanted->landmarks.rigid, error);
+  for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
+    status = fit_further(wanted, of, k, from, record, error);
   }
-  for (size_t k = 0; k < SUPINE_PATIENT_OTHERS_MAX; ++k) {
-    supine_patient_pairs_free(&work.pairs[k]);
-    supine_lungs_free(&work.lungs[k]);
-  }
+  supine_patient_gain_take(record);
   return status;
 }
 
@@ -554,27 +449,18 @@ static void warn_of_rest(const supine_patient_record *record) {
   }
 }
 
+/* Set the name, and the force with the gain of the law deep. */
 static void keep(const request *wanted, supine_patient_record *record) {
-  const supine_patient_fit_report *report = &record->report;
+  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   const char *source = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->state_path;
   const char *slash = strrchr(source, '/');
   (void)snprintf(record->name, sizeof record->name, "%s",
                  wanted->name != NULL ? wanted->name
                  : slash != NULL      ? slash + 1
                                       : source);
-  record->reach = wanted->reach;
+  record->reach = deep.reach;
   record->force =
-      supine_patient_force(&record->patient.power, wanted->has_gain ? wanted->gain : usual_gain,
-                           record->state[1].gravity);
-  record->points = (double)report->count;
-  record->held_out = report->held_out[SUPINE_PATIENT_SCORE_CORRECTED];
-  record->held_out_baseline = report->baseline;
-  record->expected = report->components == 3 ? report->expected : report->expected_point;
-  record->expected_constant =
-      report->moved > 0.0 ? pow(record->expected, 2.0) / report->moved : 0.0;
-  record->band = 100.0 * report->band;
-  record->fitted = report->fitted[SUPINE_PATIENT_SCORE_CORRECTED];
-  record->explained = 100.0 * report->explained;
+      supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }
 
 static supine_status fit(const request *wanted, const supine_arguments *given,
@@ -603,7 +489,7 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
   }
   if (status == SUPINE_OK) {
     keep(wanted, record);
-    status = wanted->count > 0 ? find_gain(wanted, &of, record, error) : SUPINE_OK;
+    status = find_gain(wanted, &of, record, error);
   }
   if (status == SUPINE_OK && wanted->path != NULL) {
     status = supine_patient_write(wanted->path, record, given->made_by, error);
@@ -612,70 +498,31 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
   return status;
 }
 
-/* Choose the surfaces and landmarks that the law is fitted to, and the further states. */
-static supine_status arrange(request *wanted, const supine_arguments *given, supine_error *error) {
-  size_t next = 1;
+/* Check the operands and options. */
+static supine_status check(request *wanted, const supine_arguments *given, supine_error *error) {
+  bool surfaces = false; /* further states as surfaces */
   wanted->rest_path = given->count > 0 ? given->operand[0] : NULL;
-  if (given->count > 1) {
-    wanted->state_path = given->operand[next++];
-  } else if (wanted->landmarks.path == NULL &&
-             wanted->count > 0) { /* the first further state replaces it */
-    *(is_landmarks(wanted->further_path[0]) ? &wanted->landmarks.path : &wanted->state_path) =
-        wanted->further_path[0];
-    wanted->state = wanted->further[0];
-    --wanted->count;
-    memmove(wanted->further, wanted->further + 1, wanted->count * sizeof *wanted->further);
-    memmove(wanted->further_path, wanted->further_path + 1,
-            wanted->count * sizeof *wanted->further_path);
-  }
-  for (; next < given->count; ++next) { /* further surfaces, in the same posture */
-    if (wanted->count == SUPINE_PATIENT_OTHERS_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "more than %d further states: give fewer --state",
-                              SUPINE_PATIENT_OTHERS_MAX);
-    }
-    wanted->further[wanted->count] = wanted->state;
-    wanted->further[wanted->count].volume = (supine_volume){SUPINE_VOLUME_DEFAULT, 0.0};
-    wanted->further_path[wanted->count++] = given->operand[next];
-  }
-  if (wanted->landmarks.path == NULL && wanted->state_path == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "nothing to fit to: give --landmarks, or the surfaces of "
-                            "both states, or all three");
-  }
+  wanted->state_path = given->count > 1 ? given->operand[1] : NULL;
   for (size_t k = 0; k < wanted->count; ++k) {
-    if (!is_landmarks(wanted->further_path[k]) && wanted->rest_path == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "%s is a surface: name that of the first scan as well",
-                              wanted->further_path[k]);
-    }
+    surfaces = surfaces || !supine_text_ends_in(wanted->further_path[k], ".csv");
   }
-  if (wanted->state_path != NULL && wanted->rest_path == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s is a surface: name that of the first scan as well",
-                            wanted->state_path);
-  }
-  if (wanted->expandability && wanted->state_path == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--expandability needs surfaces: give those of both "
-                            "states");
-  }
-  if (wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--expandability uses the paper law: leave --law out");
-  }
-  if (wanted->has_gain && wanted->count > 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "give --gain or --state, not both: further states "
-                            "determine the gain");
-  }
-  return SUPINE_OK;
+  const char *wrong =
+      wanted->landmarks.path == NULL && wanted->state_path == NULL
+          ? "nothing to fit to: give --landmarks, or the surfaces of both states, or all three"
+      : surfaces && wanted->rest_path == NULL
+          ? "a --state is a surface: name that of the first scan as well"
+      : wanted->expandability && wanted->state_path == NULL
+          ? "--expandability needs surfaces: give those of both states"
+      : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP
+          ? "--expandability uses the paper law: leave --law out"
+          : NULL;
+  return wrong != NULL ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s", wrong) : SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  static supine_patient_record record; /* about 74 kB, too large for the stack */
-  supine_status status = arrange(wanted, given, error);
+  static supine_patient_record record; /* about 90 kB, too large for the stack */
+  supine_status status = check(wanted, given, error);
   if (status == SUPINE_OK) {
     status = fit(wanted, given, &record, error);
   }
@@ -686,17 +533,20 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     char *text = supine_patient_text(&record, given->made_by);
     (void)puts(text != NULL ? text : "{}");
     free(text);
-  } else {
-    if (wanted->state_path != NULL) {
-      print_surface(&record.surface, wanted->landmarks.path != NULL);
-    }
-    print_text(&record, wanted);
-    if (wanted->state_path != NULL) {
-      print_expandability(&record.expand, &record.stiffness);
-      print_applied(&record);
-    }
-    print_gain(&record, wanted->has_gain);
+    return SUPINE_OK;
   }
+  print_states(&record);
+  print_scores(&record);
+  if (wanted->landmarks.translation || wanted->landmarks.rigid) {
+    print_motion(record.patient.power.motion);
+  }
+  if (record.patient.law == SUPINE_PATIENT_PAPER) {
+    print_paper_law(&record);
+  }
+  if (wanted->state_path != NULL) {
+    print_surfaces(&record, wanted->landmarks.path != NULL);
+  }
+  print_gain(&record);
   return SUPINE_OK;
 }
 
@@ -704,7 +554,7 @@ const supine_command supine_command_fit = {
     name,
     "fit a model to a person's scans and landmarks",
     .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
-             "SCAN SCAN... [--state STATE:FILE]... -o patient.json [OPTIONS]",
+             "SCAN SCAN [--state STATE:FILE]... -o patient.json [OPTIONS]",
     .about = "Fits a model to one person's lungs in two scans: a law of motion, and its residual "
              "interpolated by kriging. Reports the measured and the expected error at held-out "
              "points. Landmarks determine most; surfaces alone do not show sliding along them. "
@@ -721,8 +571,8 @@ const supine_command supine_command_fit = {
         "      -o patient.json\n"
         "  supine precompute rest.ply --patient patient.json -o lungs.safetensors",
     .operands_least = 0,
-    .operands_most = 2 + SUPINE_PATIENT_OTHERS_MAX,
-    .operands_missing = "more than 10 surfaces: name fewer",
+    .operands_most = 2,
+    .operands_missing = "more than two scans: give further ones as --state STATE:FILE",
     .request_size = sizeof(request),
     .begin = begin,
     .run = run};

@@ -179,15 +179,17 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
   wanted->model.patient = record;
   wanted->model.choice.law = SUPINE_LAW_DEEP; /* its constants are replaced by the patient's */
   wanted->basis.patient = *text;
+  const supine_patient_fit_report *report = &record->report;
   (void)snprintf(
       wanted->summary, sizeof wanted->summary,
       "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% explained; "
       "expected error %.1f mm RMS",
       record->name, supine_patient_law_names[record->patient.law],
-      record->patient.centre_count > 0 ? " and kriging" : "", record->points, record->held_out,
-      record->held_out_baseline, record->explained, record->expected);
+      record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline, report->explained,
+      report->expected_point);
   wanted->basis.patient_summary = wanted->summary;
-  wanted->basis.expected_error = record->expected_constant;
+  wanted->basis.expected_error = report->expected_constant;
   (void)printf("%s\n", wanted->summary);
   return SUPINE_OK;
 }
@@ -206,8 +208,8 @@ static supine_status check_patient(const supine_model_choice *choice, supine_err
                      choice->directions != NULL;
   return given ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                   "--patient has its own law and force: leave --law, --base, "
-                                  "--gain, --box-force, --constants, --direction and --reach out, "
-                                  "or give --gain and --reach to 'supine fit'")
+                                  "--gain, --box-force, --constants, --direction and --reach "
+                                  "out")
                : SUPINE_OK;
 }
 

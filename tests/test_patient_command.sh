@@ -147,8 +147,7 @@ grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain 
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
   >fit.txt || fail "fit a lesion"
-grep -q 'kept; 90 % of the determined regions' fit.txt || fail "no expandability kept"
-grep -q 'least expandable: left lung' fit.txt || fail "not told: $(cat fit.txt)"
+grep -q 'expandability: .*: kept' fit.txt || fail "no expandability kept"
 grep -q 'not determined: [1-9][0-9]* of [0-9]* regions' fit.txt || fail "all is seen: $(cat fit.txt)"
 grep -q 'correlation with height along gravity \(0.99\|1.00\);.* does not explain [0-3] %' fit.txt || # what was made
   fail "the force: $(grep correlation fit.txt)"
@@ -225,8 +224,8 @@ near "$(surfaces valid.json)" 0 3 && fail "a shift was taken out unasked"
 # Half a breath more in the same posture.
 "$supine" deform p.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
   fail deform
-"$supine" fit p_supine_rest.ply p_supine_full.ply half.ply --other supine:full --law paper \
-  >fit.txt || fail "fit more operands"
+"$supine" fit p_supine_rest.ply p_supine_full.ply --state supine:half.ply --other supine:full \
+  --law paper >fit.txt || fail "fit half a breath"
 grep -q 'supine.*: breath scale 0.[45]' fit.txt || fail "half a breath: $(grep scale fit.txt)"
 
 # What is refused, with its exit code.
@@ -243,7 +242,7 @@ refused 1 'nothing to compare with' validate points.safetensors
 refused 1 'make a basis from it first' validate points.json --landmarks full.csv
 refused 1 'landmarks do not give it' validate points.safetensors --landmarks full.csv
 refused 1 'nothing to fit to' fit rest.ply
-refused 1 'determine the gain' fit --landmarks full.csv --gain 0.3 --state prone:rest:prone.csv
+refused 1 'more than two scans' fit rest.ply rest.ply rest.ply
 refused 1 'name that of the first scan' fit --landmarks full.csv --state prone:rest:half.ply
 refused 1 'rest+500' fit --landmarks full.csv --other supine:500
 refused 2 'exchange --rest and --other' fit p_supine_full.ply p_supine_rest.ply --other supine:full

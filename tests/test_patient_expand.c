@@ -96,9 +96,9 @@ static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, doub
   if (supine_patient_fit_surface(&task, found, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  printf("fitted %.3f and %.3f mm without and with, held out %.3f and %.3f, E %.2f to %.2f\n",
+  printf("fitted %.3f and %.3f mm without and with, held out %.3f and %.3f\n",
          found->expand.fitted[0], found->expand.fitted[1], found->expand.held_out[0],
-         found->expand.held_out[1], found->expand.softest, found->expand.stiffest);
+         found->expand.held_out[1]);
   assert_true(found->expand.tried);
   free(state.vertices);
   free(e);
@@ -203,7 +203,7 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
   }
   printf("%zu of %zu regions unseen; E within 15 %% at %.0f %% of what is seen (%.0f %%), %.0f %% "
          "RMS\n",
-         found.expand.unseen, found.expand.regions, 100.0 * (double)close / (double)seen,
+         found.expand.unseen, found.stiffness.count, 100.0 * (double)close / (double)seen,
          100.0 * (double)seen / (double)n, 100.0 * sqrt(squares / (double)seen));
   assert_true(seen > n / 2);
   assert_true(sqrt(squares / (double)seen) < 0.15);

@@ -76,8 +76,7 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   for (size_t i = 0; i < 3 * rest.mesh.vertex_count; ++i) {
     square += pow(positions[i] - expected[i], 2.0) / (double)rest.mesh.vertex_count;
   }
-  double c[SUPINE_PATIENT_CONSTANTS];
-  supine_patient_constants(&patient.power, c);
+  const double *c = patient.power.c;
   printf("largest move %.1f mm; points %.3f mm RMS off; surface %.2f -> %.2f "
          "mm\n",
          largest, sqrt(square), surface.before, surface.after);
@@ -89,7 +88,7 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   /* The force is recovered without use of (18): supine, its heights are 1 - Y. */
   const supine_patient_applied *applied = &fit.applied;
   printf("force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f, "
-         "%zu blocks\n",
+         "%.0f blocks\n",
          applied->correlation, applied->slopes[0], applied->slopes[1], applied->slopes[2],
          applied->spread, applied->left, applied->blocks);
   assert_true(applied->correlation > 0.9);

@@ -129,7 +129,7 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
     const size_t blocks = supine_patient_rows_block(&m->frame, m->rows, n, 1);
     double *area = means + (COLUMNS + 2) * blocks;
     average(m, caught + n, gravity, caught, blocks, means, area);
-    applied->blocks = blocks;
+    applied->blocks = (double)blocks;
     applied->correlation =
         correlate(area, means + COLUMNS * blocks, means + (COLUMNS + 1) * blocks, blocks);
     if (!fit_force(means, area, blocks, applied)) {

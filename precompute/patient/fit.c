@@ -15,9 +15,6 @@ enum {
   SCORES = SUPINE_PATIENT_SCORES
 };
 
-const char *const supine_patient_score_names[SUPINE_PATIENT_SCORES] = {
-    "none", "translation", "affine", "law", "corrected"};
-
 /* Half widths of the 95 % interval over the expected error, for a point and for one component. */
 static const double band_point = 1.8;
 static const double band_component = 1.96;
@@ -131,17 +128,18 @@ static supine_status hold_all_out(study *s, squares *held, supine_error *error) 
   return SUPINE_OK;
 }
 
-/* Find the expected error of a surface's points in three dimensions, mm RMS, and their mean
- * displacement. */
-static void expect(const study *s, supine_patient_krige *krige, supine_patient_fit_report *report) {
+/* Find the expected error of a surface's points in three dimensions, mm RMS; return their mean
+ * displacement, mm. */
+static double expect(const study *s, supine_patient_krige *krige, double *expected) {
   const double share = (double)s->components / (double)s->row_count;
   double variance = 0.0;
+  double moved = 0.0;
   for (size_t i = 0; i < s->row_count; i += s->components) {
     supine_patient_row row = s->rows[i];
     double u[3];
     supine_patient_direction(&krige->law, &row.place,
                              supine_patient_force_at(&krige->law, &row.place), u);
-    report->moved += supine_length(u) * share;
+    moved += supine_length(u) * share;
     for (size_t a = 0; a < 3; ++a) {
       double of;
       for (size_t b = 0; b < 3; ++b) {
@@ -151,18 +149,21 @@ static void expect(const study *s, supine_patient_krige *krige, supine_patient_f
       variance += of * share;
     }
   }
-  report->expected_point = near_surface * sqrt(variance);
+  *expected = near_surface * sqrt(variance);
+  return moved;
 }
 
-/* Convert sums to RMS; return the share of the squared displacement that is explained. */
+static supine_patient_score baseline_of(const study *s) {
+  return s->options.moved != SUPINE_PATIENT_STILL ? SUPINE_PATIENT_SCORE_TRANSLATION
+                                                  : SUPINE_PATIENT_SCORE_NONE;
+}
+
+/* Convert sums to RMS; return the share of the squared displacement that is explained, %. */
 static double conclude(const study *s, const squares *sums, double score[SCORES]) {
-  const bool moved = s->options.moved != SUPINE_PATIENT_STILL;
   for (size_t k = 0; k < SCORES; ++k) {
     score[k] = sqrt(sums->of[k] * (double)s->components / sums->weight);
   }
-  return 1.0 - pow(score[SUPINE_PATIENT_SCORE_CORRECTED] /
-                       score[moved ? SUPINE_PATIENT_SCORE_TRANSLATION : SUPINE_PATIENT_SCORE_NONE],
-                   2.0);
+  return 100.0 * (1.0 - pow(score[SUPINE_PATIENT_SCORE_CORRECTED] / score[baseline_of(s)], 2.0));
 }
 
 /* Fit all rows, then without each fold. */
@@ -170,6 +171,7 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
                          supine_error *error) {
   squares fitted = {.points = 0};
   squares held = {.points = 0};
+  double moved = 0.0;
   supine_patient_krige krige = {0};
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
@@ -177,7 +179,7 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
     add_rows(s, s->rows, s->row_count, &krige, &fitted);
     s->options.sill = krige.sill;
     s->options.uncorrected = krige.sill == 0.0;
-    expect(s, &krige, report);
+    moved = expect(s, &krige, &report->expected_point);
     supine_patient_krige_errors(&krige, report->error);
     supine_patient_krige_take(&krige, patient);
     status = hold_all_out(s, &held, error);
@@ -185,11 +187,13 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
   if (status == SUPINE_OK) {
     report->explained_fitted = conclude(s, &fitted, report->fitted);
     report->explained = conclude(s, &held, report->held_out);
-    report->baseline =
-        report->held_out[s->options.moved != SUPINE_PATIENT_STILL ? SUPINE_PATIENT_SCORE_TRANSLATION
-                                                                  : SUPINE_PATIENT_SCORE_NONE];
+    report->baseline = report->held_out[baseline_of(s)];
     report->expected = sqrt(held.expected * (double)s->components / held.weight);
-    report->band = held.points > 0 ? (double)held.within / (double)held.points : 0.0;
+    if (s->components == 3) {
+      report->expected_point = report->expected;
+    }
+    report->expected_constant = moved > 0.0 ? pow(report->expected_point, 2.0) / moved : 0.0;
+    report->band = held.points > 0 ? 100.0 * (double)held.within / (double)held.points : 0.0;
   }
   supine_patient_krige_free(&krige);
   return status;
@@ -209,7 +213,7 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
              .components = single > 0 ? 1 : 3,
              .fold = malloc(SUPINE_PATIENT_SEEDS * count * sizeof(size_t))};
   supine_status status = SUPINE_OK;
-  *report = (supine_patient_fit_report){.count = single > 0 ? count : triples,
+  *report = (supine_patient_fit_report){.points = (double)(single > 0 ? count : triples),
                                         .components = s.components};
   patient->law = options->law;
   if (single + triples < needed) {
@@ -219,10 +223,11 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
                               single + triples, needed, supine_patient_law_names[options->law]);
   }
   for (size_t seed = 0; seed < SUPINE_PATIENT_SEEDS && status == SUPINE_OK; ++seed) {
-    report->blocks = s.fold == NULL ? 0
-                                    : supine_patient_rows_fold(&patient->frame, rows, count, seed,
-                                                               s.fold + seed * count);
-    if (report->blocks == 0) {
+    const size_t blocks = s.fold == NULL ? 0
+                                         : supine_patient_rows_fold(&patient->frame, rows, count,
+                                                                    seed, s.fold + seed * count);
+    report->blocks = (double)blocks;
+    if (blocks == 0) {
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count);
     }
   }

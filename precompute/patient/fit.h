@@ -18,23 +18,20 @@ typedef enum supine_patient_score {
   SUPINE_PATIENT_SCORES
 } supine_patient_score;
 
-/** "none", "translation", "affine", "law", "corrected". */
-extern const char *const supine_patient_score_names[SUPINE_PATIENT_SCORES];
-
 /** Result of a fit; errors are in mm RMS. */
 typedef struct supine_patient_fit_report {
-  size_t count;      /**< landmarks, or points of a surface */
-  size_t blocks;     /**< cubes of 40 mm with points in them */
+  double points;     /**< number of landmarks, or of points of a surface */
+  double blocks;     /**< number of cubes of 40 mm with points in them */
   size_t components; /**< components measured per point: 3 if all are landmarks, else 1 */
   double fitted[SUPINE_PATIENT_SCORES];   /**< on the fitted points */
   double held_out[SUPINE_PATIENT_SCORES]; /**< on held-out blocks */
   double baseline;  /**< on held-out blocks: of a translation if the scans moved, else of none */
-  double band;      /**< share of held-out points within the 95 % band */
+  double band;      /**< % of the held-out points within the 95 % band */
   double expected;  /**< expected error of held-out points (of one component, if one is measured) */
-  double explained; /**< held-out share of the squared displacement that the law explains */
-  double explained_fitted; /**< the same share of the fitted points */
-  double expected_point;   /**< expected error of points of the surface in three dimensions */
-  double moved;            /**< mean displacement of the fitted points, mm */
+  double explained; /**< held-out share of the squared displacement that the law explains, % */
+  double explained_fitted;                /**< the same share of the fitted points, % */
+  double expected_point;                  /**< expected error of points in three dimensions */
+  double expected_constant;               /**< its square for each mm of displacement, mm */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
 } supine_patient_fit_report;
 

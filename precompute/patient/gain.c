@@ -10,211 +10,143 @@
 #include "precompute/patient/matching.h"
 #include "sh/base/vec3.h"
 
-static const double gain_most = 2.0;     /* largest gain of the search */
-static const double at_bound = 0.01;     /* distance to a bound at which a gain is undetermined */
+static const double gain_least = 0.01, gain_most = 2.0; /* beyond, a gain is undetermined */
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
 static const double matched_least = 0.3; /* least share of a surface's vertices that must match */
 static const double settled = 1e-4;      /* change of a scale between rounds at which they end */
-enum { SEARCH_STEPS = 40, ROUNDS = 20, VERTICES_MAX = 2000, UNKNOWNS = 4, EIGHTHS = 8 };
+static const double force_least = 0.2;   /* least fitted force, of a mean of 1 */
+enum { ROUNDS = 20, VERTICES_MAX = 2000, EIGHTHS = 8, UNKNOWNS = 5 };
 
-/* A further state as rows, axis . (s (now / then) u + t) = value, with now / then of ratio_at. */
-typedef struct state {
-  supine_patient_told *told;
+/* A further state as rows, axis . ((s + s gain turned) u + t) = value. */
+typedef struct work {
+  const supine_patient_record *record;
+  const supine_mesh *surface;       /* NULL: the state is points */
+  bool moved;                       /* fit t */
+  double gains[2][3];               /* part of the way from full inflation to rest of the fuller and
+                                     * the emptier state, by axis */
   supine_patient_matching matching; /* of a state given as a surface */
   size_t count;
   supine_patient_row *rows; /* [count]; block: the eighth of the lungs */
   double *u;                /* [count, 3] from full inflation to rest in the fitted posture, mm */
-  double *heights; /* [count, 2] spread heights, 0 to 1, in the fitted posture and this one */
-  double unknowns[UNKNOWNS]; /* s, t */
-  double weight;             /* sum over the rows */
-} state;
+  double *turned;     /* [count] relative change of the force by this posture, at a gain of 1 */
+  double x[UNKNOWNS]; /* s, s gain, t */
+} work;
 
-typedef struct problem {
-  supine_patient_record *record;
-  bool moved;
-  double gains[2][3]; /* part of the way from full inflation to rest of the fuller and the
-                         emptier state, by axis */
-  state states[SUPINE_PATIENT_OTHERS_MAX];
-  size_t state_count;
-  size_t without; /* the eighth that is left out; EIGHTHS: none */
-} problem;
-
-/* Compute now / then: the force (18) in this posture over that in the fitted one. */
-static double ratio_at(const state *s, size_t i, const supine_force_law *law) {
-  const double *columns = s->rows[i].place.force;
-  double fixed = law->base * columns[0];
-  for (size_t k = 0; k < 3; ++k) {
-    fixed += law->box[k] * (columns[1 + k] + 0.5 * columns[0]);
-  }
-  const double then = fixed + law->gain * s->heights[2 * i];
-  return then != 0.0 ? (fixed + law->gain * s->heights[2 * i + 1]) / then : 0.0;
-}
-
-/* Fit the other unknowns of a state at a gain; return its squared residual, mm^2. */
-static double fit_state(const problem *p, state *s, double gain) {
-  const supine_force_law law =
-      supine_patient_force(&p->record->patient.power, gain, p->record->state[1].gravity);
-  const lapack_int n = p->moved ? UNKNOWNS : 1;
+/* Fit the unknowns by linear least squares without one eighth of the lungs (EIGHTHS: with all);
+ * return the RMS residual, mm. */
+static double fit(work *w, bool turns, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
   double squares = 0.0;
-  s->weight = 0.0;
-  for (size_t i = 0; i < s->count; ++i) {
-    const double *axis = s->rows[i].axis;
-    const double *u = s->u + 3 * i;
-    const double row[UNKNOWNS] = {ratio_at(s, i, &law) * supine_dot(axis, u), axis[0], axis[1],
-                                  axis[2]};
-    const double w = s->rows[i].block == p->without ? 0.0 : s->rows[i].weight;
-    double value = s->rows[i].value; /* from full inflation */
+  double weights = 0.0;
+  for (size_t i = 0; i < w->count; ++i) {
+    const supine_patient_row *row = &w->rows[i];
+    const double weight = row->block == without ? 0.0 : row->weight;
+    const double along = supine_dot(row->axis, w->u + 3 * i);
+    double x[UNKNOWNS] = {along, turns ? w->turned[i] * along : 0.0};
+    double value = row->value; /* from full inflation */
     for (size_t a = 0; a < 3; ++a) {
-      value += p->gains[0][a] * axis[a] * u[a];
+      x[2 + a] = w->moved ? row->axis[a] : 0.0;
+      value += w->gains[0][a] * row->axis[a] * w->u[3 * i + a];
     }
-    cblas_dsyr(CblasColMajor, CblasUpper, n, w, row, 1, matrix, n);
-    cblas_daxpy(n, w * value, row, 1, right, 1);
-    squares += w * value * value;
-    s->weight += w;
+    cblas_dsyr(CblasColMajor, CblasUpper, UNKNOWNS, weight, x, 1, matrix, UNKNOWNS);
+    cblas_daxpy(UNKNOWNS, weight * value, x, 1, right, 1);
+    squares += weight * value * value;
+    weights += weight;
   }
-  memset(s->unknowns, 0, sizeof s->unknowns);
-  cblas_dcopy(n, right, 1, s->unknowns, 1);
-  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', n, 1, matrix, n, s->unknowns, n) != 0) {
-    memset(s->unknowns, 0, sizeof s->unknowns);
+  memcpy(w->x, right, sizeof right);
+  for (size_t t = 0; t < UNKNOWNS; ++t) { /* an unknown that is not fitted is 0 */
+    matrix[t * UNKNOWNS + t] += matrix[t * UNKNOWNS + t] == 0.0 ? 1.0 : 0.0;
   }
-  return fmax(0.0, squares - cblas_ddot(n, s->unknowns, 1, right, 1));
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', UNKNOWNS, 1, matrix, UNKNOWNS, w->x, UNKNOWNS) != 0) {
+    memset(w->x, 0, sizeof w->x);
+  }
+  squares = fmax(0.0, squares - cblas_ddot(UNKNOWNS, w->x, 1, right, 1));
+  return sqrt(squares * (w->surface == NULL ? 3.0 : 1.0) / weights);
 }
 
-static double squares_at(problem *p, double gain) {
-  double squares = 0.0;
-  for (size_t k = 0; k < p->state_count; ++k) {
-    squares += fit_state(p, &p->states[k], gain);
-  }
-  return squares;
-}
-
-/* Minimise over the gain by golden section: `now / then` is all but linear in it. */
-static double search(problem *p) {
-  static const double golden = 0.6180339887498949;
-  double low = 0.0;
-  double high = gain_most;
-  for (int i = 0; i < SEARCH_STEPS; ++i) {
-    const double a = high - golden * (high - low);
-    const double b = low + golden * (high - low);
-    const bool left = squares_at(p, a) < squares_at(p, b);
-    *(left ? &high : &low) = left ? b : a;
-  }
-  return 0.5 * (low + high);
-}
-
-/* Compute the height of a row along gravity from the spread columns of the force: coordinates are
- * linear in box coordinates. */
+/* Compute the height of a row along gravity over the box, 0 to 1, from the spread columns of the
+ * force: coordinates are linear in box coordinates. */
 static double height_at(const supine_patient_frame *frame, const supine_patient_place *place,
-                        const double gravity[3], const double range[2]) {
+                        const double gravity[3]) {
   const double outer = place->side > 0.0 ? frame->maximum[0] : frame->minimum[0];
-  double height = -range[0] * place->force[0];
+  double height = 0.0;
+  double range = 0.0;
   for (int k = 0; k < 3; ++k) {
     const double from = k == 0 ? frame->midline : frame->maximum[k];
     const double size = (k == 0 ? outer : frame->minimum[k]) - from;
-    height += gravity[k] * ((from + 0.5 * size) * place->force[0] + size * place->force[1 + k]);
-  }
-  return height / (range[1] - range[0]);
-}
-
-/* Find the range of heights along gravity, mm: of the lungs, or of the box of landmarks. */
-static supine_status find_range(const problem *p, const state *s, const double gravity[3],
-                                double range[2], supine_error *error) {
-  const supine_patient_frame *frame = &p->record->patient.frame;
-  if (s->told->surface != NULL) {
-    return supine_physics_height_range(s->matching.rest, false, 1, gravity, range, range + 1) ==
-                   SUPINE_OK
-               ? SUPINE_OK
-               : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for heights");
-  }
-  range[0] = range[1] = 0.0;
-  for (int k = 0; k < 3; ++k) {
     const double ends[2] = {gravity[k] * frame->minimum[k], gravity[k] * frame->maximum[k]};
-    range[0] += fmin(ends[0], ends[1]);
-    range[1] += fmax(ends[0], ends[1]);
+    height += gravity[k] * ((from + 0.5 * size) * place->force[0] + size * place->force[1 + k]) -
+              fmin(ends[0], ends[1]) * place->force[0];
+    range += fabs(ends[1] - ends[0]);
   }
-  return SUPINE_OK;
+  return height / range;
 }
 
-/* Make the rows of a state: three for each pair, whose force is not spread, or one for each vertex
- * of `rest` that takes part. */
-static supine_status take_rows(const problem *p, state *s, const supine_lungs *rest,
+/* Make the rows: three for each pair, whose force is not spread, or one for each vertex of `rest`
+ * that takes part. */
+static supine_status take_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
                                supine_error *error) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  const supine_patient_pairs *pairs = s->told->pairs;
-  double *stiffness = NULL;
+  double *stiffness = pairs != NULL ? NULL : malloc(rest->mesh.vertex_count * sizeof *stiffness);
   supine_status status = SUPINE_OK;
-  model.reach = p->record->reach;
   if (pairs != NULL) {
-    s->count = 3 * pairs->count;
-    s->rows = malloc(s->count * sizeof *s->rows);
-  } else {
-    stiffness = malloc(rest->mesh.vertex_count * sizeof *stiffness);
-    if (stiffness != NULL) {
-      supine_patient_stiffness_of(&p->record->stiffness, rest, stiffness);
-      model.stiffness = stiffness;
-      status = supine_patient_matching_create(rest, s->told->surface, &model, VERTICES_MAX, 0,
-                                              &s->matching, error);
-    }
-    s->count = s->matching.count;
-    s->rows = s->matching.rows;
+    w->count = 3 * pairs->count;
+    w->rows = malloc(w->count * sizeof *w->rows);
+  } else if (stiffness != NULL) {
+    supine_patient_stiffness_of(&w->record->stiffness, rest, stiffness);
+    model.reach = w->record->reach;
+    model.stiffness = stiffness;
+    status = supine_patient_matching_create(rest, w->surface, &model, VERTICES_MAX, 0, &w->matching,
+                                            error);
+    w->count = w->matching.count;
+    w->rows = w->matching.rows;
   }
-  s->u = malloc(3 * s->count * sizeof *s->u);
-  s->heights = malloc(2 * s->count * sizeof *s->heights);
-  if (status == SUPINE_OK && (s->rows == NULL || s->u == NULL || s->heights == NULL)) {
+  w->u = malloc(3 * w->count * sizeof *w->u);
+  w->turned = malloc(w->count * sizeof *w->turned);
+  if (status == SUPINE_OK && (w->rows == NULL || w->u == NULL || w->turned == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a further state");
   } else if (status == SUPINE_OK && pairs != NULL) {
-    supine_patient_rows_of_pairs(&p->record->patient.frame, pairs, s->rows);
+    supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, w->rows);
   }
   free(stiffness);
   return status;
 }
 
-/* Set up a state: rows, fitted displacements and heights. */
-static supine_status begin(const problem *p, state *s, const supine_lungs *rest,
-                           supine_error *error) {
-  const supine_patient *patient = &p->record->patient;
-  const double *g[2] = {p->record->state[1].gravity, s->told->state.gravity};
-  double range[2][2];
-  supine_status status = take_rows(p, s, rest, error);
-  for (int c = 0; c < 2 && status == SUPINE_OK; ++c) {
-    status = find_range(p, s, g[c], range[c], error);
-  }
-  for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
-    supine_patient_place place = s->rows[i].place;
-    const supine_patient_frame *frame =
-        s->told->surface != NULL ? &s->matching.frame : &patient->frame;
-    for (size_t c = 0; c < 2; ++c) {
-      s->heights[2 * i + c] = height_at(frame, &place, g[c], range[c]);
-    }
-    s->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
+/* Find the fitted displacement of each row, and the change of the force. */
+static void find_motion(work *w, const supine_lungs *rest, const double gravity[3]) {
+  const supine_patient *patient = &w->record->patient;
+  const double *g = w->record->state[1].gravity;
+  const supine_patient_frame *frame = w->surface != NULL ? &w->matching.frame : &patient->frame;
+  for (size_t i = 0; i < w->count; ++i) {
+    supine_patient_place place = w->rows[i].place;
+    const double *columns = place.force;
+    const double then = 0.5 * columns[0] - g[1] * columns[2] - g[2] * columns[3];
+    w->turned[i] = (height_at(frame, &place, gravity) - then) /
+                   fmax(force_least, supine_patient_force_at(&patient->power, &place));
+    w->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
                        (place.box[2] > 0.5 ? 1U : 0U);
-    if (s->told->surface != NULL && !p->record->from_surface) {
-      /* the box of the landmarks is wider than the surface's */
-      place = supine_patient_find(&patient->frame, rest->mesh.vertices + 3 * s->matching.vertex[i],
+    if (w->surface != NULL && !w->record->from_surface) {
+      /* the landmarks' box is wider than the surface's */
+      place = supine_patient_find(&patient->frame, rest->mesh.vertices + 3 * w->matching.vertex[i],
                                   place.side);
     }
-    supine_patient_displacement(patient, &place, 1.0, s->u + 3 * i);
+    supine_patient_displacement(patient, &place, 1.0, w->u + 3 * i);
     for (size_t k = 0; k < 3; ++k) { /* scale to the way from full inflation to rest */
-      s->u[3 * i + k] /= p->gains[1][k] - p->gains[0][k];
+      w->u[3 * i + k] /= w->gains[1][k] - w->gains[0][k];
     }
   }
-  return status;
 }
 
-/* Find the nearest points, with vertices moved at a gain, a scale and a translation. */
-static supine_status match_surface(const problem *p, state *s, double gain, supine_error *error) {
-  supine_patient_matching *m = &s->matching;
-  const supine_force_law law =
-      supine_patient_force(&p->record->patient.power, gain, p->record->state[1].gravity);
+/* Find the nearest points of the surface, with vertices moved by the unknowns. */
+static supine_status match_surface(work *w, supine_error *error) {
+  supine_patient_matching *m = &w->matching;
   double rms;
   for (size_t i = 0; i < m->count; ++i) {
-    const double ratio = ratio_at(s, i, &law);
+    const double scale = w->x[0] + w->x[1] * w->turned[i];
     for (size_t k = 0; k < 3; ++k) {
       m->moved[3 * i + k] = m->rest->mesh.vertices[3 * m->vertex[i] + k] +
-                            (s->unknowns[0] * ratio - p->gains[0][k]) * s->u[3 * i + k] +
-                            s->unknowns[1 + k];
+                            (scale - w->gains[0][k]) * w->u[3 * i + k] + w->x[2 + k];
     }
   }
   supine_patient_matching_find(m);
@@ -228,86 +160,66 @@ static supine_status match_surface(const problem *p, state *s, double gain, supi
                                 100.0 * matched);
 }
 
-void supine_patient_refer(const supine_patient *patient, size_t count, double *points) {
-  for (size_t i = 0; i < count; ++i) {
-    double u[3];
-    const double point[3] = {points[3 * i], points[3 * i + 1], points[3 * i + 2]};
-    supine_patient_settle(patient, point, 0.0, 1.0, points + 3 * i, u);
-  }
-}
-
-/* Alternate between fitting gain and scales, and finding the nearest points. */
-static supine_status settle(problem *p, double *gain, supine_error *error) {
+/* Alternate between finding the nearest points and the fit, then measure the gain's error. */
+static supine_status settle(work *w, supine_patient_told *told, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;
-  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
-    double before[SUPINE_PATIENT_OTHERS_MAX];
-    change = 0.0;
-    for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
-      before[k] = p->states[k].unknowns[0];
-      status = p->states[k].told->surface == NULL ? SUPINE_OK
-                                                  : match_surface(p, &p->states[k], *gain, error);
-    }
-    *gain = p->record->gain_told ? search(p) : *gain;
-    (void)squares_at(p, *gain);
-    for (size_t k = 0; k < p->state_count && status == SUPINE_OK; ++k) {
-      change = fmax(change, fabs(p->states[k].unknowns[0] - before[k]));
-    }
-  }
-  return status;
-}
-
-static void conclude(problem *p, double gain) {
   double sum = 0.0;
   double square = 0.0;
-  for (size_t k = 0; k < p->state_count; ++k) {
-    state *s = &p->states[k];
-    const double components = s->told->surface == NULL ? 3.0 : 1.0;
-    s->told->left_without = sqrt(fit_state(p, s, 0.0) * components / s->weight);
-    s->told->left = sqrt(fit_state(p, s, gain) * components / s->weight);
-    s->told->scale = s->unknowns[0];
+  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
+    const double before = w->x[0];
+    status = w->surface == NULL ? SUPINE_OK : match_surface(w, error);
+    told->left = fit(w, told->turns, EIGHTHS);
+    change = fabs(w->x[0] - before);
   }
-  for (p->without = 0; p->without < EIGHTHS && p->record->gain_told; ++p->without) {
-    const double other = search(p);
-    sum += other;
-    square += other * other;
+  told->scale = w->x[0];
+  told->gain = w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0;
+  told->left_without = fit(w, false, EIGHTHS);
+  for (size_t without = 0; without < EIGHTHS && told->turns; ++without) {
+    (void)fit(w, true, without);
+    const double off = (w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0) - told->gain;
+    sum += off;
+    square += off * off;
   }
-  p->record->gain_error =
-      sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
+  told->gain_error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
+  return status;
 }
 
-supine_status supine_patient_gain_fit(supine_patient_record *record, const supine_lungs *rest,
-                                      bool moved, supine_error *error) {
-  problem p = {.record = record, .moved = moved, .without = EIGHTHS};
-  const double *g = record->state[1].gravity;
-  double gain = record->force.gain;
-  supine_status status = SUPINE_OK;
-  supine_patient_path(record, p.gains);
-  record->gain_told = false;
-  for (size_t k = 0; k < record->told_count && status == SUPINE_OK; ++k) {
-    state *s = &p.states[p.state_count++];
-    s->told = &record->told[k];
-    record->gain_told =
-        record->gain_told || supine_distance(s->told->state.gravity, g) >= same_posture;
-    status = begin(&p, s, rest, error);
-  }
+supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
+                                      const supine_patient_pairs *pairs, const supine_mesh *surface,
+                                      bool moved, supine_patient_told *told, supine_error *error) {
+  work w = {.record = record, .surface = surface, .moved = moved, .x = {1.0}};
+  told->turns = supine_distance(told->state.gravity, record->state[1].gravity) >= same_posture;
+  supine_patient_path(record, w.gains);
+  supine_status status = take_rows(&w, rest, pairs, error);
   if (status == SUPINE_OK) {
-    status = settle(&p, &gain, error);
+    find_motion(&w, rest, told->state.gravity);
+    status = settle(&w, told, error);
   }
-  if (status == SUPINE_OK) {
-    conclude(&p, gain);
-    record->gain_open = record->gain_told && (gain < at_bound || gain > gain_most - at_bound);
-    if (!record->gain_open) {
-      record->force = supine_patient_force(&record->patient.power, gain, g);
-    }
+  if (surface == NULL) {
+    free(w.rows);
   }
-  for (size_t k = 0; k < p.state_count; ++k) {
-    if (p.states[k].told->surface == NULL) {
-      free(p.states[k].rows);
-    }
-    supine_patient_matching_free(&p.states[k].matching);
-    free(p.states[k].u);
-    free(p.states[k].heights);
-  }
+  supine_patient_matching_free(&w.matching);
+  free(w.u);
+  free(w.turned);
   return status;
+}
+
+void supine_patient_gain_take(supine_patient_record *record) {
+  double gain = 0.0;
+  double precision = 0.0;
+  for (size_t k = 0; k < record->told_count; ++k) {
+    const supine_patient_told *told = &record->told[k];
+    const double weight = told->turns ? pow(fmax(1e-6, told->gain_error), -2.0) : 0.0;
+    gain += weight * told->gain;
+    precision += weight;
+  }
+  if (precision > 0.0) {
+    gain /= precision;
+    record->gain_error = pow(precision, -0.5);
+    record->gain_open = gain < gain_least || gain > gain_most;
+  }
+  if (precision > 0.0 && !record->gain_open) {
+    record->force = supine_patient_force(&record->patient.power, gain, record->state[1].gravity);
+  }
 }

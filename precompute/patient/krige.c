@@ -15,7 +15,7 @@ enum {
   TERMS = SUPINE_PATIENT_TERMS,
   LAW = SUPINE_PATIENT_CONSTANTS, /* terms of the constants; those of the motion follow */
   SCALE = TERMS - 1,
-  WIDTH = TERMS + 1, /* of the design: the terms, then the residual */
+  TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
 
@@ -23,6 +23,7 @@ static const double scale_spread = 0.3;  /* prior deviation of the size of a law
                                           * relative */
 static const double settled = 1e-10;     /* relative decrease of the squares that ends the fit */
 static const double damping_most = 1e10; /* damping at which no step decreases the squares: end */
+static const double region_least = 0.02; /* least expandability of a region */
 
 /* Beyond these exponents all motion is at one face; beyond these slopes the force changes sign. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
@@ -48,10 +49,10 @@ static bool keeps_shape(const supine_patient_krige *k) {
   return k->size_only || (k->kind == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
-/* Find the prior standard deviation of a term: 0 known, INFINITY free. */
+/* Find the prior standard deviation of a term of the law: 0 known, INFINITY free. */
 static double spread_of(const supine_patient_krige *k, size_t term) {
   static const size_t motion[] = {0, 3, 6};
-  const double unit = term < 3 ? fabs(k->mean.lengths[term]) : 1.0;
+  const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
   const bool kept = keeps_shape(k);
   return term == SCALE                   ? (k->size_only ? INFINITY
                                             : kept       ? scale_spread
@@ -64,18 +65,19 @@ static double spread_of(const supine_patient_krige *k, size_t term) {
 static double offset_of(const supine_patient_krige *k, size_t term) {
   const supine_patient_power *law = &k->law;
   const supine_patient_power *mean = &k->mean;
-  return term == SCALE ? law->lengths[0] / mean->lengths[0] - 1.0
-         : term < 3    ? law->lengths[term] - mean->lengths[term]
-         : term < 6    ? log(law->powers[term - 3] / mean->powers[term - 3])
-                       : law->powers[term - 3] - mean->powers[term - 3];
+  return term == SCALE ? law->c[0] / mean->c[0] - 1.0
+         : term < 3    ? law->c[2 * term] - mean->c[2 * term]
+         : term < 6    ? log(law->c[2 * term - 5] / mean->c[2 * term - 5])
+                       : law->c[term] - mean->c[term];
 }
 
 static supine_patient_power moved_by(const supine_patient_power *law, const double step[TERMS]) {
   supine_patient_power moved = *law;
   for (size_t a = 0; a < 3; ++a) {
-    moved.lengths[a] += step[a] + step[SCALE] * law->lengths[a];
-    moved.powers[a] = fmin(exponent_most, fmax(exponent_least, law->powers[a] * exp(step[3 + a])));
-    moved.powers[3 + a] = fmin(slope_most, fmax(-slope_most, law->powers[3 + a] + step[6 + a]));
+    moved.c[2 * a] += step[a] + step[SCALE] * law->c[2 * a];
+    moved.c[2 * a + 1] =
+        fmin(exponent_most, fmax(exponent_least, law->c[2 * a + 1] * exp(step[3 + a])));
+    moved.c[6 + a] = fmin(slope_most, fmax(-slope_most, law->c[6 + a] + step[6 + a]));
     moved.motion[a] += step[9 + a];
     moved.motion[3 + a] += step[12 + a];
   }
@@ -83,6 +85,20 @@ static supine_patient_power moved_by(const supine_patient_power *law, const doub
 }
 
 /* --- the rows -------------------------------------------------------------------------------- */
+
+/* Compute the derivative of a row by each term; return the law's value less the row's, mm. */
+static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
+  if (k->region_count == 0) {
+    return supine_patient_power_design(&k->law, row, x);
+  }
+  supine_patient_row with = *row;
+  with.place.force[0] = cblas_ddot((int)k->region_count, row->response, 1, k->region, 1);
+  const double left = supine_patient_power_design(&k->law, &with, x);
+  for (size_t t = TERMS; t < k->terms; ++t) {
+    x[t] = x[SCALE] / with.place.force[0] * row->response[t - TERMS];
+  }
+  return left;
+}
 
 static double noise_of(const supine_patient_krige *k, const supine_patient_row *row) {
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
@@ -94,7 +110,7 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
   double logarithm = 0.0;
-  k->scaled_sill = k->sill * (keeps_shape(k) ? fabs(k->mean.lengths[0] / k->law.lengths[0]) : 1.0);
+  k->scaled_sill = k->sill * (keeps_shape(k) ? fabs(k->mean.c[0] / k->law.c[0]) : 1.0);
   for (size_t i = 0; i < n; ++i) {
     k->centre[i] = centre_of(&k->law, &k->rows[i].place);
     logarithm += k->sill > 0.0 ? 0.0 : log(noise_of(k, &k->rows[i]));
@@ -118,53 +134,73 @@ static double factor(supine_patient_krige *k) {
   return logarithm;
 }
 
-/* Build the normal equations of the terms at the present law, and the squared residual. */
-static void linearise(supine_patient_krige *k) {
-  const int n = (int)k->count;
-  for (size_t i = 0; i < k->count; ++i) {
-    double *row = k->design + WIDTH * i;
-    row[TERMS] = -supine_patient_power_design(&k->law, &k->rows[i], row);
-    if (k->sill <= 0.0) {
-      cblas_dscal(WIDTH, 1.0 / noise_of(k, &k->rows[i]), row, 1);
-    }
-  }
-  if (k->sill > 0.0) {
-    cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, WIDTH, 1.0,
-                k->factor, n, k->design, WIDTH);
-  }
-  cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, TERMS, n, 1.0, k->design, WIDTH, 0.0,
-              k->normal, TERMS);
-  cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, 1.0, k->design, WIDTH, k->design + TERMS, WIDTH,
-              0.0, k->right, 1);
-  k->squares = cblas_ddot(n, k->design + TERMS, WIDTH, k->design + TERMS, WIDTH);
+/* Add the prior of the terms to the normal equations. */
+static void add_prior(supine_patient_krige *k) {
+  const size_t terms = k->terms;
   for (size_t t = 0; t < TERMS; ++t) {
     const double of = spread_of(k, t);
     if (of == 0.0) { /* known: the row of the identity */
       k->right[t] = 0.0;
-      for (size_t s = 0; s < TERMS; ++s) {
-        k->normal[s < t ? t * TERMS + s : s * TERMS + t] = s == t ? 1.0 : 0.0;
+      for (size_t s = 0; s < terms; ++s) {
+        k->normal[s < t ? t * terms + s : s * terms + t] = s == t ? 1.0 : 0.0;
       }
     } else if (isfinite(of)) {
-      k->normal[t * TERMS + t] += pow(of, -2.0);
+      k->normal[t * terms + t] += pow(of, -2.0);
       k->right[t] -= offset_of(k, t) * pow(of, -2.0);
       k->squares += pow(offset_of(k, t) / of, 2.0);
     }
   }
+  for (size_t t = TERMS; t < terms; ++t) {
+    const double *precision = k->precision + (t - TERMS) * k->region_count;
+    double gradient = 0.0;
+    for (size_t s = TERMS; s < terms; ++s) {
+      gradient += precision[s - TERMS] * (k->region[s - TERMS] - 1.0);
+      k->normal[t * terms + s] += s <= t ? precision[s - TERMS] : 0.0;
+    }
+    k->right[t] -= gradient;
+    k->squares += gradient * (k->region[t - TERMS] - 1.0);
+  }
+}
+
+/* Build the normal equations of the terms at the present law, and the squared residual. */
+static void linearise(supine_patient_krige *k) {
+  const int n = (int)k->count;
+  const int terms = (int)k->terms;
+  const int width = terms + 1; /* of the design: the terms, then the residual */
+  for (size_t i = 0; i < k->count; ++i) {
+    double *row = k->design + (size_t)width * i;
+    row[terms] = -design_row(k, &k->rows[i], row);
+    if (k->sill <= 0.0) {
+      cblas_dscal(width, 1.0 / noise_of(k, &k->rows[i]), row, 1);
+    }
+  }
+  if (k->sill > 0.0) {
+    cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, width, 1.0,
+                k->factor, n, k->design, width);
+  }
+  cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, terms, n, 1.0, k->design, width, 0.0,
+              k->normal, terms);
+  cblas_dgemv(CblasRowMajor, CblasTrans, n, terms, 1.0, k->design, width, k->design + terms, width,
+              0.0, k->right, 1);
+  k->squares = cblas_ddot(n, k->design + terms, width, k->design + terms, width);
+  add_prior(k);
 }
 
 /* Solve for a damped step; false if the matrix is singular. */
-static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS]) {
-  double matrix[TERMS * TERMS];
-  memcpy(matrix, k->normal, sizeof matrix);
-  memcpy(step, k->right, TERMS * sizeof *step);
-  for (size_t t = 0; t < TERMS; ++t) {
-    matrix[t * TERMS + t] *= 1.0 + damping;
+static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS_MAX]) {
+  const lapack_int terms = (lapack_int)k->terms;
+  double *matrix = k->normal + k->terms * k->terms;
+  memcpy(matrix, k->normal, k->terms * k->terms * sizeof *matrix);
+  memcpy(step, k->right, k->terms * sizeof *step);
+  for (size_t t = 0; t < k->terms; ++t) {
+    matrix[t * k->terms + t] *= 1.0 + damping;
   }
-  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', TERMS, 1, matrix, TERMS, step, TERMS) == 0;
+  return LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', terms, 1, matrix, terms, step, terms) == 0;
 }
 
 static bool factor_terms(supine_patient_krige *k) {
-  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', TERMS, k->normal, TERMS) == 0;
+  const lapack_int terms = (lapack_int)k->terms;
+  return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal, terms) == 0;
 }
 
 /* Minimise the squares over the law; false where the rows do not determine it. */
@@ -174,11 +210,16 @@ static bool descend(supine_patient_krige *k) {
   for (size_t steps = 0; steps < STEPS && damping < damping_most; ++steps) {
     const supine_patient_power before = k->law;
     const double squares = k->squares;
-    double step[TERMS];
+    double region[SUPINE_PATIENT_REGIONS_MAX];
+    double step[TERMS_MAX];
+    memcpy(region, k->region, sizeof region);
     if (!isfinite(squares) || !find_step(k, damping, step)) {
       return false;
     }
     k->law = moved_by(&before, step);
+    for (size_t t = TERMS; t < k->terms; ++t) {
+      k->region[t - TERMS] = fmax(region_least, region[t - TERMS] + step[t]);
+    }
     linearise(k);
     if (k->squares <= squares && squares - k->squares <= settled * squares) {
       break;
@@ -187,6 +228,7 @@ static bool descend(supine_patient_krige *k) {
     damping = nearer ? 0.1 * damping : fmax(1e-3, 10.0 * damping);
     if (!nearer) {
       k->law = before;
+      memcpy(k->region, region, sizeof region);
       linearise(k);
     }
   }
@@ -204,7 +246,7 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   }
   for (size_t t = 0; t < TERMS; ++t) {
     const double of = spread_of(k, t);
-    likelihood -= log(k->normal[t * TERMS + t]);
+    likelihood -= log(k->normal[t * k->terms + t]);
     likelihood -= of > 0.0 && isfinite(of) ? log(of) : 0.0;
   }
   k->law = before;
@@ -244,9 +286,11 @@ static bool fit_alone(supine_patient_krige *k, bool size_only) {
   k->noise = 1.0;
   k->size_only = size_only;
   k->law = k->mean;
+  k->terms = TERMS;
   (void)factor(k);
   const bool right = descend(k);
   k->size_only = false;
+  k->terms = TERMS + k->region_count;
   k->alone = k->law;
   return right;
 }
@@ -254,18 +298,25 @@ static bool fit_alone(supine_patient_krige *k, bool size_only) {
 static supine_status open(supine_patient_krige *k, const supine_patient_fit_options *options,
                           const supine_patient_row *rows, size_t count, bool corrected,
                           supine_error *error) {
+  const size_t terms = TERMS + options->region_count;
   *k = (supine_patient_krige){.rows = rows,
                               .count = count,
                               .kind = options->law,
                               .moved = options->moved,
+                              .region_count = options->region_count,
+                              .precision = options->precision,
                               .mean = supine_patient_deep(options->gravity, options->way),
                               .centre = malloc(count * sizeof *k->centre),
                               .factor = corrected ? malloc(count * count * sizeof(double)) : NULL,
-                              .design = malloc(WIDTH * count * sizeof *k->design),
+                              .design = malloc((terms + 1) * count * sizeof *k->design),
+                              .normal = malloc(2 * terms * terms * sizeof *k->normal),
                               .weight = malloc(count * sizeof *k->weight),
                               .scratch = malloc(count * sizeof *k->scratch)};
+  for (size_t r = 0; r < k->region_count; ++r) {
+    k->region[r] = 1.0;
+  }
   return k->centre == NULL || (corrected && k->factor == NULL) || k->design == NULL ||
-                 k->weight == NULL || k->scratch == NULL
+                 k->normal == NULL || k->weight == NULL || k->scratch == NULL
              ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count)
              : SUPINE_OK;
 }
@@ -274,6 +325,7 @@ void supine_patient_krige_free(supine_patient_krige *krige) {
   free(krige->centre);
   free(krige->factor);
   free(krige->design);
+  free(krige->normal);
   free(krige->weight);
   free(krige->scratch);
 }
@@ -307,7 +359,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   if (!right || !factor_terms(k)) {
     return undetermined(error);
   }
-  cblas_dcopy(n, k->design + TERMS, WIDTH, k->weight, 1);
+  cblas_dcopy(n, k->design + k->terms, (int)k->terms + 1, k->weight, 1);
   if (k->sill > 0.0) {
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->factor, n, k->weight, 1);
   }
@@ -330,18 +382,30 @@ supine_status supine_patient_law_fit(const supine_patient_fit_options *options,
 }
 
 /* Compute the variance of the combination x of the terms; x is overwritten. */
-static double variance_of(const supine_patient_krige *k, double x[TERMS]) {
-  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, TERMS, k->normal, TERMS, x, 1);
-  return cblas_ddot(TERMS, x, 1, x, 1);
+static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
+  const int terms = (int)k->terms;
+  cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, terms, k->normal, terms, x, 1);
+  return cblas_ddot(terms, x, 1, x, 1);
+}
+
+void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share) {
+  const supine_patient_krige *k = krige;
+  const lapack_int terms = (lapack_int)k->terms;
+  for (size_t r = 0; r < k->region_count; ++r) { /* 1 - (normal^-1 precision)[r, r] */
+    double x[TERMS_MAX] = {0.0};
+    memcpy(x + TERMS, k->precision + r * k->region_count, k->region_count * sizeof *x);
+    (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', terms, 1, k->normal, terms, x, terms);
+    share[r] = 1.0 - x[TERMS + r];
+  }
 }
 
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]) {
   for (size_t t = 0; t < LAW; ++t) {
     const bool exponent = t >= 3 && t < 6;
-    const size_t c = t < 3 ? 2 * t : exponent ? 2 * (t - 3) + 1 : t;
-    double x[TERMS] = {0.0};
-    x[t] = exponent ? krige->law.powers[t - 3] : 1.0;
+    const size_t c = t < 3 ? 2 * t : exponent ? 2 * t - 5 : t;
+    double x[TERMS_MAX] = {0.0};
+    x[t] = exponent ? krige->law.c[c] : 1.0;
     error[c] = spread_of(krige, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
   }
 }
@@ -350,8 +414,8 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
                                     double *variance) {
   supine_patient_krige *k = krige;
   const int n = (int)k->count;
-  double x[WIDTH];
-  double value = supine_patient_power_design(&k->law, row, x) + row->value;
+  double x[TERMS_MAX];
+  double value = design_row(k, row, x) + row->value;
   *variance = 0.0;
   if (k->sill > 0.0) {
     const supine_patient_centre at = centre_of(&k->law, &row->place);
@@ -362,8 +426,8 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
     value += cblas_ddot(n, k->scratch, 1, k->weight, 1);
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, k->factor, n, k->scratch,
                 1);
-    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, k->design, WIDTH, k->scratch, 1, 1.0, x,
-                1);
+    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, k->design, TERMS + 1, k->scratch, 1, 1.0,
+                x, 1);
     *variance = k->scaled_sill * supine_patient_covariance(&at, &at) -
                 cblas_ddot(n, k->scratch, 1, k->scratch, 1);
   }

@@ -19,11 +19,13 @@
 
 typedef struct supine_patient_row {
   supine_patient_place place;
-  double axis[3]; /* unit */
-  double value;   /* displacement along the axis, mm */
-  double weight;  /* of the squared residual */
-  double noise;   /* standard deviation, mm */
-  size_t block;   /* index of the block that it is held out with */
+  double axis[3];         /* unit */
+  double value;           /* displacement along the axis, mm */
+  double weight;          /* of the squared residual */
+  double noise;           /* standard deviation, mm */
+  size_t block;           /* index of the block that it is held out with */
+  const double *response; /* [regions] spread force of each region of expandability alone; NULL
+                           * where none is fitted */
 } supine_patient_row;
 
 /* Make three rows of each pair into rows [3 count]. */
@@ -47,8 +49,8 @@ enum { SUPINE_PATIENT_FOLDS = 5 };
 /* --- the law at a row ------------------------------------------------------------------------ */
 
 /* Unknowns: c1, c3, c5; logarithms of c2, c4, c6; c7 to c9; translation; small rotation;
- * scale of the whole law. */
-enum { SUPINE_PATIENT_TERMS = 16 };
+ * scale of the whole law. The expandability of each region follows, where it is fitted. */
+enum { SUPINE_PATIENT_TERMS = 16, SUPINE_PATIENT_REGIONS_MAX = 256 };
 
 /* Compute the derivative of a row by each unknown; return the law's value less the row's, mm. */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
@@ -82,6 +84,10 @@ typedef struct supine_patient_fit_options {
   double way[3];     /* by axis, as for supine_patient_deep */
   double sill;       /* factor on the covariance of g; 0: the most likely one */
   double noise;      /* factor on the noise of the rows; 0: the most likely one */
+  /* Regions whose expandability a_k is fitted, and their prior: the force on a row is the sum over
+   * k of a_k response_k, and a - 1 has this precision [regions, regions] and mean 0. */
+  size_t region_count;
+  const double *precision;
 } supine_patient_fit_options;
 
 /* A fit and its working space. */
@@ -90,21 +96,25 @@ typedef struct supine_patient_krige {
   size_t count;
   supine_patient_law kind;
   supine_patient_moved moved;
-  bool size_only;             /* only the law's size and the motion are unknown */
-  double sill, noise;         /* factors in use; a sill of 0: no g */
-  supine_patient_power mean;  /* prior mean of the constants */
-  supine_patient_power alone; /* the law fitted without g */
+  bool size_only; /* only the law's size and the motion are unknown */
+  size_t terms;   /* unknowns of `design` and `normal` */
+  size_t region_count;
+  const double *precision;
+  double region[SUPINE_PATIENT_REGIONS_MAX]; /* expandability of each region; 1 of uniform tissue */
+  double sill, noise;                        /* factors in use; a sill of 0: no g */
+  supine_patient_power mean;                 /* prior mean of the constants */
+  supine_patient_power alone;                /* the law fitted without g */
   supine_patient_power law;
   double scaled_sill;            /* factor on the covariance of g, for a law of size 1 */
   supine_patient_centre *centre; /* [count] kernel of each row, without its weight */
   double *factor;                /* [count, count] Cholesky factor of the covariance, if g */
-  double *design;                /* [count, TERMS + 1] whitened derivatives and residual */
+  double *design;                /* [count, terms + 1] whitened derivatives and residual */
   double *weight;                /* [count] weight of each row's kernel */
   double *scratch;               /* [count] */
-  /* Normal matrix, in the end its Cholesky factor. */
-  double normal[SUPINE_PATIENT_TERMS * SUPINE_PATIENT_TERMS];
-  double right[SUPINE_PATIENT_TERMS]; /* right-hand side of the normal equations */
-  double squares;                     /* squared whitened residual, plus the prior's */
+  double *normal; /* [2, terms, terms] normal matrix, in the end its Cholesky factor; work space */
+  double squares; /* squared whitened residual, plus the prior's */
+  /* Right-hand side of the normal equations. */
+  double right[SUPINE_PATIENT_TERMS + SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_krige;
 
 /* Fit the size of the deep law, which gives the prior's mean, then the law and g. `deep` keeps the
@@ -118,6 +128,10 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        const supine_patient_row *rows, size_t count,
                                        supine_patient_krige *krige, supine_error *error);
 void supine_patient_krige_free(supine_patient_krige *krige);
+
+/* Compute the share [regions] of each region's expandability that the rows determine: the diagonal
+ * of the resolution matrix. The remainder comes from neighbouring regions. */
+void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share);
 
 /* Compute the standard errors of c1 to c9; 0 for those that are not fitted. */
 void supine_patient_krige_errors(const supine_patient_krige *krige,

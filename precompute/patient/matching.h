@@ -84,23 +84,18 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
  * such that a known force moves it to the other surface.
  *
  * The motion depends only on the product a f of expandability and force, so f is fixed to the
- * model's (18). The spread force F is then linear in the regions' values a_k, F =
- * sum of a_k F_k, where F_k is the spread force of region k alone: one solve with a right-hand
- * side for each region. The fit alternates between
- *
- *     least over a of  sum of w (along_i sum of a_k F_ik - target_i)^2 + roughness + (a_k - 1)^2
- *
- * which is linear least squares, and the law's directions and the motion between the scans
- * (supine_patient_law_fit), until neither changes. Where the surfaces say little about a region,
- * its neighbours determine it; the diagonal of the resolution matrix says how much the surfaces
- * contribute.
+ * model's (18). The spread force F is then linear in the regions' values a_k, F = sum of a_k F_k,
+ * where F_k is the spread force of region k alone: one solve with a right-hand side for each
+ * region. The values are fitted together with the constants of the paper law and the motion between
+ * the scans (krige.h), with a prior that keeps neighbours alike and a near 1; fit and nearest
+ * points alternate. Where the surfaces say little about a region, its neighbours determine it.
  *
  * The result is kept only if it predicts held-out blocks of 40 mm better than uniform tissue
- * does under the same force. The matching, without landmarks, ends at the rows of the law that is
- * kept.
+ * does under the same force.
+ * @param matching   without landmarks; its force is spread by the stiffness afterwards
  * @param options    of the paper's law; the gravity of the other state
  * @param model      its force is held fixed
- * @param patient    in: the law fitted without expandability; out: the law that is kept
+ * @param patient    its frame is set; overwritten
  * @param stiffness  no regions if it was not kept
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,

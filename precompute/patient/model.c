@@ -271,8 +271,8 @@ void supine_patient_model(const supine_patient_field *field, supine_model *model
   model->reach = record->reach;
   model->direction = (supine_direction_law){.correct = direct, .context = field};
   for (size_t k = 0; k < 3; ++k) {
-    model->direction.c[2 * k] = -record->patient.power.lengths[k] / field->way[k];
-    model->direction.c[2 * k + 1] = record->patient.power.powers[k];
+    model->direction.c[2 * k] = -record->patient.power.c[2 * k] / field->way[k];
+    model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
   }
 }
 

@@ -81,33 +81,24 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double w
   supine_patient_power law = {.motion = {0.0}};
   const double *g = supine_length(gravity) > 0.0 ? gravity : supine;
   for (size_t k = 0; k < 3; ++k) {
-    law.lengths[k] = model.direction.c[2 * k] * (supine_length(way) > 0.0 ? way[k] : 1.0);
-    law.powers[k] = model.direction.c[2 * k + 1];
+    law.c[2 * k] = model.direction.c[2 * k] * (supine_length(way) > 0.0 ? way[k] : 1.0);
+    law.c[2 * k + 1] = model.direction.c[2 * k + 1];
     /* With gravity along +y the heights fall along Y, along +z they fall along Z (lungs.h). */
-    law.powers[3 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
+    law.c[6 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
   }
   return law;
 }
 
-void supine_patient_constants(const supine_patient_power *power,
-                              double c[SUPINE_PATIENT_CONSTANTS]) {
-  for (size_t a = 0; a < 3; ++a) {
-    c[2 * a] = power->lengths[a];
-    c[2 * a + 1] = power->powers[a];
-    c[6 + a] = power->powers[3 + a];
-  }
-}
-
 double supine_patient_force_at(const supine_patient_power *power,
                                const supine_patient_place *place) {
-  return place->force[0] + supine_dot(power->powers + 3, place->force + 1); /* (18) */
+  return place->force[0] + supine_dot(power->c + 6, place->force + 1); /* (18) */
 }
 
 void supine_patient_direction(const supine_patient_power *power, const supine_patient_place *place,
                               double force, double d[3]) {
   for (int k = 0; k < 3; ++k) { /* (15)-(17) */
-    d[k] = force * (k == 0 ? place->side : -1.0) * power->lengths[k] *
-           pow(inside(place->box[k]), power->powers[k]);
+    d[k] = force * (k == 0 ? place->side : -1.0) * power->c[2 * k] *
+           pow(inside(place->box[k]), power->c[2 * k + 1]);
   }
 }
 
@@ -169,10 +160,18 @@ void supine_patient_settle(const supine_patient *patient, const double point[3],
   }
 }
 
+void supine_patient_refer(const supine_patient *patient, size_t count, double *points) {
+  for (size_t i = 0; i < count; ++i) {
+    double u[3];
+    const double point[3] = {points[3 * i], points[3 * i + 1], points[3 * i + 2]};
+    supine_patient_settle(patient, point, 0.0, 1.0, points + 3 * i, u);
+  }
+}
+
 supine_force_law supine_patient_force(const supine_patient_power *power, double gain,
                                       const double gravity[3]) {
   supine_force_law law = {.gain = gain, .pair = true};
-  const double *slope = power->powers + 3;
+  const double *slope = power->c + 6;
   /* Heights fall along Y and grow along Z where the patient lies supine or stands. In a patient
    * on the side they run along x, opposite in X in the two lungs, so no term of X represents
    * them. */

@@ -51,9 +51,9 @@ enum {
 
 /** The constants of a law, and the motion between the scans. */
 typedef struct supine_patient_power {
-  double powers[6];  /**< c2, c4, c6, c7, c8, c9 */
-  double lengths[3]; /**< c1, c3, c5, mm; negative if the lung empties */
-  double motion[6];  /**< translation (mm), small rotation (rad) about the box's centre;
+  double c[SUPINE_PATIENT_CONSTANTS]; /**< c1 to c9; c1, c3 and c5 in mm, negative if the lung
+                                         empties; the force is 1 at the box's centre */
+  double motion[6]; /**< translation (mm), small rotation (rad) about the box's centre;
                         u + motion is what was measured */
 } supine_patient_power;
 
@@ -110,10 +110,6 @@ supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_
  * that lies between the two states (all 0: 1). */
 supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]);
 
-/** Copy the constants c1 to c9 in this order, the force scaled to 1 at the box's centre. */
-void supine_patient_constants(const supine_patient_power *power,
-                              double c[SUPINE_PATIENT_CONSTANTS]);
-
 /** Compute (18) of the law at a place. */
 double supine_patient_force_at(const supine_patient_power *power,
                                const supine_patient_place *place);
@@ -145,6 +141,9 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
  * @param u       its displacement, mm */
 void supine_patient_settle(const supine_patient *patient, const double point[3], double side,
                            double spread, double at[3], double u[3]);
+
+/** Move points [count, 3] of the emptier state to their places in the fuller one. */
+void supine_patient_refer(const supine_patient *patient, size_t count, double *points);
 
 /** Split the force of a patient's law into a part that follows gravity, of slope `gain`, and one
  * that is fixed to the body. In the fitted posture their sum does not depend on the gain. */

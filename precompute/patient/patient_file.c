@@ -12,7 +12,11 @@
 #include "sh/base/output.h"
 
 static const char format[] = "supine-patient";
-enum { VERSION = 2, CENTRE = sizeof(supine_patient_centre) / sizeof(double) };
+enum {
+  VERSION = 3,
+  CENTRE = sizeof(supine_patient_centre) / sizeof(double),
+  REGION = sizeof(supine_patient_mode) / sizeof(double)
+};
 
 /* A number of a record, or an array of numbers. */
 typedef struct numbers {
@@ -20,34 +24,53 @@ typedef struct numbers {
   const char *key;
   size_t count;  /* 1: no array */
   size_t offset; /* in the record, bytes */
+  bool optional; /* left out where all are 0; all others are required when reading */
 } numbers;
 
 #define AT(member) offsetof(supine_patient_record, member)
+#define SCORE(key, score)                                                                          \
+  {"fitted_rms_mm", key, 1, AT(report.fitted[SUPINE_PATIENT_SCORE_##score]), false}, {             \
+    "held_out_rms_mm", key, 1, AT(report.held_out[SUPINE_PATIENT_SCORE_##score]), false            \
+  }
 
-/* All of them are written, and required when reading. */
-static const numbers table[] = {{NULL, "points", 1, AT(points)},
-                                {NULL, "held_out_rms_mm", 1, AT(held_out)},
-                                {NULL, "held_out_baseline_mm", 1, AT(held_out_baseline)},
-                                {NULL, "expected_rms_mm", 1, AT(expected)},
-                                {NULL, "band_95_percent_holds", 1, AT(band)},
-                                {NULL, "fitted_rms_mm", 1, AT(fitted)},
-                                {NULL, "explained_percent", 1, AT(explained)},
-                                {"frame", "minimum_mm", 3, AT(patient.frame.minimum)},
-                                {"frame", "maximum_mm", 3, AT(patient.frame.maximum)},
-                                {"frame", "midline_mm", 1, AT(patient.frame.midline)},
-                                {"emptier_frame", "minimum_mm", 3, AT(emptier[0])},
-                                {"emptier_frame", "maximum_mm", 3, AT(emptier[1])},
-                                {"fuller", "volume_ml", 1, AT(volume[0])},
-                                {"emptier", "volume_ml", 1, AT(volume[1])},
-                                {NULL, "reach_mm", 1, AT(reach)},
-                                {"force", "base", 1, AT(force.base)},
-                                {"force", "gain", 1, AT(force.gain)},
-                                {"force", "box", 3, AT(force.box)},
-                                {"motion", "translation_mm", 3, AT(patient.power.motion[0])},
-                                {"motion", "rotation_rad", 3, AT(patient.power.motion[3])},
-                                {NULL, "lengths_mm", 3, AT(patient.power.lengths)},
-                                {NULL, "powers", 6, AT(patient.power.powers)},
-                                {NULL, "expected_constant_mm", 1, AT(expected_constant)}};
+static const numbers table[] = {
+    {NULL, "points", 1, AT(report.points), false},
+    {NULL, "blocks", 1, AT(report.blocks), false},
+    SCORE("none", NONE),
+    SCORE("translation", TRANSLATION),
+    SCORE("affine", AFFINE),
+    SCORE("law", LAW),
+    SCORE("corrected", CORRECTED),
+    {"held_out_rms_mm", "baseline", 1, AT(report.baseline), false},
+    {NULL, "explained_percent", 1, AT(report.explained), false},
+    {NULL, "explained_fitted_percent", 1, AT(report.explained_fitted), false},
+    {NULL, "expected_rms_mm", 1, AT(report.expected_point), false},
+    {NULL, "expected_constant_mm", 1, AT(report.expected_constant), false},
+    {NULL, "band_95_percent_holds", 1, AT(report.band), false},
+    {"frame", "minimum_mm", 3, AT(patient.frame.minimum), false},
+    {"frame", "maximum_mm", 3, AT(patient.frame.maximum), false},
+    {"frame", "midline_mm", 1, AT(patient.frame.midline), false},
+    {"emptier_frame", "minimum_mm", 3, AT(emptier[0]), false},
+    {"emptier_frame", "maximum_mm", 3, AT(emptier[1]), false},
+    {"fuller", "volume_ml", 1, AT(volume[0]), false},
+    {"emptier", "volume_ml", 1, AT(volume[1]), false},
+    {NULL, "reach_mm", 1, AT(reach), false},
+    {"force", "base", 1, AT(force.base), false},
+    {"force", "gain", 1, AT(force.gain), false},
+    {"force", "gain_standard_error", 1, AT(gain_error), true},
+    {"force", "box", 3, AT(force.box), false},
+    {"motion", "translation_mm", 3, AT(patient.power.motion[0]), false},
+    {"motion", "rotation_rad", 3, AT(patient.power.motion[3]), false},
+    {NULL, "c1_to_c9", SUPINE_PATIENT_CONSTANTS, AT(patient.power.c), false},
+    {NULL, "standard_errors", SUPINE_PATIENT_CONSTANTS, AT(report.error), true},
+    {"expandability", "fitted_without_and_with_mm", 2, AT(expand.fitted), true},
+    {"expandability", "held_out_without_and_with_mm", 2, AT(expand.held_out), true},
+    {"applied_force", "blocks", 1, AT(applied.blocks), true},
+    {"applied_force", "matched_share", 1, AT(applied.matched), true},
+    {"applied_force", "correlation_with_height", 1, AT(applied.correlation), true},
+    {"applied_force", "c7_to_c9", 3, AT(applied.slopes), true},
+    {"applied_force", "left_rms", 1, AT(applied.left), true},
+    {"applied_force", "spread_rms", 1, AT(applied.spread), true}};
 
 /* --- writing --------------------------------------------------------------------------------- */
 
@@ -75,112 +98,45 @@ static json_t *state_text(const supine_state *state) {
 
 static const char *const sides[3] = {"right", "both", "left"};
 
-static void add_report(json_t *root, const supine_patient_record *record) {
-  static const char *const names[SUPINE_PATIENT_CONSTANTS] = {"c1", "c2", "c3", "c4", "c5",
-                                                              "c6", "c7", "c8", "c9"};
-  const supine_patient_fit_report *report = &record->report;
-  double c[SUPINE_PATIENT_CONSTANTS];
-  json_t *constants = group_of(root, "paper_constants");
-  supine_patient_constants(&record->patient.power, c);
-  for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS && record->patient.law == SUPINE_PATIENT_PAPER;
-       ++k) {
-    (void)json_object_set_new(
-        constants, names[k],
-        json_pack("{s:f, s:f}", "value", c[k], "standard_error", report->error[k]));
-  }
-  for (size_t k = 0; k < SUPINE_PATIENT_SCORES; ++k) {
-    (void)json_object_set_new(group_of(root, "fitted"), supine_patient_score_names[k],
-                              json_real(report->fitted[k]));
-    (void)json_object_set_new(group_of(root, "held_out"), supine_patient_score_names[k],
-                              json_real(report->held_out[k]));
-  }
-  (void)json_object_set_new(root, "blocks", json_integer((json_int_t)report->blocks));
-  (void)json_object_set_new(root, "explained_fitted_percent",
-                            json_real(100.0 * report->explained_fitted));
-}
-
-static json_t *expandability(const supine_patient_record *record) {
-  const supine_patient_expand_report *report = &record->expand;
-  json_t *of = json_object();
-  if (report->tried) {
-    (void)json_object_update_new(
-        of, json_pack("{s:b, s:o, s:o, s:f, s:f}", "kept", report->kept ? 1 : 0,
-                      "fitted_without_and_with_mm", array_of(report->fitted, 2),
-                      "held_out_without_and_with_mm", array_of(report->held_out, 2), "softest",
-                      report->softest, "stiffest", report->stiffest));
-  }
-  for (size_t k = 0; k < record->stiffness.count; ++k) {
-    const supine_patient_mode *mode = &record->stiffness.mode[k];
-    const char *side = sides[1 + mode->side];
-    if (json_object_get(of, side) == NULL) {
-      (void)json_object_set_new(of, side, json_array());
-    }
-    (void)json_array_append_new(json_object_get(of, side),
-                                json_pack("{s:f, s:f, s:o, s:f}", "expandability", mode->value,
-                                          "seen", mode->seen, "centre_mm",
-                                          array_of(mode->centre, 3), "radius_mm", mode->radius));
-  }
-  return of;
-}
-
-static json_t *applied(const supine_patient_applied *of) {
-  return json_pack("{s:i, s:f, s:f, s:o, s:f, s:f}", "blocks", (int)of->blocks, "matched_percent",
-                   100.0 * of->matched, "correlation_with_height", of->correlation, "c7_to_c9",
-                   array_of(of->slopes, 3), "left_rms", of->left, "spread_rms", of->spread);
-}
-
-static json_t *further(const supine_patient_record *record) {
+/* Make an array of `count` arrays of `width` numbers. */
+static json_t *list_of(const void *values, size_t width, size_t count) {
   json_t *all = json_array();
-  for (size_t k = 0; k < record->told_count; ++k) {
-    const supine_patient_told *told = &record->told[k];
-    (void)json_array_append_new(all,
-                                json_pack("{s:o, s:f, s:f, s:f}", "state", state_text(&told->state),
-                                          "scale", told->scale, "left_rms_mm", told->left,
-                                          "left_without_gain_mm", told->left_without));
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_array_append_new(all, array_of((const double *)values + width * i, width));
   }
   return all;
 }
 
 static json_t *encode(const supine_patient_record *record, const char *made_by) {
   const supine_patient *patient = &record->patient;
-  json_t *centres = json_array();
-  json_t *root = json_pack("{s:s, s:i, s:s, s:s, s:{s:s, s:s}, s:{s:o}, s:{s:o}, s:{s:o}}",
-                           "format", format, "version", VERSION, "name", record->name, "law",
-                           supine_patient_law_names[patient->law], "frame", "lungs",
-                           sides[1 + patient->frame.only_side], "of",
-                           record->from_surface ? "surface" : "landmarks", "fuller", "state",
-                           state_text(&record->state[0]), "emptier", "state",
-                           state_text(&record->state[1]), "correction", "centres", centres);
-  if (root == NULL) {
-    return NULL;
-  }
-  for (size_t i = 0; i < sizeof table / sizeof *table; ++i) {
+  json_t *further = json_array();
+  json_t *root = json_pack(
+      "{s:s, s:i, s:s, s:s, s:{s:s, s:s}, s:{s:o}, s:{s:o}, s:{s:o}, s:{s:o}, s:o, s:s*}", "format",
+      format, "version", VERSION, "name", record->name, "law",
+      supine_patient_law_names[patient->law], "frame", "lungs", sides[1 + patient->frame.only_side],
+      "of", record->from_surface ? "surface" : "landmarks", "fuller", "state",
+      state_text(&record->state[0]), "emptier", "state", state_text(&record->state[1]),
+      "correction", "centres", list_of(patient->centre, CENTRE, patient->centre_count),
+      "expandability", "regions", list_of(record->stiffness.mode, REGION, record->stiffness.count),
+      "further_states", further, "made_by", made_by);
+  for (size_t i = 0; i < sizeof table / sizeof *table && root != NULL; ++i) {
     const double *values = (const double *)((const char *)record + table[i].offset);
-    (void)json_object_set_new(group_of(root, table[i].group), table[i].key,
-                              table[i].count == 1 ? json_real(*values)
-                                                  : array_of(values, table[i].count));
+    bool any = !table[i].optional;
+    for (size_t k = 0; k < table[i].count; ++k) {
+      any = any || values[k] != 0.0;
+    }
+    if (any) {
+      (void)json_object_set_new(group_of(root, table[i].group), table[i].key,
+                                table[i].count == 1 ? json_real(*values)
+                                                    : array_of(values, table[i].count));
+    }
   }
-  for (size_t i = 0; i < patient->centre_count; ++i) {
-    (void)json_array_append_new(centres, array_of((const double *)&patient->centre[i], CENTRE));
-  }
-  if (record->told_count > 0) {
-    (void)json_object_set_new(root, "further_states", further(record));
-  }
-  if (record->gain_told) {
-    (void)json_object_set_new(root, "gain_determined", json_boolean(!record->gain_open));
-    (void)json_object_set_new(root, "gain_standard_error", json_real(record->gain_error));
-  }
-  if (record->expand.tried || record->stiffness.count > 0) {
-    (void)json_object_set_new(root, "expandability", expandability(record));
-  }
-  if (record->applied.blocks > 0) {
-    (void)json_object_set_new(root, "applied_force", applied(&record->applied));
-  }
-  if (record->report.blocks > 0) {
-    add_report(root, record);
-  }
-  if (made_by != NULL) {
-    (void)json_object_set_new(root, "made_by", json_string(made_by));
+  for (size_t k = 0; k < record->told_count && root != NULL; ++k) {
+    const supine_patient_told *told = &record->told[k];
+    (void)json_array_append_new(further,
+                                json_pack("{s:o, s:f, s:f, s:f}", "state", state_text(&told->state),
+                                          "scale", told->scale, "left_rms_mm", told->left,
+                                          "left_without_gain_mm", told->left_without));
   }
   return root;
 }
@@ -256,34 +212,31 @@ static bool take_frame(const json_t *root, supine_patient_record *record) {
           (frame->midline > frame->minimum[0] && frame->midline < frame->maximum[0]));
 }
 
-static bool take_correction(const json_t *centres, supine_patient *patient) {
-  patient->centre_count = json_array_size(centres);
-  bool right = json_is_array(centres) && patient->centre_count <= SUPINE_PATIENT_CENTRES_MAX;
-  for (size_t i = 0; right && i < patient->centre_count; ++i) {
-    supine_patient_centre *of = &patient->centre[i];
-    right = take_numbers(json_array_get(centres, i), CENTRE, (double *)of) && of->size >= 0.0;
+/* Read an array of at most `most` arrays of `width` numbers. */
+static bool take_list(const json_t *from, size_t width, size_t most, void *values, size_t *count) {
+  bool right = json_is_array(from) && json_array_size(from) <= most;
+  *count = 0;
+  for (; right && *count < json_array_size(from); ++*count) {
+    right = take_numbers(json_array_get(from, *count), width, (double *)values + width * *count);
   }
   return right;
 }
 
-/* Read the regions, those of the left lung first. */
-static bool take_stiffness(const json_t *object, supine_patient_stiffness *stiffness) {
-  bool right = true;
-  for (int side = 1; side >= -1; side -= 2) {
-    const json_t *all = json_object_get(object, sides[1 + side]);
-    for (size_t k = 0; k < json_array_size(all) && right; ++k) {
-      const json_t *of = json_array_get(all, k);
-      if (stiffness->count == SUPINE_PATIENT_MODES) {
-        return false;
-      }
-      supine_patient_mode *mode = &stiffness->mode[stiffness->count++];
-      mode->side = side;
-      right = take_numbers(json_object_get(of, "expandability"), 1, &mode->value) &&
-              take_numbers(json_object_get(of, "seen"), 1, &mode->seen) &&
-              take_numbers(json_object_get(of, "radius_mm"), 1, &mode->radius) &&
-              take_numbers(json_object_get(of, "centre_mm"), 3, mode->centre) &&
-              mode->value > 0.0 && mode->radius > 0.0;
-    }
+static bool take_correction(const json_t *root, supine_patient *patient) {
+  bool right = take_list(json_object_get(json_object_get(root, "correction"), "centres"), CENTRE,
+                         SUPINE_PATIENT_CENTRES_MAX, patient->centre, &patient->centre_count);
+  for (size_t i = 0; i < patient->centre_count; ++i) {
+    right = right && patient->centre[i].size >= 0.0;
+  }
+  return right;
+}
+
+static bool take_regions(const json_t *root, supine_patient_stiffness *stiffness) {
+  bool right = take_list(json_object_get(json_object_get(root, "expandability"), "regions"), REGION,
+                         SUPINE_PATIENT_MODES, stiffness->mode, &stiffness->count);
+  for (size_t k = 0; k < stiffness->count; ++k) {
+    const supine_patient_mode *mode = &stiffness->mode[k];
+    right = right && fabs(mode->side) == 1.0 && mode->value > 0.0 && mode->radius > 0.0;
   }
   return right;
 }
@@ -294,8 +247,9 @@ static const char *take(const json_t *root, supine_patient_record *record) {
   for (size_t i = 0; i < sizeof table / sizeof *table; ++i) {
     const numbers *of = &table[i];
     const json_t *group = of->group != NULL ? json_object_get(root, of->group) : root;
-    if (!take_numbers(json_object_get(group, of->key), of->count,
-                      (double *)((char *)record + of->offset))) {
+    const json_t *value = json_object_get(group, of->key);
+    if (!(of->optional && value == NULL) &&
+        !take_numbers(value, of->count, (double *)((char *)record + of->offset))) {
       return of->group != NULL ? of->group : of->key;
     }
   }
@@ -309,12 +263,9 @@ static const char *take(const json_t *root, supine_patient_record *record) {
          : !take_state(text_of(root, "emptier", "state"), &record->state[1]) ? "emptier"
          : !is_box(record->emptier[0], record->emptier[1])                   ? "emptier_frame"
          : !(record->reach >= 0.0)                                           ? "reach_mm"
-         : !take_correction(json_object_get(json_object_get(root, "correction"), "centres"),
-                            patient)
-             ? "correction"
-         : !take_stiffness(json_object_get(root, "expandability"), &record->stiffness)
-             ? "expandability"
-             : NULL;
+         : !take_correction(root, patient)                                   ? "correction"
+         : !take_regions(root, &record->stiffness)                           ? "expandability"
+                                                                             : NULL;
 }
 
 supine_status supine_patient_read(const char *path, supine_patient_record *record,

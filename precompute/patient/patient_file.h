@@ -14,17 +14,18 @@ enum {
   SUPINE_PATIENT_TEXT = 48,
   SUPINE_PATIENT_OTHERS_MAX = 8,
   SUPINE_PATIENT_STATE_TEXT = 160,
-  SUPINE_PATIENT_MODES = 256 /**< most regions of both lungs */
+  SUPINE_PATIENT_MODES = SUPINE_PATIENT_REGIONS_MAX /**< most regions of both lungs */
 };
 
-/** A further state of the same lungs: its surface, or matched points of it and the fuller state. */
+/** A further state of the same lungs, as fitted. */
 typedef struct supine_patient_told {
   supine_state state;
-  const supine_patient_pairs *pairs; /**< NULL if the state is a surface */
-  const supine_mesh *surface;        /**< used if pairs is NULL */
-  double scale;                      /**< fitted: distance from full inflation, 1 at rest */
-  double left;         /**< RMS residual of the fit, mm; of a surface along its normals */
-  double left_without; /**< the same at a gain of 0, with all of the force fixed to the body */
+  bool turns;              /**< its posture is not the fitted one, so the gain is fitted */
+  double scale;            /**< distance from full inflation, 1 at rest */
+  double left;             /**< RMS residual of the fit, mm; of a surface along its normals */
+  double left_without;     /**< the same at a gain of 0, with all of the force fixed to the body */
+  double gain, gain_error; /**< gain and its standard error, by leaving out each eighth of the
+                                lungs (jackknife) */
 } supine_patient_told;
 
 /** A patient's expandability a = 1/E ([Santhanam2008] VI) as a weighted mean over a few
@@ -36,7 +37,7 @@ typedef struct supine_patient_told {
  *
  * This is one region. */
 typedef struct supine_patient_mode {
-  int side;         /**< of its lung: 1 left, -1 right */
+  double side;      /**< of its lung: 1 left, -1 right */
   double value;     /**< a_k > 0 */
   double centre[3]; /**< mm, in the reference surface */
   double radius;    /**< mm, > 0 */
@@ -53,14 +54,12 @@ typedef struct supine_patient_stiffness {
 /** Least diagonal of the resolution matrix at which a region counts as seen. */
 #define SUPINE_PATIENT_SEEN 0.5
 
-/** Fit and held-out error, without and with expandability. */
+/** Fit and held-out error of uniform tissue and of the regions. */
 typedef struct supine_patient_expand_report {
   bool tried, kept;
   double fitted[2];   /**< RMS distance between the surfaces along normals, mm, without and with */
   double held_out[2]; /**< the same on held-out blocks */
-  double softest, stiffest; /**< range of E that holds nine tenths of the seen regions; the
-                             * geometric mean of all is 1 */
-  size_t regions, unseen;   /**< number of regions, and of those that do not count as seen */
+  size_t unseen;      /**< number of regions that do not count as seen */
 } supine_patient_expand_report;
 
 /** The force that a measured displacement shows ([Santhanam2008] IV-B.3), with no assumption about
@@ -72,7 +71,7 @@ typedef struct supine_patient_expand_report {
  * The inversion amplifies the roughness of u by (spreading length / edge length)^2, so f is
  * averaged over blocks of 40 mm of surface: the operator conserves sums. */
 typedef struct supine_patient_applied {
-  size_t blocks;
+  double blocks;      /**< number of blocks; 0: not found */
   double matched;     /**< share of the vertices with a compatible point on the other surface */
   double correlation; /**< between force and height along gravity, over the blocks */
   double slopes[3];   /**< c7 to c9 of (18) fitted to the force, 1 at the box's centre */
@@ -97,23 +96,16 @@ typedef struct supine_patient_record {
   double volume[2];       /**< mL; 0: unknown */
   double emptier[2][3];   /**< box of the emptier state, mm; the fuller one's is the frame */
   bool from_surface;      /**< the boxes are of surfaces, else of landmarks */
-  double points;          /**< number of fitted points */
-  double held_out, held_out_baseline, fitted; /**< mm RMS */
-  double explained;                           /**< % of the squared displacement */
-  double expected_constant;           /**< mm: expected square error per mm of displacement */
-  double expected;                    /**< of held-out points, mm RMS */
-  double band;                        /**< % of held-out points in the 95 % band */
+  supine_patient_fit_report report;
   supine_patient_stiffness stiffness; /**< no regions: even tissue */
+  supine_patient_expand_report expand;
+  supine_patient_applied applied;
+  double gain_error; /**< standard error of the gain; 0: not fitted */
   /* Not in a record that was read: */
   size_t told_count; /**< further states */
   supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
-  bool gain_told;    /**< some further state was in another posture, so the gain was fitted */
-  bool gain_open;    /**< the fit ended at a bound: the gain is undetermined and kept */
-  double gain_error; /**< standard error, by leaving out each eighth of the lungs (jackknife) */
-  supine_patient_fit_report report; /**< written if it has blocks */
+  bool gain_open; /**< the gain that fits is not between 0 and 2: it is undetermined and kept */
   supine_patient_surface_report surface;
-  supine_patient_expand_report expand; /**< written if it was tried */
-  supine_patient_applied applied;      /**< written if it has blocks */
 } supine_patient_record;
 
 /** Write the record whole or not at all.
@@ -211,24 +203,27 @@ supine_status supine_patient_fit_surface(const supine_patient_surface_task *task
 
 /* --- from scans in other postures ------------------------------------------------------------ */
 
-/** Move points [count, 3] of the emptier state to their places in the fuller one. */
-void supine_patient_refer(const supine_patient *patient, size_t count, double *points);
-
-/** Find the gain from the record's further states, with the fitted field u of the law, scaled to
- * the whole way from full inflation to rest (supine_patient_path):
+/** Fit the gain to a further state, with the fitted field u of the law, scaled to the whole way
+ * from full inflation to rest (supine_patient_path):
  *
- *     u_j(p) = s_j f(g_j, p) / f(g, p) u(p) (+ t_j)      f of supine_patient_force at that gain,
- *                                                        for a surface, the spread force
+ *     u_j(p) = s_j (1 + gain_j (h_j(p) - h(p)) / f(p)) u(p) (+ t_j)
  *
- * minus the displacement of the fuller state from full inflation, if known. s_j and the
- * translations t_j come from linear least squares, the gain from a search between 0 and 2; the
- * nearest points of surfaces are found again each round.
- * @param record  its force gets the gain, its further states their fits
- * @param rest    the surface of the fuller state; NULL where no state is a surface
- * @param moved   also fit a translation between the scans
+ * minus the displacement of the fuller state from full inflation, if known; h are heights along
+ * gravity in that posture and the fitted one, f is the fitted force, and of a surface all of them
+ * are spread. s_j, s_j gain_j and t_j come from linear least squares; the nearest points of a
+ * surface are found again each round.
+ * @param rest     the surface of the fuller state; NULL if `surface` is
+ * @param pairs    points of the fuller state and of this one; NULL: give `surface`
+ * @param moved    also fit a translation between the scans
+ * @param told     its state is set; the rest is written
  * @retval SUPINE_ERROR_MESH    too few compatible points
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
-supine_status supine_patient_gain_fit(supine_patient_record *record, const supine_lungs *rest,
-                                      bool moved, supine_error *error);
+supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
+                                      const supine_patient_pairs *pairs, const supine_mesh *surface,
+                                      bool moved, supine_patient_told *told, supine_error *error);
+
+/** Set the gain of the record's force to the mean over its further states in other postures,
+ * weighted by the inverse variances. */
+void supine_patient_gain_take(supine_patient_record *record);
 
 #endif

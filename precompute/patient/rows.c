@@ -101,18 +101,18 @@ double supine_patient_power_design(const supine_patient_power *law, const supine
   double turned[3];
   double even = 0.0; /* along the row, for a force of 1 */
   supine_patient_power unit = *law;
-  unit.lengths[0] = unit.lengths[1] = unit.lengths[2] = 1.0;
+  unit.c[0] = unit.c[2] = unit.c[4] = 1.0;
   supine_patient_direction(&unit, &row->place, 1.0, along);
   supine_patient_motion(law, &row->place, motion);
   supine_cross(row->place.arm, row->axis, turned);
   for (size_t a = 0; a < 3; ++a) {
     along[a] *= row->axis[a];
-    even += law->lengths[a] * along[a];
+    even += law->c[2 * a] * along[a];
   }
   for (size_t a = 0; a < 3; ++a) {
     const double box = fmin(1.0, fmax(1e-12, row->place.box[a]));
     x[a] = force * along[a];
-    x[3 + a] = law->lengths[a] * x[a] * law->powers[a] * log(box);
+    x[3 + a] = law->c[2 * a] * x[a] * law->c[2 * a + 1] * log(box);
     x[6 + a] = even * row->place.force[1 + a];
     x[9 + a] = row->axis[a];
     x[12 + a] = turned[a];

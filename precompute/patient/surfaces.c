@@ -120,7 +120,7 @@ static supine_status judge(matching *m, const supine_patient_surface_task *task,
                                             &record->patient, report, error);
   if (status == SUPINE_OK && record->expand.kept) {
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
-    report->explained = 1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0);
+    report->explained = 100.0 * (1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0));
   }
   return status == SUPINE_OK
              ? supine_patient_applied_find(m, &record->patient, task->options.gravity,
@@ -140,7 +140,9 @@ static supine_status run(matching *m, const supine_patient_surface_task *task,
   if (status == SUPINE_OK && task->expandability) {
     status = supine_patient_expand(m, wanted, task->model, &record->patient, &record->stiffness,
                                    &record->expand, error);
-    record->surface.matched = supine_patient_matching_weigh(m, 0.0, &record->surface.after);
+    if (status == SUPINE_OK) { /* the law again, with the force spread over that tissue */
+      status = settle(m, wanted, &record->patient, &record->surface, error);
+    }
   }
   return status == SUPINE_OK ? judge(m, task, wanted, record, error) : status;
 }
