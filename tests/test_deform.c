@@ -149,6 +149,27 @@ TEST(test_basis_error_many_frames_bound_nearly_reached) {
   drop(&o);
 }
 
+/* The directions that the stated error is searched over treat all axes alike. */
+TEST(test_storage_error_mode_along_any_axis_same) {
+  double error[3];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    fixture *f = fixture_create(500, 2, 1, 1, false, false, 11, 5);
+    memset(f->mode, 0, 8 * sizeof *f->mode);
+    f->mode[0] = 1;
+    f->mode[4 + 1 + axis] = 3;
+    for (size_t i = 0; i < f->vertices; ++i) {
+      f->coefficient[2 * i] *= 0.01F;
+    }
+    opened o = made(f);
+    supine_basis *basis = open_as(&o, SUPINE_STORAGE_INT16, SUPINE_SIMD_AUTO);
+    error[axis] = supine_basis_get_info(basis)->storage_error;
+    supine_basis_close(basis);
+    drop(&o);
+  }
+  assert_true(fabs(error[1] - error[0]) <= 1e-9 * error[0]);
+  assert_true(fabs(error[2] - error[0]) <= 1e-9 * error[0]);
+}
+
 TEST(test_storage_error_orders_storages) {
   opened o = made(fixture_create(500, 16, 3, 2, false, true, 11, 5));
   double error[SUPINE_STORAGE_COUNT] = {0};

@@ -506,4 +506,81 @@ TEST(test_load_from_threads_good_and_bad) {
   supine_mesh_free(&mesh);
 }
 
+#define VTP(head, points, polys, data)                                                             \
+  "<VTKFile type=\"PolyData\" " head "><PolyData><Piece NumberOfPoints=\"3\" NumberOfPolys=\"1\">" \
+  "<Points>" points "</Points><Polys>" polys "</Polys></Piece></PolyData>" data "</VTKFile>"
+#define VTP_ASCII(points, connectivity, offsets)                                                   \
+  VTP("byte_order=\"LittleEndian\"",                                                               \
+      "<DataArray type=\"Float32\" format=\"ascii\">" points "</DataArray>",                       \
+      "<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">" connectivity             \
+      "</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">" offsets           \
+      "</DataArray>",                                                                              \
+      "")
+#define VTP_POINTS "0 0 0 1 0 0 0 1 0"
+#define VTP_BINARY(header, points, encoding, data)                                                 \
+  VTP("byte_order=\"LittleEndian\" " header,                                                       \
+      "<DataArray type=\"Int8\" format=\"binary\">" points "</DataArray>",                         \
+      "<DataArray type=\"Int8\" Name=\"connectivity\" format=\"appended\" offset=\"0\"/>"          \
+      "<DataArray type=\"UInt8\" Name=\"offsets\" format=\"appended\" offset=\"12\"/>",            \
+      "<AppendedData encoding=\"" encoding "\">_" data "</AppendedData>")
+
+/* Arrays of bytes 0 0 0 1 0 0 0 1 0, 0 1 2 and 3 in base64, each after its size in 4 or 8 bytes. */
+TEST(test_load_vtp_each_encoding_same_triangle) {
+  static const char *const texts[] = {
+      VTP_ASCII(VTP_POINTS, "0 1 2", "3"),
+      VTP_BINARY("", "CQAAAAAAAAEAAAABAA==", "base64", "AwAAAAABAg==AQAAAAM="),
+      VTP_BINARY("header_type=\"UInt32\"", " CQAA AAAA AAEA\nAAAB AA== ", "base64",
+                 "AwAAAAABAg==AQAAAAM="),
+  };
+  static const double vertices[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  static const uint32_t triangle[3] = {0, 1, 2};
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
+    char path[256];
+    supine_mesh mesh = load(sample_text(state, "a.vtp", texts[i], path), NULL, NULL);
+    assert_int_equal(mesh.vertex_count, 3);
+    assert_int_equal(mesh.triangle_count, 1);
+    assert_memory_equal(mesh.vertices, vertices, sizeof vertices);
+    assert_memory_equal(mesh.triangles, triangle, sizeof triangle);
+    supine_mesh_free(&mesh);
+  }
+}
+
+TEST(test_load_vtp_strips_cut_into_triangles) {
+  static const char text[] =
+      "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"4\" NumberOfStrips=\"1\">"
+      "<Points><DataArray type=\"Float64\" format=\"ascii\">0 0 0 1 0 0 0 1 0 1 1 0</DataArray>"
+      "</Points><Strips><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3"
+      "</DataArray><DataArray type=\"Int64\" Name=\"offsets\" "
+      "format=\"ascii\">4</DataArray></Strips>"
+      "</Piece></PolyData></VTKFile>";
+  static const uint32_t triangles[6] = {0, 1, 2, 1, 3, 2};
+  char path[256];
+  supine_mesh mesh = load(sample_text(state, "a.vtp", text, path), NULL, NULL);
+  assert_int_equal(mesh.triangle_count, 2);
+  assert_memory_equal(mesh.triangles, triangles, sizeof triangles);
+  supine_mesh_free(&mesh);
+}
+
+TEST(test_load_vtp_bad_files_refused) {
+  static const char *const texts[][2] = {
+      {"<VTKFile type=\"ImageData\"></VTKFile>", "no VTKFile of type PolyData"},
+      {VTP("byte_order=\"BigEndian\"", "", "", ""), "big-endian"},
+      {VTP("compressor=\"vtkLZ4DataCompressor\"", "", "", ""), "not compressed by zlib"},
+      {"<VTKFile type=\"PolyData\"></VTKFile>", "no Piece"},
+      {"<VTKFile type=\"PolyData\"><Piece ></Piece><Piece ></Piece></VTKFile>", "several pieces"},
+      {"<VTKFile type=\"PolyData\"><Piece NumberOfPoints=\"-3\"></Piece></VTKFile>", "invalid"},
+      {VTP("", "", "", ""), "no array of points"},
+      {VTP_ASCII("0 0 0 1 0 0 0 1", "0 1 2", "3"), "truncated or damaged"},
+      {VTP_ASCII(VTP_POINTS, "0 1 2", "-3"), "offsets of its polygons are invalid"},
+      {VTP_ASCII(VTP_POINTS, "0 1", "3"), "truncated or damaged"},
+      {VTP_BINARY("", "CAAAAAAAAAEAAAABAA==", "base64", "AwAAAAABAg==AQAAAAM="), "damaged"},
+      {VTP_BINARY("header_type=\"UInt64\"", "CQAAAAAAAAEAAAABAA==", "base64", ""), "damaged"},
+      {VTP_BINARY("", "CQAAAAAAAAEAAAABAA==", "base64", "AwAAAAABAg=="), "damaged"},
+      {VTP_BINARY("", "CQAAAAAAAAEAAAABAA==", "raw", "AwAAAAABAg==AQAAAAM="), "damaged"},
+  };
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
+    refuse_text(state, "a.vtp", texts[i][0], SUPINE_ERROR_FORMAT, texts[i][1]);
+  }
+}
+
 TEST_GROUP(sample_folder_create, sample_folder_remove)

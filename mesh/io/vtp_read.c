@@ -202,7 +202,9 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", v->file->path);
   } else {
     const bool ascii = is_attribute(e, "format", "ascii");
-    mesh_text text = {(const unsigned char *)e->body, (const unsigned char *)v->end};
+    const char *tag = memchr(e->body, '<', (size_t)(v->end - e->body));
+    mesh_text text = {(const unsigned char *)e->body,
+                      (const unsigned char *)(tag != NULL ? tag : v->end)};
     bool good = ascii || take_bytes(v, e, count * type->size, bytes);
     for (size_t i = 0; i < count && good && ascii; ++i) {
       good = supine_mesh_text_number(&text, &values[i]);
