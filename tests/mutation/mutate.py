@@ -1,17 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mutation testing: the code with one thing wrong, built and tested; a test must fail.
+"""Mutation testing: change the code in one place, build it, and expect that a test fails.
 
-    mutate.py named [PATTERN]          those of named.txt whose title has the pattern
-    mutate.py random [COUNT] [SEED]    a random COUNT (100) of places in the rooms below
+    mutate.py named [PATTERN]          mutants of named.txt whose title matches the pattern
+    mutate.py random [COUNT] [SEED]    a random COUNT (100) of mutants of the folders in ROOMS
 
-Works on a copy of what is committed, in build/mutation. A mutant is killed where a test fails or runs
-beyond its time; one that does not compile does not count. A random mutant meets the tests that reach its
-line, the quick before the slower, until one fails or they took ENOUGH: which those are an instrumented
-build tells, in which each test runs once alone, kept for further seeds of the same commit. Left out are
-tests that fail there, those that take longer than SLOW and those that build the project anew, so that
-what survives is an upper bound. CMake's further options come from SUPINE_CMAKE_OPTIONS:
--DSUPINE_LUNGS=FOLDER, say.
+Works on a copy of the last commit, in build/mutation. A mutant is killed if a test fails or exceeds its
+time; one that does not compile does not count. A random mutant is run against the tests that reach its
+line, quick ones first, until one fails or they took ENOUGH seconds. An instrumented build, in which each
+test runs once alone, shows which tests these are; the result is kept for other seeds of the same commit.
+Tests that fail there, take longer than SLOW or build the project again are left out, so the number of
+survivors is an upper bound. Set further options of CMake in SUPINE_CMAKE_OPTIONS: -DSUPINE_LUNGS=FOLDER.
 """
 import json
 import os
@@ -32,11 +31,11 @@ COPY = FOLDER / "source"
 BUILD = FOLDER / "build"
 COMMIT = subprocess.run(["git", "-C", str(SOURCE), "rev-parse", "HEAD"], check=True, text=True,
                         stdout=subprocess.PIPE).stdout.strip()
-ROOMS = ("sh", "mesh", "precompute", "runtime")
-QUICK, SLOW = 2.0, 320.0  # s, instrumented: some three times what a test takes optimised
-ENOUGH = 240.0  # s, of all that one mutant meets
-JOBS = str(len(os.sched_getaffinity(0)))  # as many as it may use
-LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"  # reads the sources, builds anew, takes any input
+ROOMS = ("sh", "mesh", "precompute", "runtime", "program")
+QUICK, SLOW = 2.0, 320.0  # s, instrumented: about three times that of an optimised build
+ENOUGH = 240.0  # s, all tests of one mutant
+JOBS = str(len(os.sched_getaffinity(0)))  # processors available
+LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"  # read the sources, build the project again, or accept any input
 
 
 def run(*command, cwd=BUILD, **environment):
@@ -68,14 +67,14 @@ def build(folder=BUILD):
 
 
 def failed_tests(names):
-    """Those of the tests that fail or run beyond their time, at most a few."""
+    """Return the tests that fail or exceed their time, at most a few."""
     _, said = run("ctest", "-R", f"^({'|'.join(names)})$", "-j", JOBS, "--stop-on-failure") if names else (0, "")
     return re.findall(r"Test +#\d+: (\S+) \.*\*\*\*(?!Skipped)", said)
 
 
 def tries(path, changed, groups):
-    """The test that reports the change, '' where none does, None where it does not compile. A group is
-    tests' names."""
+    """Return the test that fails with the change, '' if none does, None if it does not compile. A group
+    is a list of names of tests."""
     file = COPY / path
     before = file.read_text()
     file.write_text(changed)
@@ -116,7 +115,7 @@ def named(word):
     return survived == 0
 
 
-OPERATORS = [  # what is looked for, and what may take its place
+OPERATORS = [  # pattern, and its possible replacements
     (r" < ", [" <= ", " > "]), (r" > ", [" >= ", " < "]), (r" <= ", [" < "]), (r" >= ", [" > "]),
     (r" == ", [" != "]), (r" != ", [" == "]), (r" && ", [" || "]), (r" \|\| ", [" && "]),
     (r" \+ ", [" - "]), (r" - ", [" + "]), (r" \* (?=[\w(])", [" / "]), (r" / ", [" * "]),
@@ -124,7 +123,7 @@ OPERATORS = [  # what is looked for, and what may take its place
     (r"\b\d+\.\d+\b", ["(1.3 * \\g<0>)", "(0.5 + \\g<0>)"]), (r"(?<=if \()(?=.)", ["!"]),
     (r"\btrue\b", ["false"]), (r"\bfalse\b", ["true"]), (r"\bfmax\b", ["fmin"]),
     (r"\bfmin\b", ["fmax"]),
-    (r"^ +[a-z][\w>.\[\]-]*(\([^()]*\))?( [+-]?= [^;{}]*)?;$", [";"]),  # a statement less
+    (r"^ +[a-z][\w>.\[\]-]*(\([^()]*\))?( [+-]?= [^;{}]*)?;$", [";"]),  # delete a statement
 ]
 
 
@@ -148,7 +147,7 @@ def places():
 def random_ones(count, seed):
     chosen = random.Random(seed)
     took, reached = measured()
-    for file in BUILD.rglob("CTestTestfile.cmake"):  # what does not end shall not take a quarter of an hour
+    for file in BUILD.rglob("CTestTestfile.cmake"):  # shorten the time of mutants that do not end
         file.write_text(re.sub(r'(set_tests_properties\(\[=\[(\S+)\]=\].* TIMEOUT )"\d+"',
                                lambda m: f'{m[1]}"{20 + took.get(m[2], 0):.0f}"', file.read_text()))
     every = places()
@@ -162,7 +161,7 @@ def random_ones(count, seed):
         line = lines[number]
         lines[number] = line[:match.start()] + match.expand(chosen.choice(instead)) + line[match.end():]
         path = str(file.relative_to(COPY))
-        # A line that gcov does not count is reached by all that reach its file, a file of tables by all.
+        # Tests for a line that gcov does not count: those that reach the file; for a file without code: all.
         tests = reached.get((path, number + 1), reached.get((path, 0), sorted(took, key=took.get)))
         used = list(accumulate(took[t] for t in tests))
         tests = [t for t, so_far in zip(tests, used) if so_far <= ENOUGH] or tests[:1]
@@ -179,7 +178,7 @@ def random_ones(count, seed):
 
 
 def measured():
-    """The seconds of each test, and for each (file, line) the tests that reach it; line 0 is the file."""
+    """Return the seconds of each test, and for each (file, line) the tests that reach it; line 0 is the file."""
     covered = FOLDER / "covered"
     configure(covered, "-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_C_FLAGS_DEBUG=-Og", "-DSUPINE_COVERAGE=ON")
     if not build(covered):
@@ -203,8 +202,8 @@ def measured():
 
 
 def lines_reached(name, covered, kept):
-    """Seconds of one test of the instrumented build, infinite where it fails, and the (file, line) that
-    count and that it reached, with line 0 for a file; from the folder `kept` where they are there."""
+    """Return the seconds of a test of the instrumented build (infinite if it fails), the countable places
+    (file, line) and those that it reached, with line 0 for the file; read them from `kept` if they are there."""
     kept, counts = kept / f"{name}.json", FOLDER / "counts" / name
     if kept.exists():
         return json.loads(kept.read_text())
