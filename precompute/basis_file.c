@@ -12,7 +12,7 @@
 
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
-#include "precompute/normals/normals.h"
+#include "precompute/normals/normal_modes.h"
 #include "precompute/writer.h"
 #include "sh/base/text.h"
 

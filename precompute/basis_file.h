@@ -5,7 +5,7 @@
 
 #include "precompute/precompute.h"
 
-#include "precompute/projection/error_table.h"
+#include "precompute/projection/accuracy.h"
 
 /** Content of a basis file. */
 typedef struct supine_basis_content {

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "precompute/basis_file.h"
-#include "precompute/projection/compression.h"
+#include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 #include "sh/base/lapack.h"
 #include "sh/base/vec3.h"

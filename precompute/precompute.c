@@ -10,7 +10,7 @@
 #include "precompute/precompute.h"
 
 #include "precompute/basis_file.h"
-#include "precompute/projection/compression.h"
+#include "precompute/projection/projection.h"
 
 /* Bounds of the default number of held-out directions, and the number of vertices times directions
  * that sets it between them. A hundred directions give the error to about 5 %, a thousand to 1 or 2

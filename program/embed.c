@@ -10,7 +10,7 @@
 #include "mesh/io/points.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/embed.h"
-#include "precompute/inside/grid.h"
+#include "precompute/inside/content.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
@@ -181,12 +181,6 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
   }
   if (shells->scan.gains[0][0] != 0.0) {
     (void)puts("positions were given in the scan; the file holds them at full inflation");
-  }
-  if (report->centres < report->surface) {
-    (void)printf(
-        "interpolated from %zu of %zu vertices; the residual at the others, %.2g %% of the "
-        "motion,\nis added near the surface\n",
-        report->centres, report->surface, report->left_percent);
   }
   if (report->outside > 0 && !grid) {
     char text[64];

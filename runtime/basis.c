@@ -163,22 +163,6 @@ static supine_status check_modes(const check *c, supine_basis *basis) {
                       shape[1], SUPINE_SH_BAND_MAX);
 }
 
-/* Name the lungs as metadata "lungs" lists them, "left,right"; name the others by their index. */
-static void name_lungs(const check *c, supine_basis *basis) {
-  const char *at = supine_safetensors_metadata(c->file, "lungs");
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    const size_t length = at == NULL ? 0 : strcspn(at, ",");
-    basis->name_of[lung] = basis->names[lung];
-    if (length > 0) {
-      (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%.*s", (int)length, at);
-    } else {
-      (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%zu", lung);
-    }
-    at = at == NULL || at[length] == '\0' ? NULL : at + length + 1;
-  }
-  basis->info.lung_names = basis->name_of;
-}
-
 /* Compute the box around each lung of the reference surface; an empty lung has a box of zeros. */
 static void bound_lungs(supine_basis *basis) {
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
@@ -199,14 +183,24 @@ static void bound_lungs(supine_basis *basis) {
   basis->info.bounds = basis->bounds[0][0];
 }
 
-/* Count the lungs that the metadata names. */
-static size_t named_lungs(const check *c) {
-  const char *names = supine_safetensors_metadata(c->file, "lungs");
-  size_t count = names != NULL;
-  for (; names != NULL && *names != '\0'; ++names) {
-    count += *names == ',';
+/* Name the lungs as metadata "lungs" lists them, "left,right", and the others by their index;
+ * return the number of names. */
+static size_t name_lungs(const check *c, supine_basis *basis) {
+  const char *at = supine_safetensors_metadata(c->file, "lungs");
+  size_t named = 0;
+  for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
+    const size_t length = at == NULL ? 0 : strcspn(at, ",");
+    named += at != NULL;
+    basis->name_of[lung] = basis->names[lung];
+    if (length > 0) {
+      (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%.*s", (int)length, at);
+    } else {
+      (void)snprintf(basis->names[lung], LUNG_NAME_SIZE, "%zu", lung);
+    }
+    at = at == NULL || at[length] == '\0' ? NULL : at + length + 1;
   }
-  return count < SUPINE_LUNGS_MAX ? count : SUPINE_LUNGS_MAX;
+  basis->info.lung_names = basis->name_of;
+  return named;
 }
 
 /* Find where each lung's vertices begin: they are grouped by lung, 0 ... 0 1 ... 1 2 ... A lung
@@ -218,7 +212,7 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   if (lung == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
-  const size_t named = named_lungs(c);
+  const size_t named = name_lungs(c, basis);
   size_t at = 0;
   size_t count = 0;
   while (at < n && count < SUPINE_LUNGS_MAX &&
@@ -241,7 +235,6 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   basis->lung_begin[count] = n;
   info->lung_count = count;
   info->lung_begin = basis->lung_begin;
-  name_lungs(c, basis);
   bound_lungs(basis);
   return SUPINE_OK;
 }

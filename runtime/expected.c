@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "runtime/locate.h"
+#include "runtime/expected.h"
 
 /* Standard deviation of an assumed volume at rest, as a fraction of the reference volume. */
 static const double resting_spread = 0.05;

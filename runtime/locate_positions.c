@@ -2,7 +2,7 @@
 /* Compute the positions and expected errors of every vertex from a fit. */
 #include <math.h>
 
-#include "runtime/locate.h"
+#include "runtime/expected.h"
 #include "runtime/rigid.h"
 
 /* The poses that positions are computed from. */

@@ -92,8 +92,8 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
   }
 }
 
-/* Return the power of two of which `top` is 2^30 to 2^31 times, within the exponents that
- * fixed_scale can apply. */
+/* Return the power of two of which `top` is 2^30 to 2^31 times, so that adding its exponent stays
+ * within the exponents of a float. */
 static double rest_unit(float top) {
   const int exponent = flush(top) > 0 ? ilogbf(top) - 30 : -130;
   return ldexp(1, exponent < 96 ? exponent : 96);

@@ -4,7 +4,7 @@
 #include "inside_helpers.h"
 
 #include "precompute/inside/embed.h"
-#include "precompute/inside/grid.h"
+#include "precompute/inside/content.h"
 #include "program/field/cell.h"
 #include "sh/base/vec3.h"
 

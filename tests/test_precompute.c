@@ -3,7 +3,7 @@
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
-#include "precompute/projection/compression.h"
+#include "precompute/projection/projection.h"
 #include "sh/grid.h"
 #include "test.h"
 #include <supine/runtime.h>

@@ -181,25 +181,8 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
   take_back(e, (size_t)(shell - e->shells->shell), begin, end, values);
 }
 
-/* Add the squared residual of the interpolation at the surface's vertices, and their squared
- * motion, to sums. */
-static void residual(const embedding *e, const supine_inside_shell *shell,
-                     const double *displacement, const supine_inside_biharmonic *fit, double *space,
-                     double sums[2]) {
-  for (size_t first = 0; first < shell->vertex_count; first += BLOCK) {
-    const size_t left = shell->vertex_count - first;
-    const size_t count = left < BLOCK ? left : BLOCK;
-    supine_inside_biharmonic_evaluate(fit, count, shell->vertices + 3 * first, space);
-    for (size_t i = 0; i < count * e->columns; ++i) {
-      const double wanted = displacement[first * e->columns + i];
-      sums[0] += (space[i] - wanted) * (space[i] - wanted);
-      sums[1] += wanted * wanted;
-    }
-  }
-}
-
-static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end, double sums[2],
-                                supine_inside_report *report, supine_error *error) {
+static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
+                                supine_error *error) {
   static const double reach_spacings = 2.0; /* reach over the centres' spacing plus an edge */
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
@@ -217,15 +200,10 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
   supine_inside_shell_displacement(e->shells, lung, displacement);
   status = supine_inside_biharmonic_fit(shell->vertex_count, shell->vertices, e->columns,
                                         displacement, centres, &fit, error);
-  if (status == SUPINE_OK) {
-    residual(e, shell, displacement, &fit, space, sums);
-  }
   const double reach = reach_spacings * (fit.spacing + shell->edge);
   for (size_t at = begin; at < end && status == SUPINE_OK; at += BLOCK) {
     move_block(e, shell, displacement, &fit, reach, at, at + BLOCK < end ? at + BLOCK : end, space);
   }
-  report->centres += fit.count;
-  report->surface += shell->vertex_count;
 cleanup:
   supine_inside_biharmonic_free(&fit);
   free(displacement);
@@ -398,12 +376,11 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
                               content->count);
     goto cleanup;
   }
-  double sums[2] = {0.0, 0.0};
   size_t begin = 0;
   for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {
     const size_t end = begin + report->in_lung[lung];
     if (begin < end) {
-      status = embed_lung(&e, lung, begin, end, sums, report, error);
+      status = embed_lung(&e, lung, begin, end, error);
     }
     begin = end;
   }
@@ -411,7 +388,6 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
     take_back_rigid(&e, e.rigid[2 * i], e.rigid[2 * i + 1]);
   }
   if (status == SUPINE_OK) {
-    report->left_percent = sums[1] > 0.0 ? 100.0 * sqrt(sums[0] / sums[1]) : 0.0;
     status = write_content(&e, path, error);
   }
 cleanup:

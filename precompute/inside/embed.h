@@ -38,12 +38,9 @@ typedef struct supine_inside_report {
   size_t count;                     /**< points in the file */
   size_t in_lung[SUPINE_LUNGS_MAX]; /**< points in each lung or nearest to it */
   size_t outside;                   /**< points outside every lung; for a grid, its outer nodes */
-  size_t farthest;     /**< index of the outside point that is farthest from the lungs */
-  double farthest_mm;  /**< its distance from them, mm */
-  size_t rigid;        /**< rigid parts of more than one vertex */
-  size_t centres;      /**< centres of the interpolation in all lungs */
-  size_t surface;      /**< vertices of the lungs with content */
-  double left_percent; /**< RMS residual of the interpolation at them, % of their RMS motion */
+  size_t farthest;    /**< index of the outside point that is farthest from the lungs */
+  double farthest_mm; /**< its distance from them, mm */
+  size_t rigid;       /**< rigid parts of more than one vertex */
 } supine_inside_report;
 
 /** Embed content in the lungs of an open basis, and write its basis file, with these additional

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expand a vertex's normal as a polynomial of the weights and the three gains. */
+/* Expand a vertex's normal as a polynomial of the weights and the three gains, and choose the
+ * states that modes of normals are found from and measured on. */
 #ifndef SUPINE_NORMALS_POLYNOMIAL_H
 #define SUPINE_NORMALS_POLYNOMIAL_H
 
-#include "precompute/normals/normals.h"
+#include "precompute/normals/normal_modes.h"
 
 /* Return the number of monomials of K weights in one component of a normal, along axis c:
  *
@@ -52,5 +53,21 @@ supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          const supine_normals_fans *fans, size_t lung,
                                          size_t offset, size_t stride, supine_normals_rows *rows);
 void supine_normals_rows_free(supine_normals_rows *rows);
+
+/* Monomials of the weights and gains in some states. */
+typedef struct supine_normals_states {
+  size_t count;    /* S, states that are reached */
+  size_t room;     /* states that were requested */
+  double *phi;     /* [G, room, 3, terms] */
+  double range[2]; /* as in supine_normals_modes */
+} supine_normals_states;
+
+/* Spread up to `count` states over the sphere and over the volumes from rest to the reference
+ * surface, or if rest is unknown, over largest displacements of -15 to 60 mm. Another `shift`, 0 to
+ * 1, gives states between the others. Release them with supine_normals_states_free.
+ * @retval SUPINE_ERROR_MEMORY */
+supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
+                                           double shift, supine_normals_states *states);
+void supine_normals_states_free(supine_normals_states *states);
 
 #endif

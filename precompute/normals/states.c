@@ -10,7 +10,6 @@
 #include <supine/volume.h>
 
 #include "precompute/normals/polynomial.h"
-#include "precompute/normals/states.h"
 
 /* Range of the largest displacement if rest is unknown, mm; negative: deflated. */
 static const double lowest_mm = -15.0;

@@ -8,8 +8,6 @@
 #include "sh/base/parallel.h"
 #include <supine/sh.h>
 
-#include "precompute/projection/compression.h"
-
 void supine_projection_compression_free(supine_compression *compression) {
   free(compression->coefficients);
   free(compression->modes);

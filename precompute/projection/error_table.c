@@ -8,8 +8,8 @@
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
-#include "precompute/projection/compression.h"
-#include "precompute/projection/error_table.h"
+#include "precompute/projection/accuracy.h"
+#include "precompute/projection/projection.h"
 
 enum { VERTICES_MAX = 4096 };
 

@@ -8,7 +8,7 @@
 
 #include <supine/sh.h>
 
-#include "precompute/projection/compression.h"
+#include "precompute/projection/projection.h"
 #include "sh/base/lapack.h"
 
 /* Relative singular value below which a mode is rounding error, as the Gram matrix squares singular

@@ -15,18 +15,6 @@
 #include <stdint.h>
 #include <string.h>
 
-static inline uint32_t float_bits(float value) {
-  uint32_t bits = 0;
-  memcpy(&bits, &value, sizeof bits);
-  return bits;
-}
-
-static inline float bits_float(uint32_t bits) {
-  float value = 0;
-  memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
 /** Return a word as a signed integer. */
 static inline int32_t word_integer(uint32_t word) {
   int32_t value = 0;
@@ -54,26 +42,11 @@ static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** @{ Unpack the first or second number of such a word. */
-static inline float pair_first(uint32_t word) {
-  return (float)word_integer(word << 16);
-}
-
-static inline float pair_second(uint32_t word) {
-  return (float)word_integer(word);
-}
-/** @} */
-
 /** Pack three numbers likewise: into 11, 11 and 10 bits, from the uppermost. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 22) >> 22;
   const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;
   return word_nearest(first, lower, 21);
-}
-
-/** Return number 0, 1 or 2 of such a word. */
-static inline float triple_number(uint32_t word, size_t number) {
-  return (float)word_integer(word << 11 * number);
 }
 
 /** Pack three modes of a normal likewise: into 13, 10 and 9 bits, as the first modes are the
@@ -97,7 +70,7 @@ static inline float normal_number(uint32_t word, size_t number) {
 
 /** Pack three numbers between -2^31 and 2^31 into two words: the first and second into the upper 21
  * bits of a word each, the third into the 22 bits that are left. Replace 0 by the smallest positive
- * number, as fixed_scale needs. */
+ * number: the kernels multiply by a power of two by adding to the exponent bits (rest_unit). */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;
@@ -113,12 +86,6 @@ static inline void fixed_widen(const uint32_t *words, float *numbers) {
   numbers[0] = (float)word_integer(words[0]);
   numbers[1] = (float)word_integer(words[1]);
   numbers[2] = (float)word_integer(words[0] << 21 | (words[1] << 10 & 0x1FFC00U));
-}
-
-/** Multiply a number other than 0 by a power of two, by adding to its exponent bits.
- * @param unit  the exponent of the power, shifted to the exponent bits of a float */
-static inline float fixed_scale(float number, uint32_t unit) {
-  return bits_float(float_bits(number) + unit);
 }
 
 #endif

@@ -33,8 +33,9 @@ typedef struct supine_tiles {
   size_t rest_begin;      /**< byte offset of the reference positions in a tile */
   size_t stride;          /**< bytes from tile to tile */
   size_t count;           /**< number of tiles */
-  uint32_t rest_unit;     /**< unit of compact positions, see fixed_scale */
-  unsigned char *bytes;   /**< [count, stride] */
+  uint32_t
+      rest_unit; /**< exponent of the unit of compact positions, in the exponent bits of a float */
+  unsigned char *bytes; /**< [count, stride] */
 } supine_tiles;
 
 /** Report whether a storage is compact: two or three coefficients share a word, and directions and

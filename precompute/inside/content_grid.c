@@ -6,7 +6,7 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-#include "precompute/inside/grid.h"
+#include "precompute/inside/content.h"
 
 static const double nodes_max = 2147483648.0;
 

@@ -6,8 +6,7 @@
 #include <string.h>
 
 #include "precompute/normals/polynomial.h"
-#include "precompute/normals/states.h"
-#include "precompute/projection/compression.h"
+#include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 #include "runtime/kernels/compact.h"
 #include "runtime/kernels/tiles.h"
