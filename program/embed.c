@@ -124,11 +124,8 @@ static supine_status read_labelled(const request *wanted, const char *path,
                          path, part);
       continue;
     }
-    supine_options_say(name,
-                       "%s: %s, %.3g mL of voxels; its surface encloses %.3g mL, at most "
-                       "%.2g mm from them",
-                       path, part, parts[i].mask, 1e-3 * supine_mesh_volume(&parts[i].surface),
-                       parts[i].farthest);
+    supine_options_say(name, "%s: %s, %.3g mL of voxels; its surface encloses %.3g mL", path, part,
+                       parts[i].mask, 1e-3 * supine_mesh_volume(&parts[i].surface));
     status = supine_inside_content_surface(part, &parts[i].surface, content, error);
   }
   supine_labels_shapes_free(parts, count);

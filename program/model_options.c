@@ -234,9 +234,9 @@ static void print_map(const char *path, const supine_source *source) {
     (void)printf("; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n", lung->islands,
                  lung->islands == 1 ? "island" : "islands", lung->dropped, lung->cavities,
                  lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
-    (void)printf("  surface of %zu vertices: %.1f mL (%+.2g mL), at most %.2g mm from the mask\n",
+    (void)printf("  surface of %zu vertices: %.1f mL (%+.2g mL)\n",
                  lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface,
-                 lung->surface - lung->mask, lung->farthest);
+                 lung->surface - lung->mask);
   }
   if (source->axes_hold) {
     (void)printf("the shape of the lungs confirms the axes in the header: narrow at the head, "

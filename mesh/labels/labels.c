@@ -281,9 +281,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
       return status;
     }
   }
-  status = status == SUPINE_OK ? supine_labels_mask_surface(&mask, w->edge, true, &lung->held,
-                                                            &lung->farthest, mesh)
-                               : status;
+  status = status == SUPINE_OK ? supine_labels_mask_surface(&mask, w->edge, true, mesh) : status;
   supine_labels_mask_free(&mask);
   supine_topology topology = {0};
   status = status == SUPINE_OK && mesh->triangle_count > 0

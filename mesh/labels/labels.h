@@ -34,8 +34,6 @@ typedef struct supine_labels_lung {
   size_t cavities; /**< number of cavities filled */
   double filled;   /**< volume of the cavities filled */
   double surface;  /**< volume of the surface */
-  double farthest; /**< largest distance of a vertex from the mask's surface, mm */
-  double held;     /**< bound of that distance, half a voxel, mm */
   long tunnels;    /**< tunnels left through the lung: the surface's genus */
   size_t cut;      /**< voxels at the image's border, where the lung is cut off */
 } supine_labels_lung;
@@ -61,7 +59,7 @@ typedef struct supine_labels_report {
  * cubes of `edge`, in steps along its own axes; cubes at least half filled are inside, corrected
  * so that no two cubes meet only in an edge or corner, which makes the surface net [Gibson1998]
  * a closed manifold. It is smoothed without shrinking [Taubin1995], each vertex within its cell
- * of the net and within half a voxel (the larger of the map's and `edge`) of the mask.
+ * of the net.
  *
  * @param surfaces  [2] zero-initialised; report->lung_count are written, in its order, outwards
  * @retval SUPINE_ERROR_ARGUMENT  an edge, closing distance or list of labels that is invalid

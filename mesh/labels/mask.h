@@ -128,9 +128,9 @@ void supine_labels_cubes_free(labels_cubes *cubes);
 
 /* ---- net.c ---- */
 
-/** Make the net of a mask's cubes, of `one` piece or all, smoothed and held to the mask within
- * `held` mm, half a voxel; `farthest` is the largest distance of a vertex, mm. */
+/** Make the net of a mask's cubes, of `one` piece or all, and smooth it, each vertex within
+ * its cell. */
 supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
-                                         double *held, double *farthest, supine_mesh *mesh);
+                                         supine_mesh *mesh);
 
 #endif

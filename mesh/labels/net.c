@@ -219,72 +219,6 @@ static void in_voxels(const surface_net *net, const labels_cubes *cubes, size_t 
   }
 }
 
-/* Find the distance, mm, from a point in voxels to the mask's nearest face, by the nearest voxel
- * of the other value in growing boxes. */
-static double distance_to_mask(const labels_mask *mask, const double voxel[3]) {
-  long middle[3];
-  double nearest = INFINITY;
-  const double least = fmin(mask->spacing[0], fmin(mask->spacing[1], mask->spacing[2]));
-  for (int a = 0; a < 3; ++a) {
-    const long last = (long)mask->size[a] - 1;
-    const long here = lround(voxel[a]);
-    middle[a] = here < 0 ? 0 : here > last ? last : here;
-  }
-  const size_t n0 = mask->size[0];
-  const size_t n1 = mask->size[1];
-  const bool kind =
-      mask->at[(size_t)middle[0] + n0 * ((size_t)middle[1] + n1 * (size_t)middle[2])] != 0;
-  for (long reach = 1; ((double)reach - 1.0) * least < nearest; ++reach) {
-    bool inside = false; /* whether any voxel of the box is */
-    for (long k = middle[2] - reach; k <= middle[2] + reach; ++k) {
-      for (long j = middle[1] - reach; j <= middle[1] + reach; ++j) {
-        const bool shell = labs(k - middle[2]) == reach || labs(j - middle[1]) == reach;
-        for (long i = middle[0] - reach; i <= middle[0] + reach; i += shell ? 1 : 2 * reach) {
-          if (i < 0 || j < 0 || k < 0 || i >= (long)n0 || j >= (long)n1 ||
-              k >= (long)mask->size[2]) {
-            continue;
-          }
-          inside = true;
-          if ((mask->at[(size_t)i + n0 * ((size_t)j + n1 * (size_t)k)] != 0) == kind) {
-            continue;
-          }
-          const double apart[3] = {fmax(0.0, fabs(voxel[0] - (double)i) - 0.5) * mask->spacing[0],
-                                   fmax(0.0, fabs(voxel[1] - (double)j) - 0.5) * mask->spacing[1],
-                                   fmax(0.0, fabs(voxel[2] - (double)k) - 0.5) * mask->spacing[2]};
-          nearest =
-              fmin(nearest, sqrt(apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]));
-        }
-      }
-    }
-    if (!inside) {
-      break;
-    }
-  }
-  return nearest;
-}
-
-/* Move vertices farther than `limit` mm from the mask's surface back towards `before`. Return the
- * largest distance, mm. */
-static double hold(surface_net *net, const double (*before)[3], const labels_cubes *cubes,
-                   const labels_mask *mask, double limit) {
-  enum { HALVINGS = 5 };
-  double farthest = 0.0;
-  for (size_t v = 0; v < net->count; ++v) {
-    double voxel[3];
-    in_voxels(net, cubes, v, voxel);
-    double distance = distance_to_mask(mask, voxel);
-    for (int step = 0; distance > limit && step <= HALVINGS; ++step) {
-      for (int a = 0; a < 3; ++a) {
-        net->at[v][a] = step == HALVINGS ? before[v][a] : 0.5 * (net->at[v][a] + before[v][a]);
-      }
-      in_voxels(net, cubes, v, voxel);
-      distance = distance_to_mask(mask, voxel);
-    }
-    farthest = fmax(farthest, distance);
-  }
-  return farthest;
-}
-
 /* Cut the net into triangles, in mm. */
 static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes,
                                const labels_mask *mask, supine_mesh *mesh) {
@@ -316,26 +250,13 @@ static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes
 }
 
 supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
-                                         double *held, double *farthest, supine_mesh *mesh) {
+                                         supine_mesh *mesh) {
   labels_cubes cubes = {.share = NULL};
   surface_net net = {0};
-  double(*before)[3] = NULL;
   supine_status status = supine_labels_cubes_create(mask, edge, one, &cubes);
   status = status == SUPINE_OK ? create(&cubes, &net) : status;
-  if (status == SUPINE_OK) {
-    before = malloc((net.count + 1) * sizeof *before);
-    status = before == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  }
-  if (status == SUPINE_OK && net.count > 0) {
-    memcpy(before, net.at, net.count * sizeof *before);
-    status = relax(&net);
-  }
-  if (status == SUPINE_OK) {
-    *held = 0.5 * fmax(edge, fmax(mask->spacing[0], fmax(mask->spacing[1], mask->spacing[2])));
-    *farthest = hold(&net, (const double(*)[3])before, &cubes, mask, *held);
-    status = make_mesh(&net, &cubes, mask, mesh);
-  }
-  free(before);
+  status = status == SUPINE_OK ? relax(&net) : status;
+  status = status == SUPINE_OK ? make_mesh(&net, &cubes, mask, mesh) : status;
   net_free(&net);
   supine_labels_cubes_free(&cubes);
   return status;

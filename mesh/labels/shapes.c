@@ -19,7 +19,6 @@ static supine_status make_part(const supine_image *image, const labels_tally *ta
   const size_t low[3] = {tally->low[0], tally->low[1], tally->low[2]};
   const size_t high[3] = {tally->high[0], tally->high[1], tally->high[2]};
   labels_mask mask;
-  double held;
   value[part->label] = 1;
   supine_status status = supine_labels_mask_cut(image, low, high, value, &mask);
   value[part->label] = 0;
@@ -27,7 +26,7 @@ static supine_status make_part(const supine_image *image, const labels_tally *ta
     part->mask = supine_labels_voxel_ml(&mask) * (double)tally->count;
     const double edge =
         fmax(cbrt(1e3 * supine_labels_voxel_ml(&mask)), edge_share * cbrt(1e3 * part->mask));
-    status = supine_labels_mask_surface(&mask, edge, false, &held, &part->farthest, &part->surface);
+    status = supine_labels_mask_surface(&mask, edge, false, &part->surface);
   }
   supine_labels_mask_free(&mask);
   return status;

@@ -7,8 +7,7 @@
 
 typedef struct supine_labels_shape {
   unsigned label;
-  double mask;     /**< volume of its voxels, mL */
-  double farthest; /**< largest distance of a vertex from the voxels' surface, mm */
+  double mask; /**< volume of its voxels, mL */
   supine_mesh surface;
 } supine_labels_shape;
 
