@@ -10,19 +10,6 @@
 
 #include "mesh/io/image_formats.h"
 
-supine_status supine_image_check_size(const char *path, const supine_image *image, size_t file_size,
-                                      supine_error *error) {
-  static const double gzip_ratio = 1032.0; /* largest expansion of a byte */
-  const double bytes = (double)image->size[0] * (double)image->size[1] * (double)image->size[2] *
-                       (double)supine_image_voxel_size(image->voxel);
-  return bytes > 0.0 && bytes <= gzip_ratio * (double)file_size
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: %zu x %zu x %zu voxels are more than its %zu bytes can hold: "
-                                "it is truncated; fetch or write the file again",
-                                path, image->size[0], image->size[1], image->size[2], file_size);
-}
-
 void supine_image_free(supine_image *image) {
   free(image->values);
   *image = (supine_image){0};
@@ -31,6 +18,11 @@ void supine_image_free(supine_image *image) {
 size_t supine_image_voxel_size(supine_image_voxel voxel) {
   static const size_t sizes[SUPINE_VOXEL_COUNT] = {1, 1, 2, 2, 4, 4, 4, 8};
   return sizes[voxel];
+}
+
+size_t supine_image_bytes(const supine_image *image) {
+  return image->size[0] * image->size[1] * image->size[2] * image->channels *
+         supine_image_voxel_size(image->voxel);
 }
 
 double supine_image_get(const supine_image *image, size_t index) {
@@ -99,16 +91,6 @@ SUPINE_CLONES void supine_image_put(supine_image *image, size_t begin, size_t co
   case SUPINE_VOXEL_F64:
   case SUPINE_VOXEL_COUNT:
     PUT(double, values[i]);
-  }
-}
-
-void supine_image_widen(void *values, size_t count, bool is_signed) {
-  unsigned char *at = values;
-  for (size_t i = 0; i < count; ++i, at += 8) {
-    int64_t number = 0;
-    memcpy(&number, at, sizeof number);
-    const double value = is_signed ? (double)number : (double)(uint64_t)number;
-    memcpy(at, &value, sizeof value);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "sh/base/output.h"
 #include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
@@ -13,14 +14,12 @@
 /* Endings, with their readers and writers. */
 static const struct {
   const char *ending;
-  supine_status (*read)(const char *path, size_t file_size, supine_image *image,
-                        supine_error *error);
-  supine_status (*write)(const char *path, const supine_image *image, const char *note,
-                         supine_error *error);
-} formats[] = {{".nrrd", supine_image_read_nrrd, supine_image_write_nrrd},
-               {".nii", supine_image_read_nifti, supine_image_write_nifti},
-               {".nii.gz", supine_image_read_nifti, supine_image_write_nifti},
-               {".mha", supine_image_read_mha, supine_image_write_mha}};
+  image_describe *describe;
+  image_write *write;
+} formats[] = {{".nrrd", supine_image_describe_nrrd, supine_image_write_nrrd},
+               {".nii", supine_image_describe_nifti, supine_image_write_nifti},
+               {".nii.gz", supine_image_describe_nifti, supine_image_write_nifti},
+               {".mha", supine_image_describe_mha, supine_image_write_mha}};
 
 enum { FORMATS = sizeof formats / sizeof *formats };
 
@@ -64,6 +63,7 @@ static bool is_frame(const supine_image *image) {
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error) {
   struct stat file = {0};
   supine_image read = {.channels = 1};
+  image_storage storage = {0};
   if (!supine_image_supports(path)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert "
@@ -74,11 +74,14 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
                             strerror(errno == 0 ? EISDIR : errno)); /* NOLINT */
   }
-  supine_status status = formats[format_of(path)].read(path, (size_t)file.st_size, &read, error);
+  supine_status status = formats[format_of(path)].describe(path, &read, &storage, error);
   if (status == SUPINE_OK && !is_frame(&read)) {
     status = supine_error_set(
         error, SUPINE_ERROR_FORMAT,
         "%s: the header's directions are not three independent axes: write the image again", path);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_image_read_voxels(path, (size_t)file.st_size, &storage, &read, error);
   }
   if (status != SUPINE_OK) {
     supine_image_free(&read);
@@ -94,5 +97,17 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: end the name of an image in .nrrd, .nii, .nii.gz or .mha", path);
   }
-  return formats[format_of(path)].write(path, image, note, error);
+  supine_output output = {0};
+  supine_status status = supine_output_open(path, &output, error);
+  if (status == SUPINE_OK) {
+    status = formats[format_of(path)].write(path, image, note, output.file, error);
+    if (status == SUPINE_ERROR_MEMORY) {
+      (void)supine_error_set(error, status, "%s: out of memory", path);
+    }
+    if (status == SUPINE_OK) {
+      return supine_output_commit(&output, error);
+    }
+    supine_output_abandon(&output);
+  }
+  return status;
 }

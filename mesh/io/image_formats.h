@@ -3,33 +3,50 @@
 #ifndef SUPINE_IMAGE_FORMATS_H
 #define SUPINE_IMAGE_FORMATS_H
 
+#include <stdint.h>
+#include <stdio.h>
+
 #include "mesh/io/image.h"
 
-/* Refuse an image that is empty, or that a file of `file_size` bytes cannot hold:
- * SUPINE_ERROR_FORMAT. */
-supine_status supine_image_check_size(const char *path, const supine_image *image, size_t file_size,
-                                      supine_error *error);
+/* How a file stores its voxels. */
+typedef struct image_storage {
+  int64_t offset;          /* bytes before the voxels, or before their compressed stream */
+  int64_t skip;            /* bytes before the voxels in the compressed stream */
+  bool packed;             /* compressed by zlib or gzip */
+  bool text;               /* decimal numbers */
+  bool big;                /* most significant byte first */
+  int integer;             /* 64-bit integers, read as F64: 1 signed, -1 unsigned; else 0 */
+  double slope, intercept; /* of the numbers; slope 0: none */
+} image_storage;
 
-/* Read a gzip stream from `offset`, bytes, of a file to its end. Return SUPINE_ERROR_FORMAT unless
- * the stream is complete and its checksum is right. */
-supine_status supine_image_check_gzip(const char *path, long offset, supine_error *error);
-
-supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_image *image,
+/* Read the header: fill the image except its voxels, and how these are stored.
+ * Return SUPINE_ERROR_FORMAT, SUPINE_ERROR_READ or SUPINE_ERROR_MEMORY. */
+typedef supine_status image_describe(const char *path, supine_image *image, image_storage *storage,
                                      supine_error *error);
-supine_status supine_image_read_nifti(const char *path, size_t file_size, supine_image *image,
-                                      supine_error *error);
-supine_status supine_image_write_nrrd(const char *path, const supine_image *image, const char *note,
-                                      supine_error *error);
-supine_status supine_image_write_nifti(const char *path, const supine_image *image,
-                                       const char *note, supine_error *error);
+/* Write the header and the voxels. The caller checks the stream for write errors.
+ * Return SUPINE_ERROR_ARGUMENT or SUPINE_ERROR_MEMORY. */
+typedef supine_status image_write(const char *path, const supine_image *image, const char *note,
+                                  FILE *file, supine_error *error);
 
-/* MetaImage, .mha. */
-supine_status supine_image_read_mha(const char *path, size_t file_size, supine_image *image,
-                                    supine_error *error);
-supine_status supine_image_write_mha(const char *path, const supine_image *image, const char *note,
-                                     supine_error *error);
+image_describe supine_image_describe_nrrd, supine_image_describe_nifti, supine_image_describe_mha;
+image_write supine_image_write_nrrd, supine_image_write_nifti, supine_image_write_mha;
 
-/* Convert 64-bit integers to doubles in place. */
-void supine_image_widen(void *values, size_t count, bool is_signed);
+/* Compressed streams, by their window bits in zlib. */
+enum { IMAGE_ZLIB = 15, IMAGE_GZIP = 31 };
+
+/* Read the voxels; refuse more than a file of `file_size` bytes can hold, streams that are
+ * incomplete, and wrong checksums.
+ * Return SUPINE_ERROR_FORMAT, SUPINE_ERROR_READ or SUPINE_ERROR_MEMORY. */
+supine_status supine_image_read_voxels(const char *path, size_t file_size,
+                                       const image_storage *storage, supine_image *image,
+                                       supine_error *error);
+
+/* Compress `head` and the voxels into the file, as IMAGE_ZLIB or IMAGE_GZIP; return
+ * SUPINE_ERROR_MEMORY if that fails. */
+supine_status supine_image_pack(int format, const void *head, size_t head_size,
+                                const supine_image *image, const void *values, FILE *file);
+
+/* Return the size of the voxels, bytes. */
+size_t supine_image_bytes(const supine_image *image);
 
 #endif

@@ -7,9 +7,6 @@
 #include <string.h>
 #include <strings.h>
 
-#include <zlib.h>
-
-#include "sh/base/output.h"
 #include "sh/base/vec3.h"
 
 #include "mesh/io/image_formats.h"
@@ -165,77 +162,33 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
   return NULL;
 }
 
-static void swap_bytes(unsigned char *bytes, size_t count, size_t size) {
-  for (size_t i = 0; i < count; ++i) {
-    for (size_t b = 0; b < size / 2; ++b) {
-      const unsigned char other = bytes[i * size + b];
-      bytes[i * size + b] = bytes[i * size + size - 1 - b];
-      bytes[i * size + size - 1 - b] = other;
-    }
-  }
-}
-
-/* Unpack the voxels from the rest of the file; false if they are incomplete. */
-static bool unpack(const header *h, const unsigned char *packed, size_t packed_size,
-                   unsigned char *values, size_t bytes) {
-  uLongf made = bytes;
-  if (is_true(value_of(h, "CompressedData", "", ""))) {
-    return uncompress(values, &made, packed, packed_size) == Z_OK && made == bytes;
-  }
-  memcpy(values, packed, packed_size < bytes ? packed_size : bytes);
-  return packed_size >= bytes;
-}
-
-supine_status supine_image_read_mha(const char *path, size_t file_size, supine_image *image,
-                                    supine_error *error) {
+supine_status supine_image_describe_mha(const char *path, supine_image *image,
+                                        image_storage *storage, supine_error *error) {
   FILE *file = fopen(path, "rb");
-  unsigned char *bytes = malloc(file_size + 1);
   char *text = malloc(HEADER_MAX + 1);
-  header h;
-  size_t type = 0;
-  supine_status status = SUPINE_OK;
-  if (file == NULL || bytes == NULL || text == NULL) {
-    status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
-                              "%s: cannot read: check its permissions, and the free memory", path);
-    goto cleanup;
+  const char *wrong = "cannot read: check its permissions, and the free memory";
+  supine_status status = file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY;
+  if (file != NULL && text != NULL) {
+    header h;
+    size_t type = 0;
+    text[fread(text, 1, HEADER_MAX, file)] = '\0';
+    wrong = read_header(text, &h);
+    wrong = wrong == NULL ? check(&h) : wrong;
+    wrong = wrong == NULL ? describe(&h, image, &type) : wrong;
+    status = wrong == NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
+    *storage = (image_storage){
+        .offset = (int64_t)h.length,
+        .packed = is_true(value_of(&h, "CompressedData", "", "")),
+        .big = is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "")),
+        .integer = !types[type].wide            ? 0
+                   : types[type].name[4] != 'U' ? 1
+                                                : -1};
   }
-  const size_t size = fread(bytes, 1, file_size, file);
-  const size_t head = size < HEADER_MAX ? size : HEADER_MAX;
-  memcpy(text, bytes, head);
-  text[head] = '\0';
-  const char *wrong = read_header(text, &h);
-  wrong = wrong == NULL ? check(&h) : wrong;
-  wrong = wrong == NULL ? describe(&h, image, &type) : wrong;
-  if (wrong == NULL) {
-    status = supine_image_check_size(path, image, file_size, error);
-  }
-  if (wrong == NULL && status == SUPINE_OK) {
-    const size_t count = image->size[0] * image->size[1] * image->size[2];
-    const size_t each = supine_image_voxel_size(image->voxel);
-    image->values = malloc(count * each);
-    if (image->values == NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-      goto cleanup;
-    }
-    if (!unpack(&h, bytes + h.length, size - h.length, image->values, count * each)) {
-      wrong = "truncated or damaged; save it again";
-    } else if (is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", ""))) {
-      swap_bytes(image->values, count, each);
-    }
-    if (wrong == NULL && types[type].wide) {
-      supine_image_widen(image->values, count, types[type].name[4] != 'U');
-    }
-  }
-  if (wrong != NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
-  }
-cleanup:
-  free(bytes);
   free(text);
   if (file != NULL) {
     (void)fclose(file);
   }
-  return status;
+  return status == SUPINE_OK ? status : supine_error_set(error, status, "%s: %s", path, wrong);
 }
 
 static void write_header(const supine_image *image, const char *note, size_t packed, FILE *file) {
@@ -271,25 +224,22 @@ static void write_header(const supine_image *image, const char *note, size_t pac
 }
 
 supine_status supine_image_write_mha(const char *path, const supine_image *image, const char *note,
-                                     supine_error *error) {
-  enum { LEVEL = 3 };
-  supine_output output = {0};
-  const size_t bytes = image->size[0] * image->size[1] * image->size[2] * image->channels *
-                       supine_image_voxel_size(image->voxel);
-  uLongf size = compressBound(bytes);
-  unsigned char *packed = malloc(size);
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (packed == NULL || compress2(packed, &size, image->values, bytes, LEVEL) != Z_OK) {
-    (void)supine_error_set(error, status, "%s: out of memory", path);
-    goto cleanup;
+                                     FILE *file, supine_error *error) {
+  char *packed = NULL; /* the header states its size */
+  size_t size = 0;
+  FILE *memory = open_memstream(&packed, &size);
+  supine_status status = memory == NULL
+                             ? SUPINE_ERROR_MEMORY
+                             : supine_image_pack(IMAGE_ZLIB, NULL, 0, image, image->values, memory);
+  (void)path;
+  (void)error;
+  if (memory != NULL && fclose(memory) != 0) {
+    status = SUPINE_ERROR_MEMORY;
   }
-  status = supine_output_open(path, &output, error);
   if (status == SUPINE_OK) {
-    write_header(image, note, size, output.file);
-    (void)fwrite(packed, 1, size, output.file);
-    status = supine_output_commit(&output, error);
+    write_header(image, note, size, file);
+    (void)fwrite(packed, 1, size, file);
   }
-cleanup:
   free(packed);
   return status;
 }

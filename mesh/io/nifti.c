@@ -1,16 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Read NIfTI through libnifti2, and write NIfTI-1. */
 #include <math.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define ZLIB_CONST /* next_in is const */
 #include <nifti2_io.h>
-#include <zlib.h>
 
-#include "sh/base/output.h"
 #include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
@@ -40,8 +35,8 @@ static bool forms_differ(const nifti_image *nifti) {
 }
 
 /* Check size, type and frame; NIfTI is RAS. */
-static supine_status check(const char *path, const nifti_image *nifti, size_t file_size,
-                           supine_image *image, supine_error *error) {
+static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
+                           image_storage *storage, supine_error *error) {
   const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
                       : nifti->xyz_units == NIFTI_UNITS_MICRON ? 1e-3
                                                                : 1.0;
@@ -81,57 +76,28 @@ static supine_status check(const char *path, const nifti_image *nifti, size_t fi
       image->step[a][k] = turn * m->m[k][a];
     }
   }
-  return supine_image_check_size(path, image, file_size, error);
-}
-
-/* Convert stored numbers to F32, times slope plus intercept. */
-static supine_status rescale(const char *path, const nifti_image *nifti, supine_image *image,
-                             supine_error *error) {
-  const double slope = nifti->scl_slope;
-  const double intercept = nifti->scl_inter;
-  if (slope == 0.0 || !isfinite(slope) || !isfinite(intercept) ||
-      (slope == 1.0 && intercept == 0.0)) {
-    return SUPINE_OK;
-  }
-  const size_t count = image->size[0] * image->size[1] * image->size[2];
-  float *values = malloc(count * sizeof *values);
-  if (values == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
-  }
-  for (size_t i = 0; i < count; ++i) {
-    values[i] = (float)(slope * supine_image_get(image, i) + intercept);
-  }
-  free(image->values);
-  image->values = values;
-  image->voxel = SUPINE_VOXEL_F32;
+  const bool packed = nifti_is_gzfile(path) != 0;
+  *storage = (image_storage){.offset = packed ? 0 : nifti->iname_offset,
+                             .skip = packed ? nifti->iname_offset : 0,
+                             .packed = packed,
+                             .big = nifti->byteorder != nifti_short_order(),
+                             .integer = nifti->datatype == DT_INT64    ? 1
+                                        : nifti->datatype == DT_UINT64 ? -1
+                                                                       : 0,
+                             .slope = nifti->scl_slope,
+                             .intercept = nifti->scl_inter};
   return SUPINE_OK;
 }
 
-supine_status supine_image_read_nifti(const char *path, size_t file_size, supine_image *image,
-                                      supine_error *error) {
+supine_status supine_image_describe_nifti(const char *path, supine_image *image,
+                                          image_storage *storage, supine_error *error) {
   nifti_set_debug_level(0);
   nifti_image *nifti = nifti_image_read(path, 0);
   if (nifti == NULL) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: not a NIfTI header; give a NIfTI file",
                             path);
   }
-  supine_status status = check(path, nifti, file_size, image, error);
-  if (status == SUPINE_OK && nifti_is_gzfile(path)) {
-    status = supine_image_check_gzip(path, 0, error);
-  }
-  if (status == SUPINE_OK && nifti_image_load(nifti) != 0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: truncated or damaged; fetch or write the file again", path);
-  }
-  if (status == SUPINE_OK) {
-    image->values = nifti->data;
-    nifti->data = NULL;
-    if (nifti->datatype == DT_INT64 || nifti->datatype == DT_UINT64) {
-      supine_image_widen(image->values, image->size[0] * image->size[1] * image->size[2],
-                         nifti->datatype == DT_INT64);
-    }
-    status = rescale(path, nifti, image, error);
-  }
+  const supine_status status = check(path, nifti, image, storage, error);
   nifti_image_free(nifti);
   return status;
 }
@@ -186,37 +152,9 @@ static float *planes(const supine_image *image) {
   return made;
 }
 
-/* Compress the header and the values into the file. */
-static bool write_gzip(FILE *file, const unsigned char *header, const unsigned char *values,
-                       size_t bytes) {
-  enum { LEVEL = 6, GZIP = 16 + MAX_WBITS, MEMORY = 8, PIECE = 1 << 28, SPACE = 1 << 16 };
-  unsigned char space[SPACE];
-  z_stream z = {.next_in = header, .avail_in = 352};
-  bool well = deflateInit2(&z, LEVEL, Z_DEFLATED, GZIP, MEMORY, Z_DEFAULT_STRATEGY) == Z_OK;
-  while (well) {
-    z.next_out = space;
-    z.avail_out = SPACE;
-    const int result = deflate(&z, bytes == 0 ? Z_FINISH : Z_NO_FLUSH);
-    const size_t made = SPACE - z.avail_out;
-    well = fwrite(space, 1, made, file) == made;
-    if (result == Z_STREAM_END) {
-      break;
-    }
-    if (z.avail_in == 0 && bytes > 0) {
-      z.next_in = values;
-      z.avail_in = (unsigned)(bytes < PIECE ? bytes : PIECE);
-      values += z.avail_in;
-      bytes -= z.avail_in;
-    }
-  }
-  (void)deflateEnd(&z);
-  return well;
-}
-
 supine_status supine_image_write_nifti(const char *path, const supine_image *image,
-                                       const char *note, supine_error *error) {
+                                       const char *note, FILE *file, supine_error *error) {
   unsigned char header[352];
-  supine_output output = {0};
   const bool vectors = image->channels == 3 && image->voxel == SUPINE_VOXEL_F32;
   if ((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
       image->size[1] > INT16_MAX || image->size[2] > INT16_MAX) {
@@ -227,25 +165,16 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
   }
   float *planar = vectors ? planes(image) : NULL;
   if (vectors && planar == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+    return SUPINE_ERROR_MEMORY;
   }
-  supine_status status = supine_output_open(path, &output, error);
-  if (status == SUPINE_OK) {
-    make_header(image, note, header);
-    const size_t bytes = image->size[0] * image->size[1] * image->size[2] * image->channels *
-                         supine_image_voxel_size(image->voxel);
-    const unsigned char *values = vectors ? (const unsigned char *)planar : image->values;
-    const bool well = supine_text_ends_in_any_case(path, ".gz")
-                          ? write_gzip(output.file, header, values, bytes)
-                          : fwrite(header, 1, sizeof header, output.file) == sizeof header &&
-                                fwrite(values, 1, bytes, output.file) == bytes;
-    if (well) {
-      status = supine_output_commit(&output, error);
-    } else {
-      supine_output_abandon(&output);
-      status =
-          supine_error_set(error, SUPINE_ERROR_WRITE, "%s: cannot write: is the disk full?", path);
-    }
+  supine_status status = SUPINE_OK;
+  const void *values = vectors ? planar : image->values;
+  make_header(image, note, header);
+  if (supine_text_ends_in_any_case(path, ".gz")) {
+    status = supine_image_pack(IMAGE_GZIP, header, sizeof header, image, values, file);
+  } else {
+    (void)fwrite(header, 1, sizeof header, file);
+    (void)fwrite(values, 1, supine_image_bytes(image), file);
   }
   free(planar);
   return status;

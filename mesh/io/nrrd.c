@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Read and write NRRD through teem. */
+/* Read NRRD headers through teem, and write NRRD. */
 #include <stdlib.h>
-#include <string.h>
 
 #include <teem/nrrd.h>
 
-#include "sh/base/output.h"
-
 #include "mesh/io/image_formats.h"
 
-static const int types[SUPINE_VOXEL_COUNT] = {nrrdTypeChar,   nrrdTypeUChar, nrrdTypeShort,
-                                              nrrdTypeUShort, nrrdTypeInt,   nrrdTypeUInt,
-                                              nrrdTypeFloat,  nrrdTypeDouble};
+static const struct {
+  int type;
+  const char *name;
+} types[SUPINE_VOXEL_COUNT] = {{nrrdTypeChar, "int8"},   {nrrdTypeUChar, "uint8"},
+                               {nrrdTypeShort, "int16"}, {nrrdTypeUShort, "uint16"},
+                               {nrrdTypeInt, "int32"},   {nrrdTypeUInt, "uint32"},
+                               {nrrdTypeFloat, "float"}, {nrrdTypeDouble, "double"}};
 
 /* Set the error to the last line of teem's message. */
-static supine_status teem_fails(const char *path, supine_status status, supine_error *error) {
+static supine_status teem_fails(const char *path, supine_error *error) {
   char *text = biffGetDone(NRRD);
   char *last = text;
   for (char *at = text; at != NULL && *at != '\0'; ++at) {
@@ -23,17 +24,14 @@ static supine_status teem_fails(const char *path, supine_status status, supine_e
       last = at[1] != '\0' ? at + 1 : last;
     }
   }
-  (void)supine_error_set(error, status, "%s: %s", path, last != NULL ? last : "malformed");
+  (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path,
+                         last != NULL ? last : "malformed");
   free(text);
-  return status;
-}
-
-static bool is_wide(const Nrrd *nrrd) {
-  return nrrd->type == nrrdTypeLLong || nrrd->type == nrrdTypeULLong;
+  return SUPINE_ERROR_FORMAT;
 }
 
 static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState *io,
-                           size_t file_size, supine_image *image, supine_error *error) {
+                           supine_image *image, image_storage *storage, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: the voxels are in another file; save them in one", path);
@@ -59,9 +57,18 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                             "right-anterior-superior; write it in one of them",
                             path);
   }
+  storage->packed = io->encoding == nrrdEncodingGzip;
+  storage->text = io->encoding == nrrdEncodingAscii;
+  if ((io->encoding != nrrdEncodingRaw && !storage->packed && !storage->text) ||
+      io->lineSkip != 0 || io->byteSkip != 0) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: its encoding is not raw, gzip or ascii, or it skips lines or "
+                            "bytes; save it again as gzip",
+                            path);
+  }
+  const bool wide = nrrd->type == nrrdTypeLLong || nrrd->type == nrrdTypeULLong;
   size_t type = 0;
-  while (type < SUPINE_VOXEL_COUNT &&
-         types[type] != (is_wide(nrrd) ? nrrdTypeDouble : nrrd->type)) {
+  while (type < SUPINE_VOXEL_COUNT && types[type].type != (wide ? nrrdTypeDouble : nrrd->type)) {
     ++type;
   }
   if (type == SUPINE_VOXEL_COUNT) {
@@ -79,121 +86,59 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
     }
     image->origin[a] = (a < 2 ? turn : 1.0) * nrrd->spaceOrigin[a];
   }
-  return supine_image_check_size(path, image, file_size, error);
+  storage->big = io->endian == airEndianBig;
+  storage->integer = !wide ? 0 : nrrd->type == nrrdTypeLLong ? 1 : -1;
+  return SUPINE_OK;
 }
 
-/* Return the number of bytes before the voxels: the header ends with an empty line. */
-static long header_length(const char *path) {
-  FILE *file = fopen(path, "rb");
-  int before = 0;
-  long length = 0;
-  for (int c; file != NULL && (c = fgetc(file)) != EOF;) {
-    ++length;
-    if (c == '\n' && before == '\n') {
-      break;
-    }
-    before = c == '\r' ? before : c;
-  }
-  if (file != NULL) {
-    (void)fclose(file);
-  }
-  return length;
-}
-
-supine_status supine_image_read_nrrd(const char *path, size_t file_size, supine_image *image,
-                                     supine_error *error) {
+supine_status supine_image_describe_nrrd(const char *path, supine_image *image,
+                                         image_storage *storage, supine_error *error) {
   Nrrd *nrrd = nrrdNew();
   NrrdIoState *io = nrrdIoStateNew();
+  FILE *file = fopen(path, "rb");
   supine_status status = SUPINE_OK;
-  if (nrrd == NULL || io == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  if (nrrd == NULL || io == NULL || file == NULL) {
+    status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
+                              "%s: cannot read: check its permissions, and the free memory", path);
     goto cleanup;
   }
-  io->skipData = AIR_TRUE; /* only the header, before allocating what it asks for */
-  if (nrrdLoad(nrrd, path, io) != 0) {
-    status = teem_fails(path, SUPINE_ERROR_FORMAT, error);
-    goto cleanup;
-  }
-  status = check(path, nrrd, io, file_size, image, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  if (io->encoding == nrrdEncodingGzip) {
-    status = supine_image_check_gzip(path, header_length(path), error);
-    if (status != SUPINE_OK) {
-      goto cleanup;
-    }
-  }
-  nrrdIoStateInit(io);
-  if (nrrdLoad(nrrd, path, io) != 0) {
-    status = teem_fails(path, SUPINE_ERROR_FORMAT, error);
-    goto cleanup;
-  }
-  image->values = nrrd->data; /* from malloc: teem allocates with calloc */
-  nrrd->data = NULL;
-  if (is_wide(nrrd)) {
-    supine_image_widen(image->values, image->size[0] * image->size[1] * image->size[2],
-                       nrrd->type == nrrdTypeLLong);
-  }
+  io->skipData = AIR_TRUE;
+  io->keepNrrdDataFileOpen = AIR_TRUE;
+  status = nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
+                                         : check(path, nrrd, io, image, storage, error);
+  storage->offset = status == SUPINE_OK ? ftello(file) : 0;
 cleanup:
   if (io != NULL) {
     (void)nrrdIoStateNix(io);
   }
   (void)nrrdNuke(nrrd);
+  if (file != NULL) {
+    (void)fclose(file);
+  }
   return status;
-}
-
-/* Describe the image in the header: axes, space, kinds. */
-static bool describe(Nrrd *nrrd, const supine_image *image, const char *note) {
-  const unsigned vector = image->channels > 1;
-  size_t sizes[4] = {image->channels, image->size[0], image->size[1], image->size[2]};
-  if (nrrdWrap_nva(nrrd, image->values, types[image->voxel], 3 + vector, sizes + 1 - vector) != 0 ||
-      nrrdSpaceSet(nrrd, nrrdSpaceLeftPosteriorSuperior) != 0) {
-    return false;
-  }
-  for (unsigned a = 0; a < 3; ++a) {
-    nrrd->spaceOrigin[a] = image->origin[a];
-    nrrd->axis[a + vector].kind = nrrdKindDomain;
-    for (int k = 0; k < 3; ++k) {
-      nrrd->axis[a + vector].spaceDirection[k] = image->step[a][k];
-    }
-  }
-  if (vector != 0) {
-    nrrd->axis[0].kind = nrrdKindVector;
-    for (int k = 0; k < NRRD_SPACE_DIM_MAX; ++k) {
-      nrrd->axis[0].spaceDirection[k] = AIR_NAN;
-    }
-  }
-  return note == NULL || nrrdCommentAdd(nrrd, note) == 0;
 }
 
 supine_status supine_image_write_nrrd(const char *path, const supine_image *image, const char *note,
-                                      supine_error *error) {
-  supine_output output = {0};
-  Nrrd *nrrd = nrrdNew();
-  NrrdIoState *io = nrrdIoStateNew();
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (nrrd == NULL || io == NULL || !describe(nrrd, image, note)) {
-    status = teem_fails(path, status, error);
-    goto cleanup;
+                                      FILE *file, supine_error *error) {
+  const bool vector = image->channels > 1;
+  (void)path;
+  (void)error;
+  (void)fprintf(file, "NRRD0004\n%s%s%stype: %s\ndimension: %d\nsizes:", note != NULL ? "# " : "",
+                note != NULL ? note : "", note != NULL ? "\n" : "", types[image->voxel].name,
+                vector ? 4 : 3);
+  if (vector) {
+    (void)fprintf(file, " %zu", image->channels);
   }
-  status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    goto cleanup;
+  (void)fprintf(file,
+                " %zu %zu %zu\nspace: left-posterior-superior\nkinds:%s domain domain domain\n"
+                "space directions:%s",
+                image->size[0], image->size[1], image->size[2], vector ? " vector" : "",
+                vector ? " none" : "");
+  for (int a = 0; a < 3; ++a) {
+    const double *s = image->step[a];
+    (void)fprintf(file, " (%.17g,%.17g,%.17g)", s[0], s[1], s[2]);
   }
-  (void)nrrdIoStateEncodingSet(io, nrrdEncodingGzip);
-  if (nrrdWrite(output.file, nrrd, io) != 0) {
-    status = teem_fails(path, SUPINE_ERROR_WRITE, error);
-    supine_output_abandon(&output);
-    goto cleanup;
-  }
-  status = supine_output_commit(&output, error);
-cleanup:
-  if (io != NULL) {
-    (void)nrrdIoStateNix(io);
-  }
-  if (nrrd != NULL) {
-    (void)nrrdNix(nrrd); /* not the voxels */
-  }
-  return status;
+  (void)fprintf(file, "\nspace origin: (%.17g,%.17g,%.17g)\nendian: little\nencoding: gzip\n\n",
+                image->origin[0], image->origin[1], image->origin[2]);
+  return supine_image_pack(IMAGE_GZIP, NULL, 0, image, image->values, file);
 }
