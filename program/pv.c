@@ -40,13 +40,13 @@ static json_t *json_numbers(size_t count, const double *numbers) {
 }
 
 static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *report) {
-  return json_pack("{s:I, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:f}", "samples",
+  return json_pack("{s:I, s:o, s:o, s:o, s:o, s:o, s:f, s:f}", "samples",
                    (json_int_t)report->samples, "pressure_cmH2O", json_numbers(2, curve->pressure),
                    "volume_mL", json_numbers(2, curve->volume), "volume_interval_mL",
                    json_numbers(2, report->volume_interval), "control",
                    json_numbers(SUPINE_PV_CONTROLS, curve->control), "control_interval",
                    json_numbers(SUPINE_PV_CONTROLS, report->control_interval), "rms_mL",
-                   report->rms, "rms_percent", report->rms_percent, "condition", report->condition);
+                   report->rms, "rms_percent", report->rms_percent);
 }
 
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {

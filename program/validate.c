@@ -15,13 +15,10 @@ static const char name[] = "validate";
 typedef struct request {
   const char *path;
   supine_landmark_options landmarks;
-  supine_command_state from, state[SUPINE_COMMAND_STATES_MAX];
+  supine_command_state from, to, state[SUPINE_COMMAND_STATES_MAX];
   size_t count;
-  supine_orientation orientation;
   supine_source_options source;
-  supine_volume_options volume;
-  double scale;
-  bool has_scale, json;
+  bool json;
 } request;
 
 /* Read "prone", "prone:rest+500", "0.6:0:-0.8" or "0.6:0:-0.8:full". */
@@ -61,7 +58,7 @@ static supine_status read_state(const char *text, void *field, supine_error *err
 static const supine_option table[] = {
     {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
      "surface of the same lungs in another state, with any mesh; may be repeated, up to 8 times. "
-     "Several also show how linear displacement is in volume. Default volume: that of the surface",
+     "Several also show how linear displacement is in volume",
      .read = read_state, .wants = "(at most 8) SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
@@ -69,17 +66,16 @@ static const supine_option table[] = {
      "fitted "
      "maps move; default: the scan",
      FILLS(from), .read = read_posture, .wants = "a state, as supine:rest"},
-    {.help = "The volume of states that name none (default: the volume of the state's surface):"},
-    {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {"scale", 0, "S", "breath scale, instead of a volume", FILLS(scale),
-     SUPINE_SAYS_GIVEN(request, has_scale), .wants = "a number", .rivals = "breath"},
+    {"to", 0, "POSTURE[:VOLUME]",
+     "state of the landmarks where no --state is given; default of the states that name no posture "
+     "or volume: supine, and the volume of their surface",
+     FILLS(to), .read = read_posture, .wants = "a state, as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
      "local errors: .png, a picture of every state; .ply or .vtp, the predicted surface of the "
      "first "
      "state, with its displacement from the nearest points of the state's surface (mm)",
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
-    {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
@@ -108,12 +104,10 @@ static json_t *encode_state(const supine_command_state *state,
     supine_text_add(file, sizeof file, "%s", state->path);
     (void)json_object_set_new(root, "file", json_string(supine_text_make_utf8(file)));
   }
-  (void)json_object_update_new(root, json_pack("{s:[f, f, f], s:f}", "gravity",
+  (void)json_object_update_new(root, json_pack("{s:[f, f, f], s:f, s:f}", "gravity",
                                                state->state.gravity[0], state->state.gravity[1],
-                                               state->state.gravity[2], "scale", outcome->scale));
-  if (outcome->has_millilitres) {
-    (void)json_object_set_new(root, "volume_ml", json_real(outcome->millilitres));
-  }
+                                               state->state.gravity[2], "scale", outcome->scale,
+                                               "volume_ml", outcome->millilitres));
   if (outcome->has_surface) {
     (void)json_object_set_new(root, "surface", encode(outcome->surface));
   }
@@ -143,31 +137,23 @@ static void print(const supine_command_subject *s, bool json) {
   supine_options_print(root, json);
 }
 
-/* Set the states: each gets a posture, and a volume or scale where one was given. */
-static supine_status set_states(const request *wanted, supine_command_subject *s,
-                                supine_error *error) {
-  double gravity[3] = {0.0, 1.0, 0.0};
+/* Set the states: each gets a posture, and a volume where one was given. */
+static void set_states(const request *wanted, supine_command_subject *s) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  const supine_command_state *to = &wanted->to;
   s->from = wanted->from;
   s->count = wanted->count > 0 ? wanted->count : 1;
-  if (wanted->orientation.given) {
-    const supine_status status = supine_options_gravity(&wanted->orientation, gravity, error);
-    if (status != SUPINE_OK) {
-      return status;
-    }
-  }
   for (size_t i = 0; i < s->count; ++i) {
     supine_command_state *state = &s->state[i];
     *state = wanted->state[i];
     if (state->posture[0] == '\0') {
-      memcpy(state->state.gravity, gravity, sizeof gravity);
+      memcpy(state->state.gravity, to->posture[0] != '\0' ? to->state.gravity : supine,
+             sizeof supine);
     }
     if (state->state.volume.kind == SUPINE_VOLUME_DEFAULT) {
-      state->state.volume = wanted->volume.state.volume;
-      state->has_scale = wanted->has_scale;
-      state->scale = wanted->scale;
+      state->state.volume = to->state.volume;
     }
   }
-  return SUPINE_OK;
 }
 
 static supine_status write_errors(const request *wanted, const supine_command_subject *s,
@@ -184,7 +170,7 @@ static supine_status write_errors(const request *wanted, const supine_command_su
 static supine_status validate(const request *wanted, supine_command_subject *s,
                               supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
-  supine_status status = supine_command_subject_begin(s, error);
+  supine_status status = SUPINE_OK;
   for (size_t i = 0; i < s->count && status == SUPINE_OK; ++i) {
     status =
         supine_command_validate_state(s, i, &wanted->source, i == 0 ? wanted->landmarks.path : NULL,
@@ -227,10 +213,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
             : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
                                             : SUPINE_PATIENT_STILL;
+  set_states(wanted, &s);
   status = supine_command_subject_open(path, &s, error);
-  if (status == SUPINE_OK) {
-    status = set_states(wanted, &s, error);
-  }
   if (status == SUPINE_OK) {
     status = validate(wanted, &s, error);
   }
@@ -245,7 +229,7 @@ const supine_command supine_command_validate = {
     name,
     "compare a basis with another scan of the person",
     .usage = "BASIS --state [POSTURE:]SURFACE [--landmarks PAIRS.csv] [OPTIONS]\n"
-             "BASIS --landmarks PAIRS.csv --volume VOLUME [OPTIONS]",
+             "BASIS --landmarks PAIRS.csv --to POSTURE:VOLUME [OPTIONS]",
     .about = "Compares a basis with other states of the same person: "
              "distances between the surfaces and of landmarks, and how much of the motion is "
              "explained, beside what no motion, a translation, a similarity and an affine map "

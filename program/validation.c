@@ -28,19 +28,6 @@ void supine_command_subject_free(supine_command_subject *subject) {
   }
 }
 
-supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
-                                          supine_error *error) {
-  supine_command_subject *s = subject;
-  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_basis_rest_mesh(s->basis, &s->rest);
-    if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: no memory for its surface", path);
-    }
-  }
-  return status;
-}
-
 static bool same_direction(const double a[3], const double b[3]) {
   double off = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -49,21 +36,14 @@ static bool same_direction(const double a[3], const double b[3]) {
   return off < same_posture;
 }
 
-/* Compute the surface in a pose, [N, 3]. */
-static supine_status deform(const supine_basis *basis, const supine_pose *pose, double *positions,
+/* Compute the surface in a pose, [N, 3], which the caller frees. */
+static supine_status deform(const supine_basis *basis, const supine_pose *pose, double **positions,
                             supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
-  if (xyz == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                            info->vertex_count);
-  }
-  supine_deform(basis, pose, xyz);
-  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    positions[i] = (double)xyz[i];
-  }
-  free(xyz);
-  return SUPINE_OK;
+  *positions = supine_options_basis_positions(basis, pose);
+  return *positions != NULL
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                                supine_basis_get_info(basis)->vertex_count);
 }
 
 /* Compute the volume of all lungs in a pose, mL; 0 for an open surface. */
@@ -79,9 +59,14 @@ static double held(const supine_basis *basis, const supine_pose *pose) {
   return sum;
 }
 
-supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error) {
+supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
+                                          supine_error *error) {
   supine_command_subject *s = subject;
   supine_pose pose;
+  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
   if (s->from.posture[0] == '\0') {
     s->from.state = supine_basis_scan(s->basis);
   }
@@ -90,40 +75,36 @@ supine_status supine_command_subject_begin(supine_command_subject *subject, supi
       !supine_basis_get_info(s->basis)->has_rest) {
     s->from.state.volume.kind = SUPINE_VOLUME_SCAN;
   }
-  const supine_status status = supine_basis_pose(s->basis, &s->from.state, &pose, error);
-  if (status != SUPINE_OK) {
-    return status;
+  status = supine_basis_pose(s->basis, &s->from.state, &pose, error);
+  if (status == SUPINE_OK) {
+    s->from_millilitres = held(s->basis, &pose);
+    s->from_scale = pose.gains[0][0];
+    status = supine_options_basis_rest_mesh(s->basis, &s->rest);
   }
-  s->from_millilitres = held(s->basis, &pose);
-  s->from_scale = pose.gains[0][0];
-  return deform(s->basis, &pose, s->rest.vertices, error);
+  if (status == SUPINE_OK) {
+    free(s->rest.vertices);
+    status = deform(s->basis, &pose, &s->rest.vertices, error);
+  }
+  return status;
 }
 
-/* Compute the gains: as given, or those of the state's volume. */
+/* Compute the gains for the volume of the state: as given, else that of its surface. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
   supine_state asked = state->state;
-  const bool told = asked.volume.kind != SUPINE_VOLUME_DEFAULT;
-  const bool measured = mesh->vertex_count > 0 && supine_basis_get_info(s->basis)->has_volume;
-  supine_status status = SUPINE_OK;
-  if (!told && measured) {
+  if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
+    if (mesh->vertex_count == 0) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "the volume of the other state is unknown, and landmarks do not give "
+                              "it: give --to POSTURE:VOLUME");
+    }
     asked.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 1e-3 * supine_mesh_volume(mesh)};
   }
-  outcome->has_millilitres = told || measured;
-  if (state->has_scale) {
-    supine_pose_fill(&outcome->pose, state->scale);
-  } else if (!outcome->has_millilitres) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "the volume of the other state is unknown, and landmarks do not "
-                              "give it: give --volume, or --scale");
-  } else {
-    status = supine_basis_gains(s->basis, &asked, &outcome->pose, error);
-  }
+  const supine_status status = supine_basis_gains(s->basis, &asked, &outcome->pose, error);
   if (status == SUPINE_OK) {
     outcome->scale = outcome->pose.gains[0][0];
-    outcome->millilitres = (measured && !told ? asked.volume.ml : held(s->basis, &outcome->pose)) -
-                           s->from_millilitres;
+    outcome->millilitres = held(s->basis, &outcome->pose) - s->from_millilitres;
   }
   return status;
 }
@@ -132,25 +113,22 @@ static supine_status predict_surface(const supine_command_subject *s,
                                      const supine_command_state *state, const supine_mesh *mesh,
                                      supine_command_outcome *outcome, supine_error *error) {
   const size_t n = s->rest.vertex_count;
-  outcome->predicted = malloc(3 * n * sizeof(double));
   outcome->nearest = malloc(3 * n * sizeof(double));
-  supine_status status = SUPINE_ERROR_MEMORY;
-  if (outcome->predicted == NULL || outcome->nearest == NULL) {
-    return supine_error_set(error, status, "no memory for %zu vertices", n);
-  }
-  status = supine_basis_weights(s->basis, state->state.gravity, outcome->pose.weights);
+  supine_status status =
+      outcome->nearest != NULL
+          ? supine_basis_weights(s->basis, state->state.gravity, outcome->pose.weights)
+          : supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   if (status == SUPINE_OK) {
     status = find_gains(s, state, mesh, outcome, error);
   }
   if (status == SUPINE_OK) {
-    status = deform(s->basis, &outcome->pose, outcome->predicted, error);
+    status = deform(s->basis, &outcome->pose, &outcome->predicted, error);
   }
   return status;
 }
 
 typedef struct search {
   const supine_inside_surface *tree;
-  double *positions;      /* [vertices, 3] */
   size_t vertices, count; /* vertices of the mesh, and how many of them are searched */
   double *distance;       /* [count] */
 } search;
@@ -161,27 +139,29 @@ static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale,
                                  const search *look, double *rms, supine_error *error) {
   supine_pose pose = outcome->pose;
+  double *positions = NULL;
+  double sum = 0.0;
   for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
     pose.gains[i / 3][i % 3] *= outcome->scale != 0.0 ? scale / outcome->scale : 0.0;
   }
   if (outcome->scale == 0.0) {
     supine_pose_fill(&pose, scale);
   }
-  const supine_status status = deform(s->basis, &pose, look->positions, error);
-  *rms = INFINITY;
-  if (status == SUPINE_OK) {
-    double sum = 0.0;
-    for (size_t i = 0; i < look->count; ++i) {
-      memmove(look->positions + 3 * i, look->positions + 3 * (i * look->vertices / look->count),
-              3 * sizeof(double));
-    }
-    supine_inside_surface_distances(look->tree, look->count, look->positions, look->distance, NULL);
-    for (size_t i = 0; i < look->count; ++i) {
-      sum += look->distance[i] * look->distance[i] / (double)look->count;
-    }
-    *rms = sqrt(sum);
+  const supine_status status = deform(s->basis, &pose, &positions, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
-  return status;
+  for (size_t i = 0; i < look->count; ++i) {
+    memmove(positions + 3 * i, positions + 3 * (i * look->vertices / look->count),
+            3 * sizeof(double));
+  }
+  supine_inside_surface_distances(look->tree, look->count, positions, look->distance, NULL);
+  for (size_t i = 0; i < look->count; ++i) {
+    sum += look->distance[i] * look->distance[i] / (double)look->count;
+  }
+  *rms = sqrt(sum);
+  free(positions);
+  return SUPINE_OK;
 }
 
 /* Find the scale that comes nearest to the surface, by golden section about the predicted one. */
@@ -189,11 +169,10 @@ static supine_status find_best(const supine_command_subject *s, const supine_mes
                                supine_command_outcome *outcome, supine_error *error) {
   const size_t n = s->rest.vertex_count;
   search look = {.vertices = n, .count = n < SEARCHED_MAX ? n : SEARCHED_MAX};
-  look.positions = malloc(3 * n * sizeof(double));
   look.distance = malloc(look.count * sizeof(double));
   supine_inside_surface *tree = NULL;
   supine_status status =
-      look.positions == NULL || look.distance == NULL
+      look.distance == NULL
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
           : supine_inside_surface_create(mesh->vertices, mesh->triangle_count, mesh->triangles,
                                          &tree, error);
@@ -217,7 +196,6 @@ static supine_status find_best(const supine_command_subject *s, const supine_mes
     status = distance_at(s, outcome, outcome->best_scale, &look, &outcome->best_rms, error);
   }
   supine_inside_surface_destroy(tree);
-  free(look.positions);
   free(look.distance);
   return status;
 }
@@ -232,8 +210,7 @@ void supine_command_find_line(supine_command_subject *subject) {
   for (int pass = 0; pass < 2; ++pass) {
     for (size_t i = 0; i < s->count; ++i) {
       const supine_command_outcome *of = &s->outcome[i];
-      if (!of->has_best || !of->has_millilitres ||
-          !same_direction(s->state[i].state.gravity, s->state[0].state.gravity)) {
+      if (!of->has_best || !same_direction(s->state[i].state.gravity, s->state[0].state.gravity)) {
         continue;
       }
       const double scale = of->best_scale - s->from_scale;

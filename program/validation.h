@@ -15,15 +15,12 @@ typedef struct supine_command_state {
   const char *path;                      /* its surface; NULL: landmarks only */
   char posture[SUPINE_POSTURE_NAME_MAX]; /* empty: not given */
   supine_state state;                    /* default volume: not given */
-  bool has_scale;
-  double scale; /* the gain, instead of a volume */
 } supine_command_state;
 
 /* Result for one state. */
 typedef struct supine_command_outcome {
   supine_pose pose;
-  double scale; /* its gain */
-  bool has_millilitres;
+  double scale;       /* its gain */
   double millilitres; /* mL above the state that motion starts from */
   double *predicted;  /* [N, 3] */
   double *nearest;    /* [N, 3] nearest points of the state's surface */
@@ -50,14 +47,11 @@ typedef struct supine_command_subject {
 
 void supine_command_subject_free(supine_command_subject *subject);
 
-/* Open a basis.
- * @retval those of the reader */
+/* Open a basis and compute the surface that motion starts from: that of the state `from`, or the
+ * scan's where `from` names no posture.
+ * @retval those of the run-time library */
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error);
-
-/* Set the surface that motion starts from: the scan's own state where `from` names no posture.
- * @retval those of the run-time library */
-supine_status supine_command_subject_begin(supine_command_subject *subject, supine_error *error);
 
 /* Predict state i, and compare it with its surface and with landmarks (NULL: none).
  * @param reverse  of the landmarks

@@ -67,11 +67,8 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
     }
     find_values(s, outcome, values + count * n, &largest, &end);
     const supine_patient_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
-    const int used = outcome->has_millilitres ? snprintf(subtitle[count], sizeof subtitle[count],
-                                                         "%+.0f mL, ", outcome->millilitres)
-                                              : 0;
-    (void)snprintf(subtitle[count] + used, sizeof subtitle[count] - (size_t)used,
-                   "RMS %.1f, Hausdorff %.1f mm", off->rms, off->largest);
+    (void)snprintf(subtitle[count], sizeof subtitle[count], "%+.0f mL, RMS %.1f, Hausdorff %.1f mm",
+                   outcome->millilitres, off->rms, off->largest);
     panel[count] = (supine_panel){.title = s->state[i].posture[0] != '\0' ? s->state[i].posture
                                                                           : s->state[i].path,
                                   .subtitle = subtitle[count],

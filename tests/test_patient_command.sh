@@ -208,7 +208,7 @@ done
   vertices supine.obj >from.csv
   vertices prone.obj | paste -d, from.csv - | awk 'NR % 5 == 1'
 } >turned.csv
-"$supine" validate scanned.safetensors --landmarks turned.csv --posture prone --volume rest --json \
+"$supine" validate scanned.safetensors --landmarks turned.csv --to prone:rest --json \
   >valid.json || fail "validate points that were turned"
 near "$(number rms_mm valid.json)" 0 0.01 || fail "points are $(number rms_mm valid.json) mm off"
 near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
@@ -263,6 +263,6 @@ awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3,
   full.csv >far.csv
 "$supine" fit --landmarks far.csv --other supine:full -o far.json >/dev/null || fail "fit far away"
 refused 2 'in one frame and unit, of one person' precompute p.ply --patient far.json -o x.safetensors
-refused 2 'check their frame, unit and person' validate points.safetensors --volume full --landmarks far.csv
+refused 2 'check their frame, unit and person' validate points.safetensors --to supine:full --landmarks far.csv
 [ ! -e x.safetensors ] || fail "a refused command left a file"
 echo passed

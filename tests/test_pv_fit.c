@@ -99,8 +99,8 @@ TEST(test_fit_published_curves_under_one_percent) {
     supine_pv_report report;
     assert_int_equal(fit(SAMPLES, pressures, volumes, 0.95, &curve, &report, NULL), SUPINE_OK);
     const double held_out = held_out_percent(&truths[i], &curve);
-    print_message("%-34s RMS %.4f %%, held out %.4f %%, condition %.0f\n", truths[i].name,
-                  report.rms_percent, held_out, report.condition);
+    print_message("%-34s RMS %.4f %%, held out %.4f %%\n", truths[i].name, report.rms_percent,
+                  held_out);
     assert_true(report.rms_percent < 1.0);
     assert_true(held_out < 1.0);
     assert_true(held_out < 0.3); /* % of the range: the limit of the form of the curve */
@@ -182,7 +182,6 @@ TEST(test_fit_model_own_data_recovers_parameters) {
       }
       assert_near(curve.volume[0], model.volume[0], 1e-5);
       assert_near(curve.volume[1], model.volume[1], 1e-5);
-      assert_true(report.condition >= 1.0 && report.condition < 1e4);
     }
   }
 }

@@ -26,7 +26,6 @@ typedef struct supine_pv_report {
   double volume_interval[2];                   /**< half-widths for V_low and V_high, mL */
   double rms;                                  /**< root mean square residual, mL */
   double rms_percent; /**< the same as a percentage of the samples' range of volumes */
-  double condition;   /**< condition number of the Jacobian with columns of unit length */
 } supine_pv_report;
 
 /** Fit a limb to samples:

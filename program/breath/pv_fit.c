@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_cblas.h>
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_multifit_nlinear.h>
 #include <gsl/gsl_statistics.h>
-#include <lapacke.h>
 
 #include "program/breath/pv.h"
 
@@ -29,7 +29,7 @@ typedef struct problem {
   double *x;       /* [count] pressures mapped to -1 to 1 */
   double *v;       /* [count] volumes above the first, in shares of their range */
   double *q;       /* [count] the curve with volumes 0 to 1 */
-  double *scratch; /* [count, SUPINE_PV_UNKNOWNS] */
+  double *scratch; /* [count] */
 } problem;
 
 static supine_status refuse(const problem *limb, const supine_pv_sample *sample, const char *why,
@@ -146,22 +146,6 @@ static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *
   return GSL_SUCCESS;
 }
 
-/* Return the ratio of the extreme singular values of J with columns scaled to unit length, in
- * `scaled`; 0 where LAPACK fails. */
-static double jacobian_condition(const gsl_matrix *jacobian, double *scaled) {
-  const int rows = (int)jacobian->size1;
-  const int columns = (int)jacobian->size2;
-  double s[SUPINE_PV_UNKNOWNS];
-  for (int j = 0; j < columns; ++j) {
-    cblas_dcopy(rows, jacobian->data + j, (int)jacobian->tda, scaled + j, columns);
-    const double length = cblas_dnrm2(rows, scaled + j, columns);
-    cblas_dscal(rows, length > 0.0 ? 1.0 / length : 1.0, scaled + j, columns);
-  }
-  const bool found = LAPACKE_dgesdd(LAPACK_ROW_MAJOR, 'N', rows, columns, scaled, columns, s, NULL,
-                                    columns, NULL, columns) == 0;
-  return found ? s[0] / s[columns - 1] : 0.0;
-}
-
 /* Fill the report of a minimum found, and estimate the noise of a volume, mL, from the median
  * residual, which outliers do not affect. */
 static void describe(const problem *limb, double span, double confidence, supine_pv_report *report,
@@ -173,10 +157,7 @@ static void describe(const problem *limb, double span, double confidence, supine
   const double freedom = (double)(count - SUPINE_PV_UNKNOWNS);
   const double misfit = cblas_dnrm2((int)count, residual->data, (int)residual->stride);
   const double share = misfit / sqrt((double)count);
-  *report = (supine_pv_report){.samples = count,
-                               .rms = span * share,
-                               .rms_percent = 100.0 * share,
-                               .condition = jacobian_condition(jacobian, limb->scratch)};
+  *report = (supine_pv_report){.samples = count, .rms = span * share, .rms_percent = 100.0 * share};
   /* covariance = sigma^2 (J^T J)^-1 */
   (void)gsl_multifit_nlinear_covar(jacobian, 0.0, limb->covariance);
   const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);
@@ -271,7 +252,7 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
                   .work = gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &options, count,
                                                      SUPINE_PV_UNKNOWNS),
                   .covariance = gsl_matrix_alloc(SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS),
-                  .x = malloc((3 + SUPINE_PV_UNKNOWNS) * count * sizeof(double))};
+                  .x = malloc(4 * count * sizeof(double))};
   supine_status status = SUPINE_ERROR_MEMORY;
   if (limb.sample == NULL || limb.work == NULL || limb.covariance == NULL || limb.x == NULL) {
     (void)supine_error_set(error, status, "%s: no memory for %zu samples", name, count);

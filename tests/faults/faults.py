@@ -52,7 +52,7 @@ solve lungs.ply --posture prone -o out/a.vtp
 solve lungs.ply --unit-force 3 -o out/a.csv
 fit --landmarks pairs.csv -o out/a.json
 fit lungs.ply state.ply -o out/a.json
-validate lungs.safetensors --state state.ply --posture supine
+validate lungs.safetensors --state supine:state.ply
 embed lungs.safetensors points.csv lungs.ply -o out/a.safetensors
 embed lungs.safetensors image.nrrd -o out/a.safetensors
 embed lungs.safetensors --grid 60 -o out/a.safetensors
