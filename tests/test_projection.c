@@ -311,6 +311,7 @@ TEST(test_modes_below_rounding_dropped) {
   assert_int_equal(modes.mode_count, 3);
   assert_close(singular[2], 6e-7, 1e-9);
   assert_close(singular[3], 0.0, 0.0);
+  assert_close(fabs(modes.modes[2 * TERMS + 2]), 1.0, 1e-3);
   supine_projection_compression_free(&modes);
 }
 

@@ -338,15 +338,20 @@ TEST(test_capacity_height_and_sex_literal) {
   static const struct {
     supine_person person;
     double range[2];
-  } known[] = {{{178.0, SUPINE_SEX_MALE}, {7300.2, 7300.2}},
-               {{165.0, SUPINE_SEX_FEMALE}, {5458.7, 5458.7}},
-               {{170.0, SUPINE_SEX_UNKNOWN}, {5756.3, 6724.0}},
-               {{0.0, SUPINE_SEX_UNKNOWN}, {4566.0, 8525.0}}};
+    const char *text;
+  } known[] = {{{178.0, SUPINE_SEX_MALE}, {7300.2, 7300.2}, "expected 7300"},
+               {{165.0, SUPINE_SEX_FEMALE}, {5458.7, 5458.7}, "expected 5459"},
+               {{170.0, SUPINE_SEX_UNKNOWN}, {5756.3, 6724.0}, "an adult's 5756 to 6724"},
+               {{0.0, SUPINE_SEX_UNKNOWN}, {4566.0, 8525.0}, "an adult's 4566 to 8525"}};
+  const supine_reference pair = {.lung_count = 2};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     double range[2];
     supine_reference_capacity(&known[i].person, range);
     assert_true(fabs(range[0] - known[i].range[0]) < 1.0);
     assert_true(fabs(range[1] - known[i].range[1]) < 1.0);
+    char text[64] = "";
+    supine_reference_compare(&pair, &known[i].person, text, sizeof text);
+    assert_string_equal(text, known[i].text);
   }
 }
 
