@@ -99,7 +99,7 @@ lungs of {best['vertices']:,} vertices.
 | (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row a vertex | |
 | (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits to an error of 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare it with the paper's iteration |
 | (9)-(14), all paths | `supine solve --law paper` | the same fixed point (`test_equilibrium`) | solved, not enumerated |
-| (15)-(17), directions | `--law`, `--direction`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits a person's own |
+| (15)-(17), directions | `--law`, `--constants`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits a person's own |
 | (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | in `deep` only a part of the gradient follows gravity |
 | Fig. 4, lungs in postures | `supine render BASIS --posture supine,prone,left,right -o postures.png` | | drawn by the processor |
 | IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as (5), (6) | |

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Select the law, stiffness, lesions, directions and reference of a model. */
+/* Select the law, stiffness, lesions and reference of a model. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -81,19 +81,6 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
     a[i] = 1.0 / a[i];
   }
   return status;
-}
-
-static supine_status set_directions(const supine_lungs *lungs, const supine_model_choice *choice,
-                                    supine_prepared *p, supine_error *error) {
-  supine_status status = SUPINE_OK;
-  if (choice->directions == NULL) {
-    return SUPINE_OK;
-  }
-  p->vectors = allocate(3 * lungs->mesh.vertex_count, &status, error);
-  p->model.direction.vectors = p->vectors;
-  return status == SUPINE_OK ? supine_physics_directions_load(
-                                   choice->directions, lungs->mesh.vertex_count, p->vectors, error)
-                             : status;
 }
 
 /* Warn of a lesion that reaches no vertex and so changes no stiffness. */
@@ -199,7 +186,6 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
                             "or take --law deep");
   }
   supine_status status = set_expandability(lungs, choice, p, error);
-  status = status == SUPINE_OK ? set_directions(lungs, choice, p, error) : status;
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;
   status = status == SUPINE_OK ? set_shares(lungs, choice, p, error) : status;
   status = status == SUPINE_OK ? supine_reference_find(lungs, &p->model, &scan, &choice->resting,
@@ -220,6 +206,5 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
 void supine_precompute_prepared_free(supine_prepared *prepared) {
   free(prepared->stiffness);
   free(prepared->lesions);
-  free(prepared->vectors);
   *prepared = (supine_prepared){0};
 }

@@ -22,7 +22,6 @@ typedef struct supine_model_choice {
   supine_scan scan;
   supine_resting resting;
   supine_person person;
-  const char *directions;    /**< path of a CSV file of directions; NULL: those of the law */
   const char *expandability; /**< path of a CSV file; NULL: `expandability_law` */
   supine_expandability_law expandability_law;
   size_t lesion_count;
@@ -40,16 +39,14 @@ typedef struct supine_prepared {
   char summary[512]; /**< assumptions: law, scan, full inflation, rest */
   double *stiffness; /**< [N], or NULL */
   double *lesions;   /**< [N], or NULL */
-  double *vectors;   /**< [N, 3], or NULL */
 } supine_prepared;
 
-/** Select the law, set stiffness, lesions and directions, and move the lungs to the reference.
+/** Select the law, set stiffness and lesions, and move the lungs to the reference.
  * @param lungs     as scanned; moved to the reference
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
  * @param findings  warnings are added
  * @retval SUPINE_ERROR_ARGUMENT  the paper's law with a scan's state, or a share for a missing lung
- * Other statuses as supine_physics_directions_load, supine_tissue_add_lesion and
- * supine_reference_find */
+ * Other statuses as supine_tissue_add_lesion and supine_reference_find */
 supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_choice *choice,
                                         supine_prepared *prepared, supine_findings *findings,
                                         supine_error *error);

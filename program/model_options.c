@@ -17,14 +17,11 @@ static supine_status read_scan(const char *text, void *field, supine_error *erro
   return supine_reference_scan_parse(text, &choice->scan, error);
 }
 
-/* Read "supine=0.43,prone=2600mL"; a text without an equals sign names a file. */
+/* Read "supine=0.43,prone=2600mL". */
 static supine_status read_resting(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   char copy[256];
   (void)snprintf(copy, sizeof copy, "%s", text);
-  if (strchr(text, '=') == NULL) {
-    return supine_reference_resting_load(text, &choice->resting, error);
-  }
   supine_status status = SUPINE_OK;
   for (char *rest = copy, *piece; status == SUPINE_OK && (piece = strsep(&rest, ",")) != NULL;) {
     char *value = strchr(piece, '=');
@@ -147,16 +144,15 @@ const supine_option supine_command_model_options[] = {
      .wants = "full, POSTURE:rest, either with +ML or -ML, or none"},
     {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
      FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
-    {"resting", 0, "LIST|FILE",
+    {"resting", 0, "LIST",
      "volume at rest (FRC) in each posture, where it is known for the patient: POSTURE=2600mL, "
      "gas and tissue of both lungs, as measured in a CT at rest (lung-function tests give the "
      "gas alone, seated: add about 0.9 L of tissue and give it as upright; other postures keep "
      "their proportion to those named); POSTURE=0.43, a share of the volume at full inflation; "
-     "POSTURE=0.42/0.44, shares of the left and the right lung; or a CSV file with the columns "
-     "posture,share. Default, from healthy people: supine 0.418/0.440, prone 0.464/0.475, left "
+     "POSTURE=0.42/0.44, shares of the left and the right lung. Default, from healthy people: "
+     "supine 0.418/0.440, prone 0.464/0.475, left "
      "0.413/0.546, right 0.563/0.435, upright 0.481/0.506, inverted as supine",
-     FILLS(choice), .read = read_resting, .file = SUPINE_FILE_NONE,
-     .wants = "POSTURE=2600mL or POSTURE=SHARE,... or a CSV file with the columns posture,share"},
+     FILLS(choice), .read = read_resting, .wants = "POSTURE=2600mL or POSTURE=SHARE,..."},
     {"height", 0, "CM",
      "height of the person, to report with --sex the expected volume at TLC beside the scan's "
      "volume (ECSC 1993, less 10 % for lying, plus 0.86 L of tissue); default: the range of adults",
@@ -178,10 +174,6 @@ const supine_option supine_command_model_options[] = {
      "0. With the paper law, give --reach as well",
      FILLS(choice.model.force.soften), .more = true},
     {.help = "Direction of displacement:", .more = true},
-    {"direction", 0, "FILE",
-     "a vector per vertex instead of (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm: CSV with the columns "
-     "dx,dy,dz in mm, in the vertex order of 'supine solve'",
-     FILLS(choice.directions), .file = SUPINE_FILE_IN, .more = true},
     {"constants", 0, "C1,...,C6",
      "constants of the box model; default by law:" SUPINE_LAWS(
          LAW_CONSTANTS) ". Fitted to landmarks: paper to ten 4-D CTs (DIR-Lab), deep to ten "

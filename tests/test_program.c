@@ -327,21 +327,6 @@ TEST(test_mesh_inward_lung_flipped_and_reported) {
   EXPECT(2, "runs through the right lung", "solve in.obj --midline 49 --posture prone -o h.ply");
 }
 
-TEST(test_direction_file_moves_vertices_along_it) {
-  write_text("tetra.obj",
-             "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
-  write_text("d.csv", "dx,dy,dz\n0,0,0\n0,0,0\n0,0,0\n3,0,4\n");
-  EXPECT(0, "displacement 5.000 mm",
-         "solve tetra.obj --direction d.csv --posture inverted --scale 5 -o i.ply");
-  EXPECT(0, "one lung", "precompute tetra.obj --direction d.csv -o i.safetensors --band 3");
-  write_text("d.csv", "dx,dy,dz\n0,0,0\n3,0,4\n");
-  EXPECT(2, "2 rows, but the model has 4",
-         "solve tetra.obj --direction d.csv --posture supine+9 -o j.ply");
-  write_text("d.csv", "dx,dy,dz\n0,0,0\n3,nan,4\n");
-  EXPECT(2, "d.csv:3", "solve tetra.obj --direction d.csv --posture supine+9 -o j.ply");
-  assert_int_equal(count_files("j."), 0);
-}
-
 TEST(test_solve_unit_force_writes_column) {
   static char text[1 << 20];
   EXPECT(0, "", "solve lungs.ply --unit-force 17 -o column.csv");

@@ -138,19 +138,6 @@ TEST(test_resting_defaults_and_options) {
                      SUPINE_ERROR_ARGUMENT);
     assert_memory_equal(&before, &resting, sizeof before);
   }
-  FILE *file = fopen(path, "wb");
-  assert_non_null(file);
-  (void)fputs("posture,share\nupright,0.6/0.61\n# a note\nright,2500mL\n", file);
-  assert_int_equal(fclose(file), 0);
-  assert_int_equal(supine_reference_resting_load(path, &resting, &error), SUPINE_OK);
-  assert_true(resting.share[0][5] == 0.6 && resting.share[1][5] == 0.61);
-  assert_true(resting.ml[1] == 2500.0);
-  file = fopen(path, "wb");
-  assert_non_null(file);
-  (void)fputs("posture,share\nupright,0.6\nright,7\n", file);
-  assert_int_equal(fclose(file), 0);
-  assert_int_equal(supine_reference_resting_load(path, &resting, &error), SUPINE_ERROR_ARGUMENT);
-  assert_non_null(strstr(error.message, "line 3"));
 }
 
 /* Volumes in mL become shares of the lungs' own full volumes; volumes not given keep their

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the directions of displacement (15)-(17), or read one vector for each vertex. */
+/* Compute the directions of displacement (15)-(17). */
 #include <math.h>
-#include <string.h>
 
 #include "precompute/physics/force.h"
-#include "sh/base/csv.h"
 
 static void box_direction(const supine_lungs *lungs, const double c[6], size_t vertex, double *d) {
   double box[3];
@@ -25,11 +23,8 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
                               k % 2 == 1 ? "exponents must be positive" : "it must be finite");
     }
   }
-  for (size_t i = 0; i < n && law->vectors == NULL; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     box_direction(lungs, law->c, i, directions + 3 * i);
-  }
-  if (law->vectors != NULL) {
-    memcpy(directions, law->vectors, 3 * n * sizeof *directions);
   }
   if (law->correct != NULL) {
     law->correct(law->context, lungs, directions);
@@ -41,36 +36,5 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
                           "no vertex would move, as every direction is zero: change the direction "
-                          "constants or vectors");
-}
-
-supine_status supine_physics_directions_load(const char *path, size_t count, double *vectors,
-                                             supine_error *error) {
-  static const char *const columns[] = {"dx", "dy", "dz"};
-  supine_csv csv;
-  bool more = true;
-  size_t rows = 0;
-  supine_status status = supine_csv_open(path, columns, 3, 3, &csv, error);
-  while (status == SUPINE_OK && more) {
-    status = supine_csv_next(&csv, &more, error);
-    if (status == SUPINE_OK && more && rows == count) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_FORMAT,
-                           "%s:%zu: more rows than the model has vertices (%zu): give one row for "
-                           "each vertex",
-                           path, csv.line, count);
-    }
-    for (size_t k = 0; k < 3 && status == SUPINE_OK && more; ++k) {
-      status = supine_csv_number(&csv, k, columns[k], vectors + 3 * rows + k, error);
-    }
-    rows += more ? 1 : 0;
-  }
-  supine_csv_close(&csv);
-  if (status == SUPINE_OK && rows < count) {
-    status = supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: %zu rows, but the model has %zu vertices: give one row for each vertex", path, rows,
-        count);
-  }
-  return status;
+                          "constants");
 }

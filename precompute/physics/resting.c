@@ -8,7 +8,6 @@
 #include <supine/posture.h>
 
 #include "precompute/physics/resting.h"
-#include "sh/base/csv.h"
 
 /* Sources of the shares, tissue included (gas + tissue over full gas + tissue, supine). Shares of
  * both lungs together:
@@ -103,25 +102,6 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
     used += (size_t)snprintf(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
                              names[axis], resting->share[0][axis], resting->share[1][axis]);
   }
-}
-
-supine_status supine_reference_resting_load(const char *path, supine_resting *resting,
-                                            supine_error *error) {
-  static const char *const columns[] = {"posture", "share"};
-  supine_csv csv = {0};
-  bool more = false;
-  supine_status status = supine_csv_open(path, columns, 2, 2, &csv, error);
-  while (status == SUPINE_OK && (status = supine_csv_next(&csv, &more, error)) == SUPINE_OK &&
-         more) {
-    supine_error inner = {0};
-    status = supine_reference_resting_set(resting, supine_csv_text(&csv, 0),
-                                          supine_csv_text(&csv, 1), &inner);
-    if (status != SUPINE_OK) {
-      (void)supine_error_set(error, status, "%s: line %zu: %s", path, csv.line, inner.message);
-    }
-  }
-  supine_csv_close(&csv);
-  return status;
 }
 
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,

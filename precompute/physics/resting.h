@@ -37,11 +37,6 @@ supine_resting supine_reference_resting_default(void);
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
 
-/** Set the volumes at rest in the postures of a CSV file with the columns posture,share.
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_ARGUMENT (line named) */
-supine_status supine_reference_resting_load(const char *path, supine_resting *resting,
-                                            supine_error *error);
-
 /** Print the shares so that --resting reads them back: "left=0.413/0.546,...,upright=0.481/0.506".
  * 256 characters are enough. */
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz tables of numbers with each reader in turn: expandability and directions by vertex, samples
- * of pressure and volume, and fitted curves. */
+/* Fuzz tables of numbers with each reader in turn: expandability by vertex, samples of pressure
+ * and volume, and fitted curves. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "precompute/lungs/expandability.h"
-#include "precompute/physics/force.h"
 #include "program/breath/pv.h"
 
 #include "fuzz.h"
@@ -29,12 +28,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   for (size_t i = 0; status == SUPINE_OK && i < VERTICES; ++i) {
     supine_fuzz_expect(a[i] > 0.0 && isfinite(a[i]), "an expandability");
   }
-  double vectors[3 * VERTICES];
-  status = supine_physics_directions_load(path, VERTICES, vectors, &error);
-  expect_words(status, &error);
-  for (size_t i = 0; status == SUPINE_OK && i < (size_t)3 * VERTICES; ++i) {
-    supine_fuzz_expect(isfinite(vectors[i]), "a direction");
-  }
   supine_pv pv;
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   status = supine_breath_fit_file(path, 0.95, &pv, reports, &error);
@@ -51,7 +44,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
 uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   static const char *const texts[] = {
       "expandability\n1\n0.5\n# half\n2e-1\n", "vertex,expandability\n0,1\n2,0.25\n1,3\n",
-      "vertex,x,y,z\n0,1,0,0\n1,0,-1,0\n2,0.6,0,-0.8\n", "x,y,z\n1,0,0\n0,-1,0\n0.6,0,-0.8\n",
       ("pressure_cmH2O,volume_mL,limb\n0,100,inhale\n5,420,inhale\n10,900,inhale\n20,1500,inhale\n"
        "20,1500,exhale\n10,1200,exhale\n5,700,exhale\n0,150,exhale\n")};
   enum { TEXTS = sizeof texts / sizeof *texts };
