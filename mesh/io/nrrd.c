@@ -5,6 +5,15 @@
 #include <teem/nrrd.h>
 
 #include "mesh/io/image_formats.h"
+#include "sh/base/library.h"
+
+/* clang-format off */
+#define FUNCTIONS(EACH)                                                                            \
+  EACH(, nrrdBiffKey) EACH(, nrrdType) EACH(, nrrdEncodingAscii) EACH(, nrrdEncodingGzip)          \
+  EACH(, nrrdEncodingRaw) EACH(, nrrdNew) EACH(, nrrdIoStateNew) EACH(, nrrdRead)                  \
+  EACH(, nrrdIoStateNix) EACH(, nrrdNuke) EACH(, biffGetDone) EACH(, airEnumStr)
+/* clang-format on */
+static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } teem;
 
 static const struct {
   int type;
@@ -16,7 +25,7 @@ static const struct {
 
 /* Set the error to the last line of teem's message. */
 static supine_status teem_fails(const char *path, supine_error *error) {
-  char *text = biffGetDone(NRRD);
+  char *text = teem.biffGetDone(*teem.nrrdBiffKey);
   char *last = text;
   for (char *at = text; at != NULL && *at != '\0'; ++at) {
     if (*at == '\n') {
@@ -57,9 +66,9 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                             "right-anterior-superior; write it in one of them",
                             path);
   }
-  storage->packed = io->encoding == nrrdEncodingGzip;
-  storage->text = io->encoding == nrrdEncodingAscii;
-  if ((io->encoding != nrrdEncodingRaw && !storage->packed && !storage->text) ||
+  storage->packed = io->encoding == *teem.nrrdEncodingGzip;
+  storage->text = io->encoding == *teem.nrrdEncodingAscii;
+  if ((io->encoding != *teem.nrrdEncodingRaw && !storage->packed && !storage->text) ||
       io->lineSkip != 0 || io->byteSkip != 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: its encoding is not raw, gzip or ascii, or it skips lines or "
@@ -74,7 +83,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   if (type == SUPINE_VOXEL_COUNT) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: voxels of type %s are not read; convert them to int16", path,
-                            airEnumStr(nrrdType, nrrd->type));
+                            teem.airEnumStr(*teem.nrrdType, nrrd->type));
   }
   image->voxel = (supine_image_voxel)type;
   image->axes = turn > 0.0 ? SUPINE_AXES_LPS : SUPINE_AXES_RAS;
@@ -93,10 +102,13 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
 
 supine_status supine_image_describe_nrrd(const char *path, supine_image *image,
                                          image_storage *storage, supine_error *error) {
-  Nrrd *nrrd = nrrdNew();
-  NrrdIoState *io = nrrdIoStateNew();
+  supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_TEEM, FUNCTIONS, &teem, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  Nrrd *nrrd = teem.nrrdNew();
+  NrrdIoState *io = teem.nrrdIoStateNew();
   FILE *file = fopen(path, "rb");
-  supine_status status = SUPINE_OK;
   if (nrrd == NULL || io == NULL || file == NULL) {
     status = supine_error_set(error, file == NULL ? SUPINE_ERROR_READ : SUPINE_ERROR_MEMORY,
                               "%s: cannot read: check its permissions, and the free memory", path);
@@ -104,14 +116,14 @@ supine_status supine_image_describe_nrrd(const char *path, supine_image *image,
   }
   io->skipData = AIR_TRUE;
   io->keepNrrdDataFileOpen = AIR_TRUE;
-  status = nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
-                                         : check(path, nrrd, io, image, storage, error);
+  status = teem.nrrdRead(nrrd, file, io) != 0 ? teem_fails(path, error)
+                                              : check(path, nrrd, io, image, storage, error);
   storage->offset = status == SUPINE_OK ? ftello(file) : 0;
 cleanup:
   if (io != NULL) {
-    (void)nrrdIoStateNix(io);
+    (void)teem.nrrdIoStateNix(io);
   }
-  (void)nrrdNuke(nrrd);
+  (void)teem.nrrdNuke(nrrd);
   if (file != NULL) {
     (void)fclose(file);
   }
