@@ -26,8 +26,6 @@ def numbers(result):
         found[f"rms_in_{posture['name']}_mm"] = posture["displacement_mm"]["rms"]
         for lung, gain in posture.get("gain_ml", {}).items():
             found[f"gain_of_{lung}_lung_in_{posture['name']}_ml"] = gain
-    for pair in comparison["pairs"]:
-        found[f"rms_{pair['a']}_to_{pair['b']}_mm"] = pair["distance_mm"]["rms"]
     return found
 
 

@@ -252,11 +252,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (status == SUPINE_OK) {
     status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error);
   }
-  if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
-    status = supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                              "%s: its surface is open and encloses no volume: close the mesh "
-                              "before 'supine precompute'",
-                              path);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_closed(basis, path, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_basis_frame(basis, wanted->as_scanned, &frame, error);

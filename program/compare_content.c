@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/output.h"
+#include <jansson.h>
+
 #include "sh/base/vec3.h"
 
 #include "program/compare_content.h"
@@ -71,9 +72,8 @@ static supine_status find_errors(const comparison *c, const supine_state *to,
   return status;
 }
 
-/* Add the displacements from one posture to another to a list, and write them to a CSV file where
- * it is open. */
-static void add_pair(const comparison *c, size_t from, size_t to, json_t *list, FILE *csv) {
+/* Add the displacements from one posture to another to a list. */
+static void add_pair(const comparison *c, size_t from, size_t to, json_t *list) {
   for (size_t name = 0; name < c->names.count; ++name) {
     const char *const text[] = {c->postures->item[from].name, c->postures->item[to].name,
                                 c->names.text[name]};
@@ -86,16 +86,12 @@ static void add_pair(const comparison *c, size_t from, size_t to, json_t *list, 
                                 json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from", text[0],
                                           "to", text[1], "name", text[2], "move", move[0], move[1],
                                           move[2], "mm", length, "expected_error_mm", sigma));
-    if (csv != NULL) {
-      (void)fprintf(csv, "%s,%s,%s,%.3f,%.3f,%.3f,%.3f,%.3f\n", text[0], text[1], text[2], move[0],
-                    move[1], move[2], length, sigma);
-    }
   }
 }
 
 /* Compute the displacements between every two postures. */
 static supine_status find_pairs(const comparison *c, const supine_state *volume, json_t *list,
-                                FILE *csv, supine_error *error) {
+                                supine_error *error) {
   supine_state state[SUPINE_POSTURE_LIST_MAX];
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < c->postures->count && status == SUPINE_OK; ++i) {
@@ -106,7 +102,7 @@ static supine_status find_pairs(const comparison *c, const supine_state *volume,
   for (size_t i = 0; i < c->postures->count; ++i) {
     for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
       status = find_errors(c, &state[j], &state[i], error);
-      add_pair(c, i, j, list, csv);
+      add_pair(c, i, j, list);
     }
   }
   return status;
@@ -114,16 +110,12 @@ static supine_status find_pairs(const comparison *c, const supine_state *volume,
 
 supine_status supine_command_compare_content(const supine_basis *basis,
                                              const supine_posture_list *postures,
-                                             const supine_state *volume, bool json, const char *csv,
+                                             const supine_state *volume, bool json,
                                              supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   comparison c = {.basis = basis, .postures = postures};
-  supine_output output = {0};
   json_t *list = json_array();
   supine_status status = supine_command_names_open(basis, &c.names, error);
-  if (status == SUPINE_OK && csv != NULL) {
-    status = supine_output_open(csv, &output, error);
-  }
   if (status == SUPINE_OK) {
     c.step = malloc(3 * n * sizeof *c.step);
     c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
@@ -132,19 +124,12 @@ supine_status supine_command_compare_content(const supine_basis *basis,
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
     }
   }
-  if (status == SUPINE_OK && csv != NULL) {
-    (void)fputs("from,to,name,dx,dy,dz,moved_mm,expected_error_mm\n", output.file);
-  }
   if (status == SUPINE_OK) {
-    status = find_pairs(&c, volume, list, output.file, error);
+    status = find_pairs(&c, volume, list, error);
   }
   if (status == SUPINE_OK) {
     supine_options_print(json_incref(list), json);
   }
-  if (status == SUPINE_OK && csv != NULL) {
-    status = supine_output_commit(&output, error);
-  }
-  supine_output_abandon(&output);
   json_decref(list);
   free(c.step);
   free(c.moves);

@@ -8,11 +8,11 @@
 #include "program/options/state_options.h"
 
 /* Print the mean displacement of each named structure between every two postures, as a table or as
- * JSON, and write it as CSV if `csv` is not NULL.
+ * JSON.
  * @param volume  of the lungs in every posture */
 supine_status supine_command_compare_content(const supine_basis *basis,
                                              const supine_posture_list *postures,
-                                             const supine_state *volume, bool json, const char *csv,
+                                             const supine_state *volume, bool json,
                                              supine_error *error);
 
 #endif

@@ -28,32 +28,11 @@ void supine_command_studio_close(supine_command_studio *studio) {
   supine_compare_destroy(studio->compare);
 }
 
-/* Compute the pose for a posture. Overwrites `value`. */
-static supine_status find_pose(const supine_command_studio *studio, const supine_posture_item *item,
-                               supine_command_drawn *found, supine_error *error) {
-  const supine_command_drawing *wanted = studio->wanted;
-  if (wanted->scale == 0.0) {
-    return supine_options_pose(studio->basis, name, &wanted->volume, item->gravity, &found->pose,
-                               error);
-  }
-  supine_distance_statistics statistics;
-  (void)supine_basis_weights(studio->basis, item->gravity, found->pose.weights); /* a unit vector */
-  supine_pose_fill(&found->pose, 1.0);
-  supine_compare_distances(studio->compare, &found->pose, NULL, found->value);
-  supine_compare_statistics(studio->compare, found->value, &statistics);
-  if (!(statistics.max > 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "nothing moves in %s, so no --scale gives %g mm: give another posture",
-                            item->name, wanted->scale);
-  }
-  supine_pose_fill(&found->pose, wanted->scale / statistics.max);
-  return SUPINE_OK;
-}
-
 supine_status supine_command_drawn_find(supine_command_studio *studio,
                                         const supine_posture_item *item,
                                         supine_command_drawn *found, supine_error *error) {
-  const supine_status status = find_pose(studio, item, found, error);
+  const supine_status status = supine_options_pose(studio->basis, name, &studio->wanted->volume,
+                                                   item->gravity, &found->pose, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -62,17 +41,13 @@ supine_status supine_command_drawn_find(supine_command_studio *studio,
   supine_compare_statistics(studio->compare, found->value, &statistics);
   studio->ends[0] = fmax(studio->ends[0], statistics.p95);
   studio->ends[1] = fmax(studio->ends[1], statistics.max);
-  size_t used = 0;
-  if (supine_basis_get_info(studio->basis)->has_volume) {
-    double held[SUPINE_LUNGS_MAX];
-    double volume = 0.0;
-    supine_basis_volumes(studio->basis, &found->pose, held);
-    for (size_t lung = 0; lung < supine_basis_get_info(studio->basis)->lung_count; ++lung) {
-      volume += held[lung];
-    }
-    used = (size_t)snprintf(found->subtitle, sizeof found->subtitle, "%.0f mL, ", volume);
+  double held[SUPINE_LUNGS_MAX];
+  double volume = 0.0;
+  supine_basis_volumes(studio->basis, &found->pose, held);
+  for (size_t lung = 0; lung < supine_basis_get_info(studio->basis)->lung_count; ++lung) {
+    volume += held[lung];
   }
-  (void)snprintf(found->subtitle + used, sizeof found->subtitle - used, "mean %.1f, max %.1f mm",
+  (void)snprintf(found->subtitle, sizeof found->subtitle, "%.0f mL, mean %.1f, max %.1f mm", volume,
                  statistics.mean, statistics.max);
   return SUPINE_OK;
 }

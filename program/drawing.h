@@ -19,7 +19,6 @@ typedef struct supine_command_drawing {
   supine_from from; /* state that colours and displacements are measured from */
   const char *title;
   const char *inside;   /* file of --inside; NULL: none */
-  double scale;         /* largest displacement, mm; 0: by volume */
   double largest;       /* end of the colour bar, mm; 0: automatic */
   double opacity;       /* opacity of the lungs; 0: not given */
   size_t width, height; /* pixels; 0: automatic */

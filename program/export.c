@@ -14,9 +14,6 @@ typedef struct request {
   const char *path;
   const char *title;
   supine_from from;
-  double volume;  /* tidal volume, mL */
-  double largest; /* largest displacement of an open surface, mm */
-  bool page;
   bool glb_only; /* set where an option was given that a page does not use */
   const char *inside;
   export_glb_options glb;
@@ -32,18 +29,13 @@ static const supine_option table[] = {
     {"breath", 0, "ML",
      "tidal volume of the breath played, and the largest for which the weights of morph targets "
      "stay within 0 and 1",
-     SUPINE_FILLS(request, volume), .standard = "500", SUPINE_ABOVE_ZERO,
+     SUPINE_FILLS(request, glb.breath), .standard = "500", SUPINE_ABOVE_ZERO,
      .wants = "millilitres above 0"},
-    {"scale", 0, "MM",
-     "the same for an open surface, which has no volume: largest displacement when supine",
-     SUPINE_FILLS(request, largest), .standard = "10", SUPINE_ABOVE_ZERO,
-     .wants = "millimetres above 0"},
-    {"inside", 0, "FILE",
-     "structures from 'supine embed' with the same basis, shown through the lungs; points are "
-     "balls of 4 mm. On a page, each part shows its name and displacement at the pointer and "
-     "in a table; in glTF, each is a material of its name",
-     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {.help = "For a page:"},
+    {"inside", 0, "FILE",
+     "structures from 'supine embed' with the same basis, shown through the lungs; each part shows "
+     "its name and displacement at the pointer and in a table",
+     SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"title", 0, "TEXT", "its title; default the name of the basis file",
      SUPINE_FILLS(request, title)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
@@ -72,80 +64,72 @@ static supine_status write_glb(const export_source *source, const request *wante
   return SUPINE_OK;
 }
 
+/* Open the structures named by --inside, and write the page. */
 static supine_status write_page(const export_source *source, const request *wanted,
                                 const char *basis_path, supine_error *error) {
   supine_reference_pose from;
-  supine_status status = supine_options_reference(source->basis, &wanted->from, true, &from, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  const char *slash = strrchr(basis_path, '/');
-  const export_page page = {.breath = wanted->glb.breath,
-                            .from = &from.pose,
-                            .from_name = from.name,
-                            .title = wanted->title != NULL ? wanted->title
-                                     : slash != NULL       ? slash + 1
-                                                           : basis_path,
-                            .inside = wanted->glb.inside,
-                            .parts = wanted->glb.parts};
-  status = supine_export_html_write(wanted->path, source, &page, error);
-  if (status == SUPINE_OK) {
-    (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
-    if (page.inside != NULL) {
-      (void)printf(" and the structures inside, %zu name%s", page.parts->count,
-                   page.parts->count == 1 ? "" : "s");
-    }
-    (void)puts("; open it in any browser");
-  }
-  return status;
-}
-
-/* Export the basis of the lungs, with embedded structures of the same basis where --inside names
- * them. */
-static supine_status export_basis(const char *path, request *wanted, supine_error *error) {
-  export_source source = {0};
   export_source inside = {0};
   supine_command_names names = {0};
-  export_parts parts;
-  supine_status status = supine_export_source_open(path, &source, error);
-  if (status == SUPINE_OK) {
-    status = supine_export_breath_set(&source, wanted->volume, wanted->largest, &wanted->glb.breath,
-                                      error);
-  }
+  supine_status status = supine_options_reference(source->basis, &wanted->from, true, &from, error);
   if (status == SUPINE_OK && wanted->inside != NULL) {
     status = supine_export_source_open(wanted->inside, &inside, error);
     if (status == SUPINE_OK) {
       status = supine_command_names_open(inside.basis, &names, error);
     }
     if (status == SUPINE_OK) {
-      status = supine_command_inside_check(source.basis, inside.basis, wanted->inside, error);
+      status = supine_command_inside_check(source->basis, inside.basis, wanted->inside, error);
     }
-    parts = (export_parts){names.count, names.text, names.part};
-    wanted->glb.inside = &inside;
-    wanted->glb.parts = &parts;
+  }
+  const char *slash = strrchr(basis_path, '/');
+  const export_parts parts = {names.count, names.text, names.part};
+  const export_page page = {.breath = wanted->glb.breath,
+                            .from = &from.pose,
+                            .from_name = from.name,
+                            .title = wanted->title != NULL ? wanted->title
+                                     : slash != NULL       ? slash + 1
+                                                           : basis_path,
+                            .inside = wanted->inside != NULL ? &inside : NULL,
+                            .parts = &parts};
+  if (status == SUPINE_OK) {
+    status = supine_export_html_write(wanted->path, source, &page, error);
   }
   if (status == SUPINE_OK) {
-    status =
-        wanted->page ? write_page(&source, wanted, path, error) : write_glb(&source, wanted, error);
+    (void)printf("%s: a page of %zu vertices", wanted->path, source->info->vertex_count);
+    if (page.inside != NULL) {
+      (void)printf(" and the structures inside, %zu name%s", parts.count,
+                   parts.count == 1 ? "" : "s");
+    }
+    (void)puts("; open it in any browser");
   }
   supine_command_names_close(&names);
   supine_export_source_close(&inside);
-  supine_export_source_close(&source);
   return status;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  wanted->page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other form: .glb */
-  if (wanted->page && wanted->glb_only) {
+  const char *path = given->operand[0];
+  const bool page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* the other form: .glb */
+  export_source source = {0};
+  if (page && wanted->glb_only) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--plain and --animate need an output that ends in .glb");
   }
-  if (!wanted->page && (wanted->title != NULL || wanted->from.given)) {
+  if (!page && (wanted->title != NULL || wanted->inside != NULL || wanted->from.given)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s needs an output that ends in .html",
-                            wanted->from.given ? "--from" : "--title");
+                            wanted->from.given       ? "--from"
+                            : wanted->inside != NULL ? "--inside"
+                                                     : "--title");
   }
-  return export_basis(given->operand[0], wanted, error);
+  supine_status status = supine_export_source_open(path, &source, error);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_closed(source.basis, path, error);
+  }
+  if (status == SUPINE_OK) {
+    status = page ? write_page(&source, wanted, path, error) : write_glb(&source, wanted, error);
+  }
+  supine_export_source_close(&source);
+  return status;
 }
 
 const supine_command supine_command_export = {

@@ -5,31 +5,12 @@
 #include <string.h>
 #include <strings.h>
 
-#include "sh/base/output.h"
-
 #include "program/drawing.h"
 #include "program/options/basis_input.h"
 
 static const char name[] = "render";
 
 typedef supine_command_drawing request;
-
-static supine_status write_picture(const request *wanted, supine_renderer *renderer,
-                                   const supine_picture *picture, supine_error *error) {
-  supine_output output = {0};
-  supine_status status = supine_output_open(wanted->output, &output, error);
-  if (status == SUPINE_OK) {
-    status = supine_render_picture_write(renderer, picture, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* committing reports a failed write */
-      status = supine_output_commit(&output, error);
-    }
-  }
-  supine_output_abandon(&output);
-  if (status == SUPINE_OK) {
-    (void)printf("%s: %zu x %zu pixels\n", wanted->output, picture->width, picture->height);
-  }
-  return status;
-}
 
 static supine_status render(supine_command_studio *studio, const supine_posture_list *postures,
                             supine_error *error) {
@@ -55,7 +36,10 @@ static supine_status render(supine_command_studio *studio, const supine_posture_
   }
   if (status == SUPINE_OK) {
     const supine_picture picture = supine_command_drawing_picture(studio, panel, count, label);
-    status = write_picture(studio->wanted, studio->renderer, &picture, error);
+    status = supine_render_picture_save(studio->renderer, &picture, studio->wanted->output, error);
+    if (status == SUPINE_OK) {
+      (void)printf("%s: %zu x %zu pixels\n", studio->wanted->output, picture.width, picture.height);
+    }
   }
   for (size_t i = 0; states != NULL && i < count; ++i) {
     supine_command_marks_free(&states[i].marks);
@@ -130,10 +114,6 @@ static const supine_option table[] = {
      "as supine:left:5s, rests for a second, and starts again",
      .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {"scale", 0, "MM",
-     "largest displacement in each posture, instead of a volume: for open surfaces",
-     SUPINE_FILLS(request, scale), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
-     .rivals = "breath"},
     {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".png or .webp"},
@@ -202,6 +182,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_status status = check(wanted, &postures, error);
   if (status == SUPINE_OK) {
     status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_closed(basis, given->operand[0], error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_reference(basis, &wanted->from, true, &from, error);

@@ -184,13 +184,10 @@ static void close_points(observed_points *points) {
 }
 
 /* Make the page of a basis file; the caller frees it. */
-static supine_status make_page(const char *path, export_page *shown, char **page, size_t *size,
-                               supine_error *error) {
+static supine_status make_page(const char *path, const export_page *shown, char **page,
+                               size_t *size, supine_error *error) {
   export_source source = {0};
   supine_status status = supine_export_source_open(path, &source, error);
-  if (status == SUPINE_OK) {
-    status = supine_export_breath_set(&source, shown->breath.volume, 20.0, &shown->breath, error);
-  }
   if (status == SUPINE_OK) {
     FILE *file = open_memstream(page, size);
     status =
@@ -218,11 +215,11 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
     status = supine_options_reference(basis, &wanted->from, true, &from, error);
   }
   if (status == SUPINE_OK) {
-    export_page shown = {.breath.volume = wanted->breath.tidal,
-                         .from = &from.pose,
-                         .from_name = from.name,
-                         .title = "Lungs, live",
-                         .live = true};
+    const export_page shown = {.breath = wanted->breath.tidal,
+                               .from = &from.pose,
+                               .from_name = from.name,
+                               .title = "Lungs, live",
+                               .live = true};
     status = make_page(path, &shown, page, &site.page_size, error);
   }
   if (status == SUPINE_OK) {
@@ -339,11 +336,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_basis *basis = NULL;
   supine_status status =
       supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
-  if (status == SUPINE_OK && !supine_basis_get_info(basis)->has_volume) {
-    status = supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                              "%s: its surface is open and encloses no volume: close the mesh "
-                              "before 'supine precompute'",
-                              given->operand[0]);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_closed(basis, given->operand[0], error);
   }
   if (status == SUPINE_OK) {
     status = stream(basis, given->operand[0], wanted, error);

@@ -7,7 +7,6 @@
 #include "program/validation.h"
 
 #include "program/render/render.h"
-#include "sh/base/output.h"
 
 /* Least upper end of the colour scale, mm. */
 static const double end_least = 1.0;
@@ -25,24 +24,6 @@ static void find_values(const supine_command_subject *s, const supine_command_ou
     *largest = fmax(*largest, off);
   }
   *end = fmax(*end, outcome->surface[SUPINE_PATIENT_MAP_PREDICTED].p95);
-}
-
-static supine_status write_picture(supine_renderer *renderer, const supine_picture *picture,
-                                   const char *path, supine_error *error) {
-  supine_output output = {0};
-  supine_status status = supine_output_open(path, &output, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  status = supine_render_picture_write(renderer, picture, output.file, error);
-  if (status == SUPINE_OK) {
-    return supine_output_commit(&output, error);
-  }
-  if (ferror(output.file) != 0) { /* committing reports a failed write */
-    (void)supine_output_commit(&output, error);
-  }
-  supine_output_abandon(&output);
-  return status;
 }
 
 supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
@@ -89,7 +70,7 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
   picture.beyond = largest > picture.largest;
   supine_status status = supine_render_create(s->basis, &renderer, error);
   if (status == SUPINE_OK) {
-    status = write_picture(renderer, &picture, path, error);
+    status = supine_render_picture_save(renderer, &picture, path, error);
   }
   supine_render_destroy(renderer);
   free(values);

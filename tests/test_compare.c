@@ -259,55 +259,6 @@ TEST(test_energy_sums_to_mean_square_over_sphere) {
   unmake(&m);
 }
 
-TEST(test_compare_pose_given_rms_reaches_it) {
-  made m = make(401, 6, 3, 2, false, true);
-  const supine_state asked = {.gravity = {0.3, -0.5, 0.7}};
-  supine_pose pose;
-  assert_int_equal(supine_compare_pose(m.compare, &asked, 3.7, &pose, NULL), SUPINE_OK);
-  assert_near(supine_compare_rms(m.compare, &pose, NULL), 3.7, 1e-12);
-  unmake(&m);
-}
-
-/* Volumes count from the rest of that direction of gravity: constant and linear terms, by hand. */
-TEST(test_compare_pose_volume_counts_from_rest_of_posture) {
-  static const double resting[9] = {-40, 7, -5, 3}; /* Y_00, then along y, z and x */
-  made m = make_resting(401, 6, 3, 2, false, true, resting);
-  supine_state asked = {.gravity = {0.6, -0.48, 0.64}, .volume = {SUPINE_VOLUME_REST, 11}};
-  const double *g = asked.gravity;
-  const double *reference = supine_basis_get_info(m.basis)->reference_volume;
-  supine_pose pose;
-  double held[2];
-  assert_int_equal(supine_compare_pose(m.compare, &asked, 0, &pose, NULL), SUPINE_OK);
-  supine_basis_volumes(m.basis, &pose, held);
-  const double rest =
-      0.5 * sqrt(1 / M_PI) * -40 + 0.5 * sqrt(3 / M_PI) * (7 * g[1] + -5 * g[2] + 3 * g[0]);
-  assert_near(held[0] + held[1] - reference[0] - reference[1], rest + 11, 1e-9);
-  memset(asked.gravity, 0, sizeof asked.gravity);
-  supine_error error;
-  assert_int_equal(supine_compare_pose(m.compare, &asked, 0, &pose, &error), SUPINE_ERROR_ARGUMENT);
-  assert_string_equal(error.message, "gravity has no direction");
-  unmake(&m);
-}
-
-TEST(test_compare_pose_open_or_unmoved_surface_refused) {
-  made m = make(401, 6, 3, 2, false, false);
-  supine_state asked = {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_ABSOLUTE, 100}};
-  supine_pose pose;
-  supine_error error;
-  assert_int_equal(supine_compare_pose(m.compare, &asked, 0, &pose, &error),
-                   SUPINE_ERROR_OPEN_SURFACE);
-  unmake(&m);
-  fixture *f = fixture_create(50, 3, 2, 1, false, false, 3, 9);
-  memset(f->coefficient, 0, 3 * f->vertices * sizeof *f->coefficient);
-  size_t size = 0;
-  m = (made){.f = f, .bytes = fixture_bytes(f, &size)};
-  assert_int_equal(supine_basis_open_memory(m.bytes, size, &m.basis, NULL), SUPINE_OK);
-  assert_int_equal(supine_compare_create(m.basis, &m.compare, NULL), SUPINE_OK);
-  assert_int_equal(supine_compare_pose(m.compare, &asked, 5, &pose, &error),
-                   SUPINE_ERROR_NUMERICAL);
-  unmake(&m);
-}
-
 TEST(test_create_surface_without_area_refused) {
   fixture *f = fixture_create(50, 3, 2, 1, false, false, 3, 9);
   memset(f->vertex, 0, 3 * f->vertices * sizeof *f->vertex);

@@ -15,18 +15,23 @@
 
 #include "tests/poses.h"
 
-enum { MODES = 11, BAND = 4 };
+enum { TARGETS = 8 };
 
 static char *folder;
-static char vector[256], open_surface[256], out[256];
+static char lungs[256], basis[256], out[256];
 static char text[8192];
 
 static int setup(void **state) {
   (void)state;
   folder = fixture_folder();
-  export_basis_make(folder, "vector", MODES, BAND, true, false, vector);
-  export_basis_make(folder, "open", MODES, BAND, false, false, open_surface);
+  (void)snprintf(lungs, sizeof lungs, "%s/lungs.ply", folder);
+  (void)snprintf(basis, sizeof basis, "%s/basis", folder);
   (void)snprintf(out, sizeof out, "%s/out.glb", folder);
+  assert_int_equal(
+      COMMAND_RUN(&supine_command_phantom, KEPT_BOTH, text, "--vertices", "120", "-o", lungs), 0);
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_BOTH, text, lungs, "--held-out",
+                               "9", "-o", basis),
+                   0);
   return 0;
 }
 
@@ -99,14 +104,13 @@ static double real(const json_t *object, const char *key, size_t index) {
 
 /* Assert that base + sum of weight * target, with weights from the extras, gives the positions of
  * the library; s and t are the gains of each lung. */
-static void check_pose(const char *path, const supine_pose *given, const double s[2],
-                       const double t[2]) {
+static void check_pose(const supine_pose *given, const double s[2], const double t[2]) {
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
   json_t *root = read_glb(&bytes, &numbers);
   const json_t *all = json_object_get(json_object_get(root, "extras"), "supine");
   export_source source = {0};
-  assert_int_equal(supine_export_source_open(path, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_source_open(basis, &source, NULL), SUPINE_OK);
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
   float *xyz = fixture_allocate(3 * source.info->vertex_count, sizeof *xyz);
   supine_deform(source.basis, given, xyz);
@@ -139,33 +143,13 @@ static void check_pose(const char *path, const supine_pose *given, const double 
   free(xyz);
 }
 
-static void check_positions(const char *path, double scale) {
-  supine_basis *basis = NULL;
-  double weights[SUPINE_MODES_MAX];
-  const double scales[2] = {scale, scale};
-  assert_int_equal(supine_basis_open(path, &basis, NULL), SUPINE_OK);
-  assert_int_equal(supine_basis_weights(basis, pose_gravity, weights), SUPINE_OK);
-  check_pose(path, POSED(basis, weights, scales), scales, (const double[2]){0, 0});
-  supine_basis_close(basis);
-}
-
 /* The bend has its own targets, and each lung its own gains. */
 TEST(test_glb_bent_basis_targets_give_positions_of_library) {
-  char lungs[280];
-  char path[280];
-  (void)snprintf(lungs, sizeof lungs, "%s/bent.ply", folder);
-  (void)snprintf(path, sizeof path, "%s/bent", folder);
-  assert_int_equal(
-      COMMAND_RUN(&supine_command_phantom, KEPT_BOTH, text, "--vertices", "120", "-o", lungs), 0);
-  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_BOTH, text, lungs, "--held-out",
-                               "9", "-o", path),
-                   0);
-  assert_int_equal(EXPORT_RUN(text, path, "-o", out, "--plain"), 0);
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain"), 0);
   export_source source = {0};
   supine_pose pose;
-  assert_int_equal(supine_export_source_open(path, &source, NULL), SUPINE_OK);
-  const export_breath breath = {.volume = 600};
-  assert_int_equal(supine_export_breath_pose(&source, &breath, pose_gravity, 0.7, &pose, NULL),
+  assert_int_equal(supine_export_source_open(basis, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_breath_pose(&source, 600, pose_gravity, 0.7, &pose, NULL),
                    SUPINE_OK);
   double s[2];
   double t[2];
@@ -176,15 +160,8 @@ TEST(test_glb_bent_basis_targets_give_positions_of_library) {
     t[lung] = (gain[2] - gain[0]) / source.info->bend[2];
   }
   assert_true(fabs(s[0] - s[1]) > 0.01 * fabs(s[0]));
-  check_pose(path, &pose, s, t);
+  check_pose(&pose, s, t);
   supine_export_source_close(&source);
-}
-
-TEST(test_glb_plain_basis_targets_give_positions_of_library) {
-  assert_int_equal(EXPORT_RUN(text, vector, "-o", out, "--plain"), 0);
-  check_positions(vector, 0.7);
-  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--plain"), 0);
-  check_positions(open_surface, 0.7);
 }
 
 /* Between the sampled directions a weight may exceed the sampled extremes: a fiftieth of the range
@@ -192,14 +169,12 @@ TEST(test_glb_plain_basis_targets_give_positions_of_library) {
 TEST(test_glb_weights_any_direction_within_range) {
   enum { TRIED = 4096 };
   export_source source = {0};
-  export_breath breath;
   export_targets *targets = fixture_allocate(1, sizeof *targets);
-  assert_int_equal(supine_export_source_open(open_surface, &source, NULL), SUPINE_OK);
-  assert_int_equal(supine_export_breath_set(&source, 500.0, 30.0, &breath, NULL), SUPINE_OK);
-  assert_int_equal(supine_export_targets_choose(&source, &breath, targets, NULL), SUPINE_OK);
-  double low[MODES];
-  double high[MODES];
-  for (size_t j = 0; j < MODES; ++j) {
+  assert_int_equal(supine_export_source_open(basis, &source, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_targets_choose(&source, 500, targets, NULL), SUPINE_OK);
+  double low[TARGETS];
+  double high[TARGETS];
+  for (size_t j = 0; j < TARGETS; ++j) {
     low[j] = 1.0;
     high[j] = 0.0;
   }
@@ -208,15 +183,15 @@ TEST(test_glb_weights_any_direction_within_range) {
     double weights[EXPORT_TARGETS_MAX];
     supine_pose pose;
     supine_spiral((double)(i / 2), TRIED, 0, g);
-    assert_int_equal(supine_export_breath_pose(&source, &breath, g, (double)(i % 2), &pose, NULL),
+    assert_int_equal(supine_export_breath_pose(&source, 500, g, (double)(i % 2), &pose, NULL),
                      SUPINE_OK);
-    supine_export_targets_weights(&source, targets, &pose, i % 2, weights);
-    for (size_t j = 0; j < MODES; ++j) {
+    supine_export_targets_weights(&source, targets, &pose, 0, weights);
+    for (size_t j = 0; j < TARGETS; ++j) {
       low[j] = fmin(low[j], weights[j]);
       high[j] = fmax(high[j], weights[j]);
     }
   }
-  for (size_t j = 0; j < MODES; ++j) {
+  for (size_t j = 0; j < TARGETS; ++j) {
     assert_true(fabs(low[j] - 0.02 / 1.04) < 1e-9);
     assert_true(fabs(high[j] - 1.02 / 1.04) < 1e-9);
   }
@@ -226,7 +201,7 @@ TEST(test_glb_weights_any_direction_within_range) {
 
 /* Compressed arrays fill the file without gaps, and state the array that they decode to. */
 TEST(test_glb_compressed_views_fill_file) {
-  assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 0);
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
   json_t *root = read_glb(&bytes, &numbers);
@@ -251,7 +226,7 @@ TEST(test_glb_compressed_views_fill_file) {
 }
 
 TEST(test_glb_postures_one_animation_each) {
-  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--animate"), 0);
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--animate"), 0);
   assert_non_null(strstr(text, "and animations"));
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -263,7 +238,7 @@ TEST(test_glb_postures_one_animation_each) {
     const size_t frames = number(child(root, "accessors", number(sampler, "input")), "count");
     assert_int_equal(frames, i == 0 ? 24 * 6 + 1 : 3 * 6 + 1);
     assert_int_equal(number(child(root, "accessors", number(sampler, "output")), "count"),
-                     frames * MODES);
+                     frames * TARGETS);
     assert_int_equal(json_array_size(json_object_get(animation, "channels")), 3);
   }
   json_decref(root);
@@ -273,7 +248,7 @@ TEST(test_glb_postures_one_animation_each) {
 TEST(test_glb_without_triangles_refused) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/points", folder);
-  fixture *f = fixture_create(4, 2, 1, 1, false, false, 5, 5); /* too few vertices for triangles */
+  fixture *f = fixture_create(4, 2, 1, 1, false, true, 5, 5); /* too few vertices for triangles */
   fixture_write(f, path);
   fixture_destroy(f);
   assert_int_equal(EXPORT_RUN(text, path, "-o", out), 2);

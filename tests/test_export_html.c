@@ -10,7 +10,7 @@
 #include "export_helpers.h"
 
 static char *folder;
-static char basis[256], many[256], vector[256], open_surface[256], out[256];
+static char basis[256], many[256], vector[256], out[256];
 static char text[8192];
 
 static int setup(void **state) {
@@ -19,7 +19,6 @@ static int setup(void **state) {
   export_basis_make(folder, "basis", 6, 3, false, true, basis);
   export_basis_make(folder, "many", 17, 4, false, true, many);
   export_basis_make(folder, "vector", 4, 3, true, true, vector);
-  export_basis_make(folder, "open", 4, 3, false, false, open_surface);
   (void)snprintf(out, sizeof out, "%s/out.html", folder);
   return 0;
 }
@@ -132,15 +131,15 @@ static void check_motion(const char *page, const export_source *s, const uint32_
   assert_true(place_unit > 0 && place_unit <= 0.005 && unit > 0 && unit <= 0.005);
   for (size_t i = 0; i < n; ++i) {
     const size_t v = order[i];
-    const float *d = s->direction + 3 * v;
+    const float *d = s->info->direction + 3 * v;
     const double length = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
-    assert_true(fabs(places[4 * i] * place_unit + middle - (double)s->vertices[3 * v]) <=
+    assert_true(fabs(places[4 * i] * place_unit + middle - (double)s->info->vertices[3 * v]) <=
                 0.5001 * place_unit);
     for (size_t axis = 0; axis < 3; ++axis) {
       assert_true(fabs(directions[4 * i + axis] / 32767.0 - (double)d[axis] / length) < 1e-4);
     }
     for (size_t k = 0; k < modes; ++k) {
-      const double c = (double)s->coefficients[v * modes + k] * length;
+      const double c = (double)s->info->coefficients[v * modes + k] * length;
       assert_true(fabs(counts[i * modes + k] * unit - c) <= 0.5001 * unit);
     }
   }
@@ -179,7 +178,7 @@ TEST(test_page_tensors_equal_basis) {
   check_motion(page, &s, order.vertex);
   check_corners(page, order.corners, 3 * s.info->triangle_count);
   supine_export_order_free(&order);
-  check_tensor(page, "modes", s.modes, 6 * 16 * sizeof(double));
+  check_tensor(page, "modes", s.info->modes, 6 * 16 * sizeof(double));
   check_tensor(page, "volume_linear", s.info->volume_linear, 2 * 6 * sizeof(double));
   check_tensor(page, "volume_quadratic", s.info->volume_quadratic, 2 * 36 * sizeof(double));
   check_tensor(page, "volume_cubic", s.info->volume_cubic, 2 * 216 * sizeof(double));
@@ -188,15 +187,6 @@ TEST(test_page_tensors_equal_basis) {
   assert_null(strstr(page, "@import"));
   assert_non_null(strstr(page, "default-src 'none'"));
   supine_export_source_close(&s);
-  free(page);
-}
-
-TEST(test_page_open_surface_no_volumes) {
-  assert_int_equal(EXPORT_RUN(text, open_surface, "-o", out, "--scale", "12"), 0);
-  char *page = read_page();
-  assert_non_null(strstr(page, "&quot;hasVolume&quot;:false"));
-  assert_non_null(strstr(page, "&quot;breathLargest&quot;:12"));
-  assert_null(strstr(page, "tensor-volume_linear"));
   free(page);
 }
 

@@ -10,20 +10,15 @@
 
 enum { EXPORT_RESTING_TERMS = 9 }; /* Y_lm of bands 0 to 2 */
 
-/** An open basis and its tensors. */
+/** An open basis of closed surfaces, and its tensors. */
 typedef struct export_source {
   supine_basis *basis;
   const supine_basis_info *info;
-  size_t terms;              /**< (L+1)^2 */
-  const float *vertices;     /**< [N, 3] */
-  const uint32_t *triangles; /**< [M, 3] */
-  const float *direction;    /**< [N, 3]; NULL where the kind is vector */
-  const float *coefficients; /**< [N, K] or [N, 3, K] */
-  const double *modes;       /**< [K, (L+1)^2] */
-  const double *resting;     /**< [resting_rows, EXPORT_RESTING_TERMS] coefficients in Y_lm of the
-                                volume at rest minus that of the reference surface, mL; NULL
-                                without info->has_rest */
-  size_t resting_rows;       /**< G, or 1 for all lungs together */
+  size_t terms;          /**< (L+1)^2 */
+  const double *resting; /**< [resting_rows, EXPORT_RESTING_TERMS] coefficients in Y_lm of the
+                            volume at rest minus that of the reference surface, mL; NULL
+                            without info->has_rest */
+  size_t resting_rows;   /**< G, or 1 for all lungs together */
 } export_source;
 
 /** Open a basis file.
@@ -40,23 +35,10 @@ void supine_export_box(const export_source *source, double low[3], double high[3
 /** Compute the displacement of a vertex, mm, by one mode at weight 1 and gain 1. */
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
-/** Depth of a breath. */
-typedef struct export_breath {
-  double volume;  /**< closed surfaces: mL above rest, or above the scan where rest is unknown */
-  double largest; /**< open surfaces: largest displacement when supine, mm */
-  double scale;   /**< open surfaces: gain at which the largest displacement is `largest` */
-} export_breath;
-
-/** Set a breath of `volume` mL or, on an open surface, one with a largest displacement of `largest`
- * mm when supine.
- * @retval SUPINE_ERROR_NUMERICAL  all displacements of an open surface are 0 when supine */
-supine_status supine_export_breath_set(const export_source *source, double volume, double largest,
-                                       export_breath *breath, supine_error *error);
-
-/** Compute the pose at a fraction of the breath for gravity along the unit vector `g`. Fraction 0
- * is rest, or the scan where rest is unknown; 1 is the end of inspiration.
+/** Compute the pose at a fraction of a breath of `breath` mL for gravity along the unit vector `g`.
+ * Fraction 0 is rest, or the scan where rest is unknown; 1 is the end of inspiration.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it holds that volume */
-supine_status supine_export_breath_pose(const export_source *source, const export_breath *breath,
+supine_status supine_export_breath_pose(const export_source *source, double breath,
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error);
 
@@ -69,28 +51,23 @@ typedef struct export_parts {
 
 /** How to write glTF. */
 typedef struct export_glb_options {
-  bool plain;   /**< float32 throughout, vertices in the basis' order; else positions as 16-bit
-                   counts of 0.045 mm (more for lungs beyond 1.4 m), within 0.1 mm of the library's,
-                   and normals as bytes (KHR_mesh_quantization), all in an order that compresses
-                   well (EXT_meshopt_compression) */
-  bool animate; /**< add an animation of breathing while the patient turns, and one of breathing in
-                   each of the four lying postures */
-  export_breath breath;
-  const export_source *inside; /**< content of the same lungs, a vector basis with the same modes;
-                                  the lungs are drawn translucent around it; NULL: none */
-  const export_parts *parts;   /**< names of the parts of `inside`; NULL without it */
+  bool plain;    /**< float32 throughout, vertices in the basis' order; else positions as 16-bit
+                    counts of 0.045 mm (more for lungs beyond 1.4 m), within 0.1 mm of the library's,
+                    and normals as bytes (KHR_mesh_quantization), all in an order that compresses
+                    well (EXT_meshopt_compression) */
+  bool animate;  /**< add an animation of breathing while the patient turns, and one of breathing in
+                    each of the four lying postures */
+  double breath; /**< tidal volume, mL, for which weights stay within 0 and 1 */
 } export_glb_options;
 
 /** Write glTF 2.0 binary. Each lung is a mesh of its own, with morph targets that any engine plays:
  *
  *     position_i = base_i + sum over j of weight_j target_ij     0 <= weight_j <= 1
  *
- * The file's `extras` say how each lung's weights follow from gravity and volume. Targets of the
- * lungs hold normals too. The colour of a vertex shows its largest
- * displacement from supine over the lying postures, at rest. The content of a lung is a separate
- * mesh with the same weights, in which each part is a primitive with a material of its name; points
- * are balls of radius 4 mm. The node "patient" lies on a table and rotates about the centre of the
- * lungs; an arrow shows gravity. Units and axes are glTF's: metres, y up.
+ * The file's `extras` say how each lung's weights follow from gravity and volume. Targets hold
+ * normals too. The colour of a vertex shows its largest displacement from supine over the lying
+ * postures, at rest. The node "patient" lies on a table and rotates about the centre of the lungs;
+ * an arrow shows gravity. Units and axes are glTF's: metres, y up.
  * @param bytes  size of the file; output
  * @retval SUPINE_ERROR_MESH         the basis has no triangles
  * @retval SUPINE_ERROR_ARGUMENT     the file would exceed 4 GiB, the limit of the format
@@ -106,12 +83,12 @@ enum { EXPORT_PAGE_MODES_MAX = 16 };
 
 /** Contents of a page besides the lungs. */
 typedef struct export_page {
-  export_breath breath;
+  double breath;           /**< tidal volume, mL */
   const supine_pose *from; /**< displacements are measured from this pose */
   const char *from_name;   /**< name of `from`, as "supine at rest" */
   const char *title;
   const export_source
-      *inside;               /**< content of the same lungs, as in export_glb_options; NULL: none */
+      *inside; /**< content of the same lungs, a vector basis with the same modes; NULL: none */
   const export_parts *parts; /**< names of the parts of `inside`; NULL without it */
   bool live;                 /**< also show the states that the page's server sends (stream) */
 } export_page;

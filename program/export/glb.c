@@ -14,22 +14,22 @@ static const double step_mm = 0.045; /* smallest unit of quantized positions: th
                                     twice as much from the library's */
 
 /* Compute the largest displacement of each vertex from supine over the lying postures, at rest, mm;
- * return the largest of all. `xyz` and `supine_xyz` are workspace, [N, 3]. */
-static double find_moves(const glb *g, float *xyz, float *supine_xyz, float *move) {
+ * return the largest of all. glb.xyz and glb.normals are workspace. */
+static double find_moves(const glb *g, float *move) {
   static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
+  float *from = g->normals;
   double largest = 0;
   for (size_t p = 0; p < sizeof lying / sizeof *lying; ++p) {
     supine_pose pose;
-    if (supine_export_breath_pose(g->source, &g->options->breath, lying[p], 0, &pose, NULL) !=
+    if (supine_export_breath_pose(g->source, g->options->breath, lying[p], 0, &pose, NULL) !=
         SUPINE_OK) {
       continue;
     }
-    supine_deform(g->source->basis, &pose, p == 0 ? supine_xyz : xyz);
+    supine_deform(g->source->basis, &pose, p == 0 ? from : g->xyz);
     for (size_t i = 0; p > 0 && i < g->source->info->vertex_count; ++i) {
-      const double d[3] = {(double)xyz[3 * i] - (double)supine_xyz[3 * i],
-                           (double)xyz[3 * i + 1] - (double)supine_xyz[3 * i + 1],
-                           (double)xyz[3 * i + 2] - (double)supine_xyz[3 * i + 2]};
-      move[i] = fmaxf(move[i], (float)hypot(hypot(d[0], d[1]), d[2]));
+      const float *to = g->xyz + 3 * i;
+      const float away[3] = {to[0] - from[3 * i], to[1] - from[3 * i + 1], to[2] - from[3 * i + 2]};
+      move[i] = fmaxf(move[i], hypotf(hypotf(away[0], away[1]), away[2]));
       largest = fmax(largest, (double)move[i]);
     }
   }
@@ -49,79 +49,48 @@ static void colour(const float *move, size_t count, double end, uint8_t *colours
   }
 }
 
-/* Append a mesh for each lung; set the displacement at the end of the colours, mm. */
-static supine_status add_lungs(glb *g, json_int_t *nodes, double *end, supine_error *error) {
-  static const double white[3] = {1, 1, 1};
-  const export_source *s = g->source;
-  const size_t n = s->info->vertex_count;
-  export_order order = {0};
-  float *base = malloc(3 * n * sizeof *base);
-  float *xyz = malloc(3 * n * sizeof *xyz);
+/* Compute the arrays of the lungs' vertices; set the displacement at the end of the colours, mm. */
+static supine_status prepare(glb *g, double *end, supine_error *error) {
+  const size_t n = g->source->info->vertex_count;
   float *move = calloc(n, sizeof *move);
-  float *added = malloc(3 * n * g->targets.count * sizeof *added);
-  uint8_t *colours = malloc(4 * n);
-  supine_status status = supine_export_order_make(s, !g->options->plain, &order, error);
-  if (status == SUPINE_OK &&
-      (base == NULL || xyz == NULL || move == NULL || added == NULL || colours == NULL)) {
+  g->xyz = malloc(3 * n * sizeof *g->xyz);
+  g->normals = malloc(3 * n * sizeof *g->normals);
+  g->added = malloc(3 * n * g->targets.count * sizeof *g->added);
+  g->colours = malloc(4 * n);
+  supine_status status = supine_export_order_make(g->source, !g->options->plain, &g->order, error);
+  if (status == SUPINE_OK && (move == NULL || g->xyz == NULL || g->normals == NULL ||
+                              g->added == NULL || g->colours == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
-  if (status != SUPINE_OK) {
-    goto cleanup;
+  if (status == SUPINE_OK) {
+    *end = supine_render_bar_end(find_moves(g, move));
+    colour(move, n, *end, g->colours);
+    status = supine_export_targets_normals(g->source, g->options->breath, &g->targets,
+                                           g->options->plain ? NULL : g->order.vertex, g->normals,
+                                           g->added, error);
   }
-  *end = supine_render_bar_end(find_moves(g, xyz, base, move));
-  colour(move, n, *end, colours);
-  status =
-      supine_export_targets_normals(s, &g->options->breath, &g->targets,
-                                    g->options->plain ? NULL : order.vertex, base, added, error);
-  for (size_t lung = 0; status == SUPINE_OK && lung < s->info->lung_count; ++lung) {
-    char name[64];
-    (void)snprintf(name, sizeof name, "%s lung", s->info->lung_names[lung]);
-    const json_int_t material =
-        supine_export_glb_material(g, name, white, g->options->inside != NULL ? 0.3 : 1);
-    const uint32_t *own = order.corners + order.corner_begin[lung];
-    const size_t count = order.corner_begin[lung + 1] - order.corner_begin[lung];
-    const glb_shape shape = {name,    s, lung, order.vertex, base,     added,
-                             colours, 1, &own, &count,       &material};
-    nodes[lung] = supine_export_glb_add(g, &shape);
-  }
-cleanup:
-  free(base);
-  free(xyz);
   free(move);
-  free(added);
-  free(colours);
-  supine_export_order_free(&order);
   return status;
 }
 
-/* Append the node "patient" with the lungs and their content, the animations, the table and the
- * arrow of gravity. */
+/* Append the patient with the lungs, the animations, the table and the arrow; set the scene's root
+ * nodes and the displacement at the end of the colours, mm. */
 static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
-  const size_t lung_count = g->source->info->lung_count;
-  json_int_t nodes[2 * SUPINE_LUNGS_MAX];
-  size_t lungs[2 * SUPINE_LUNGS_MAX];
-  size_t count = lung_count;
   float q[4];
+  const supine_status status = prepare(g, end, error);
+  if (status != SUPINE_OK) {
+    return status;
+  }
   supine_export_glb_rotation(0, q);
   json_t *children = json_array();
   (void)json_array_append_new(g->nodes, json_pack("{s:s, s:o, s:[f,f,f,f]}", "name", "patient",
                                                   "children", children, "rotation", (double)q[0],
                                                   (double)q[1], (double)q[2], (double)q[3]));
-  const supine_status status = add_lungs(g, nodes, end, error);
-  if (status != SUPINE_OK) {
-    return status;
+  for (size_t lung = 0; lung < g->source->info->lung_count; ++lung) {
+    (void)json_array_append_new(children, json_integer(supine_export_glb_add(g, lung)));
   }
-  for (size_t lung = 0; lung < lung_count; ++lung) {
-    lungs[lung] = lung;
-  }
-  if (g->options->inside != NULL) {
-    supine_export_glb_inside(g, &count, nodes, lungs);
-  }
-  for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(children, json_integer(nodes[i]));
-  }
-  if (g->options->animate && g->status == SUPINE_OK) {
-    supine_export_glb_animate(g, count, nodes, lungs);
+  if (g->options->animate) {
+    supine_export_glb_animate(g);
   }
   *roots = supine_export_glb_room(g);
   return g->status == SUPINE_OK ? SUPINE_OK : supine_error_set(error, g->status, "out of memory");
@@ -229,7 +198,7 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
   for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
     *parts[i] = json_array();
   }
-  status = supine_export_targets_choose(source, &options->breath, &g->targets, error);
+  status = supine_export_targets_choose(source, options->breath, &g->targets, error);
   g->step = options->plain ? 1 : fmax(step_mm, g->targets.reach / (INT16_MAX / 2));
   if (status == SUPINE_OK) {
     status = make_and_write(g, path, bytes, error);
@@ -237,6 +206,11 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
   for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i) {
     json_decref(*parts[i]);
   }
+  supine_export_order_free(&g->order);
+  free(g->xyz);
+  free(g->normals);
+  free(g->added);
+  free(g->colours);
   free(g);
   return status;
 }

@@ -6,6 +6,7 @@
 
 #include <jansson.h>
 
+#include "program/export/packed.h"
 #include "program/export/targets.h"
 
 /** Kinds of array. Unless the file is plain, positions and weights are stored as 16-bit integers
@@ -26,28 +27,17 @@ typedef struct glb {
   const export_source *source;
   const export_glb_options *options;
   export_targets targets;
-  double step; /**< unit of GLB_PLACES, mm; 1 in plain files */
+  export_order order; /**< of the vertices and triangles written */
+  float *xyz;         /**< [N, 3] workspace */
+  float *normals;     /**< [N, 3] of the base */
+  float *added;       /**< [targets, N, 3] what targets add to normals */
+  uint8_t *colours;   /**< [N, 4] RGBA */
+  double step;        /**< unit of GLB_PLACES, mm; 1 in plain files */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
   FILE *numbers;        /**< contents of the binary chunk, in memory */
   size_t unpacked;      /**< bytes of the compressed arrays once decoded */
   supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */
 } glb;
-
-/** Vertices of a lung or of its content, and how they are drawn. N is the vertex count of `source`.
- */
-typedef struct glb_shape {
-  const char *name;
-  const export_source *source;
-  size_t lung;
-  const uint32_t *order;          /**< [N] index in `source` of each vertex written */
-  const float *normals;           /**< [N, 3] */
-  const float *added;             /**< [targets, N, 3] what targets add to normals, or NULL */
-  const uint8_t *colours;         /**< [N, 4] RGBA, or NULL */
-  size_t parts;                   /**< number of primitives, each with its material */
-  const uint32_t *const *corners; /**< [parts] vertex indices of each part's triangles */
-  const size_t *corner_count;     /**< [parts] number of those indices */
-  const json_int_t *material;     /**< [parts] index of each part's material */
-} glb_shape;
 
 /** Append an array of `count` rows and return its accessor's index.
  * @param order  [count] index in `rows` of each row; NULL: as they are */
@@ -62,11 +52,11 @@ json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
  * @param mesh  the function takes ownership */
 json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
 
-/** Append a shape with morph targets; return its node's index. */
-json_int_t supine_export_glb_add(glb *g, const glb_shape *shape);
+/** Append the mesh of a lung, with morph targets; return its node's index. */
+json_int_t supine_export_glb_add(glb *g, size_t lung);
 
-/** Append a material and return its index; it is translucent if `alpha` < 1. */
-json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3], double alpha);
+/** Append a material and return its index. */
+json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
 /** Return the extras of the file: how weights follow from gravity and volume.
  * @param largest_move  displacement at the end of the colours, mm */
@@ -79,14 +69,8 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
  * long axis by `roll` radians: 0 is supine, pi / 2 the left side. */
 void supine_export_glb_rotation(double roll, float q[4]);
 
-/** Append the animations.
- * @param nodes  [count] nodes with morph targets
- * @param lungs  [count] lung of each node */
-void supine_export_glb_animate(glb *g, size_t count, const json_int_t *nodes, const size_t *lungs);
-
-/** Append the content of each lung that has any: append its node to `nodes` and its lung to
- * `lungs`, and increment `*count`. */
-void supine_export_glb_inside(glb *g, size_t *count, json_int_t *nodes, size_t *lungs);
+/** Append the animations. The node of lung i is 1 + i, that of the patient 0. */
+void supine_export_glb_animate(glb *g);
 
 /** Append a table and an arrow that shows gravity; return the root nodes of the scene: the patient,
  * the table and the arrow. */

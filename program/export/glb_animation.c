@@ -28,18 +28,17 @@ static double roll_at(double seconds) {
   return pi / 2 * (stage + x * x * (3 - 2 * x));
 }
 
-/* Compute the weights of all nodes at a time. `rows` points to this frame of the first node in an
- * array [count, frames, targets]. */
-static void make_frame(glb *g, size_t count, const size_t *lungs, double roll, double seconds,
-                       float *rows, size_t frames) {
+/* Compute the weights of all lungs at a time. `rows` points to this frame of the first lung in an
+ * array [lungs, frames, targets]. */
+static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
   const double gravity[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
   double weights[EXPORT_TARGETS_MAX];
   supine_pose pose;
   /* This succeeds: supine_export_targets_choose posed directions all around at both ends. */
-  (void)supine_export_breath_pose(g->source, &g->options->breath, gravity, fraction, &pose, NULL);
-  for (size_t i = 0; i < count; ++i) {
-    supine_export_targets_weights(g->source, &g->targets, &pose, lungs[i], weights);
+  (void)supine_export_breath_pose(g->source, g->options->breath, gravity, fraction, &pose, NULL);
+  for (size_t i = 0; i < g->source->info->lung_count; ++i) {
+    supine_export_targets_weights(g->source, &g->targets, &pose, i, weights);
     for (size_t j = 0; j < g->targets.count; ++j) {
       rows[i * frames * g->targets.count + j] = (float)weights[j];
     }
@@ -47,8 +46,8 @@ static void make_frame(glb *g, size_t count, const size_t *lungs, double roll, d
 }
 
 /* Append an animation at `roll` radians; NAN turns the patient through all lying postures. */
-static void add(glb *g, const char *name, double roll, size_t seconds, size_t count,
-                const json_int_t *nodes, const size_t *lungs) {
+static void add(glb *g, const char *name, double roll, size_t seconds) {
+  const size_t count = g->source->info->lung_count;
   const size_t frames = RATE * seconds + 1;
   const size_t targets = g->targets.count;
   float *times = malloc(frames * sizeof *times);
@@ -63,7 +62,7 @@ static void add(glb *g, const char *name, double roll, size_t seconds, size_t co
     const double turned = isnan(roll) ? roll_at(at) : roll;
     times[i] = (float)at;
     supine_export_glb_rotation(turned, rotations + 4 * i);
-    make_frame(g, count, lungs, turned, at, weights + i * targets, frames);
+    make_frame(g, turned, at, weights + i * targets, frames);
   }
   const json_int_t input = supine_export_glb_put(g, GLB_TIMES, times, NULL, frames);
   json_t *samplers = json_pack("[{s:I, s:I}]", "input", input, "output",
@@ -77,7 +76,7 @@ static void add(glb *g, const char *name, double roll, size_t seconds, size_t co
                                                   NULL, frames * targets)));
     (void)json_array_append_new(channels,
                                 json_pack("{s:I, s:{s:I, s:s}}", "sampler", (json_int_t)i + 1,
-                                          "target", "node", nodes[i], "path", "weights"));
+                                          "target", "node", (json_int_t)i + 1, "path", "weights"));
   }
   (void)json_array_append_new(g->animations, json_pack("{s:s, s:o, s:o}", "name", name, "samplers",
                                                        samplers, "channels", channels));
@@ -87,10 +86,10 @@ cleanup:
   free(weights);
 }
 
-void supine_export_glb_animate(glb *g, size_t count, const json_int_t *nodes, const size_t *lungs) {
+void supine_export_glb_animate(glb *g) {
   static const char *const names[POSTURES] = {"supine", "left side", "prone", "right side"};
-  add(g, "turning", NAN, SECONDS * POSTURES, count, nodes, lungs);
+  add(g, "turning", NAN, SECONDS * POSTURES);
   for (size_t p = 0; p < POSTURES; ++p) {
-    add(g, names[p], (double)p * pi / 2, BREATH_SECONDS, count, nodes, lungs);
+    add(g, names[p], (double)p * pi / 2, BREATH_SECONDS);
   }
 }

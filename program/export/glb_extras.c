@@ -78,19 +78,18 @@ json_t *supine_export_glb_extras(const glb *g, double largest_move) {
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();
     for (size_t i = 0; i < s->terms; ++i) {
-      (void)json_array_append_new(row, json_integer(llround(s->modes[k * s->terms + i] / unit)));
+      (void)json_array_append_new(row,
+                                  json_integer(llround(s->info->modes[k * s->terms + i] / unit)));
     }
     (void)json_array_append_new(modes, row);
   }
-  json_t *supine =
-      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
-                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit",
-                unit, "bend", supine_template_numbers(s->info->bend, 3), "middle",
-                supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
-                s->info->has_volume ? "breathVolume" : "breathScale",
-                s->info->has_volume ? g->options->breath.volume : g->options->breath.scale,
-                "largestMoveColoured", largest_move, "basis", origin(s));
-  if (s->info->has_volume && g->targets.count <= FORMS_MAX) {
+  json_t *supine = json_pack(
+      "{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text, "weights",
+      weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit", unit, "bend",
+      supine_template_numbers(s->info->bend, 3), "middle",
+      supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step, "breathVolume",
+      g->options->breath, "largestMoveColoured", largest_move, "basis", origin(s));
+  if (g->targets.count <= FORMS_MAX) {
     (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }
   if (s->info->has_rest) {
@@ -115,7 +114,7 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
     (void)json_object_set_new(supine, "resting",
                               supine_template_numbers(resting, EXPORT_RESTING_TERMS));
   }
-  if (info->has_volume && g->targets.count <= FORMS_MAX) {
+  if (g->targets.count <= FORMS_MAX) {
     (void)json_object_update_new(
         supine,
         json_pack(

@@ -34,7 +34,7 @@ static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2]
       }
     }
   }
-  const json_int_t material = supine_export_glb_material(g, name, rgb, 1);
+  const json_int_t material = supine_export_glb_material(g, name, rgb);
   const json_int_t indices = supine_export_glb_put(g, GLB_CORNERS, corners, NULL, at);
   return supine_export_glb_show(
       g, name,

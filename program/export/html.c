@@ -53,13 +53,14 @@ static double length_of(const float v[3]) {
 
 static void place_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   for (size_t axis = 0; axis < 3; ++axis) {
-    row[axis] = count_of((double)s->vertices[3 * vertex + axis] - p->middle[axis], p->place_unit);
+    row[axis] =
+        count_of((double)s->info->vertices[3 * vertex + axis] - p->middle[axis], p->place_unit);
   }
 }
 
 static void direction_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   static const float none[3] = {0, 0, 1};
-  const float *d = s->direction + 3 * vertex;
+  const float *d = s->info->direction + 3 * vertex;
   const float length = (float)length_of(d);
   const float unit[3] = {d[0] / length, d[1] / length, d[2] / length};
   (void)p;
@@ -69,15 +70,16 @@ static void direction_row(const page *p, const export_source *s, size_t vertex, 
 static void coefficient_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   const size_t k = s->info->mode_count;
   for (size_t i = 0; i < k; ++i) {
-    row[i] = count_of(
-        (double)s->coefficients[vertex * k + i] * length_of(s->direction + 3 * vertex), p->unit);
+    row[i] = count_of((double)s->info->coefficients[vertex * k + i] *
+                          length_of(s->info->direction + 3 * vertex),
+                      p->unit);
   }
 }
 
 static void inside_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   const size_t columns = 3 * s->info->mode_count;
   for (size_t i = 0; i < columns; ++i) {
-    row[i] = count_of((double)s->coefficients[vertex * columns + i], p->inside_unit);
+    row[i] = count_of((double)s->info->coefficients[vertex * columns + i], p->inside_unit);
   }
 }
 
@@ -137,13 +139,13 @@ static void find_units(page *p) {
   double largest_inside = 0;
   supine_export_box(s, low, high);
   for (size_t i = 0; i < s->info->vertex_count * k; ++i) {
-    largest =
-        fmax(largest, fabs((double)s->coefficients[i]) * length_of(s->direction + 3 * (i / k)));
+    largest = fmax(largest, fabs((double)s->info->coefficients[i]) *
+                                length_of(s->info->direction + 3 * (i / k)));
   }
   if (inside != NULL) {
     supine_export_box(inside, low, high);
     for (size_t i = 0; i < 3 * k * inside->info->vertex_count; ++i) {
-      largest_inside = fmax(largest_inside, fabs((double)inside->coefficients[i]));
+      largest_inside = fmax(largest_inside, fabs((double)inside->info->coefficients[i]));
     }
   }
   p->place_unit = step;
@@ -230,7 +232,7 @@ static double scan_volume(const export_source *s) {
   double beyond = 0;
   supine_pose pose;
   supine_error error;
-  if (!s->info->has_volume || supine_basis_pose(s->basis, &scan, &pose, &error) != SUPINE_OK) {
+  if (supine_basis_pose(s->basis, &scan, &pose, &error) != SUPINE_OK) {
     return 0;
   }
   supine_basis_volumes(s->basis, &pose, held);
@@ -257,16 +259,14 @@ static json_t *describe(const page *p) {
     (void)json_object_set_new(metadata, all[i].key, json_string(all[i].value));
   }
   json_t *title = json_string(p->shown->title);
-  const export_breath *breath = &p->shown->breath;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:b, s:b, s:o, s:f, s:f, s:f, s:o, s:o, s:o, s:f, s:f, "
+      "{s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
       "s:o, s:o, s:o, s:f, s:I, s:o}",
       "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
       "modes", (json_int_t)info->mode_count, "normalModes", (json_int_t)info->normal_count, "band",
       (json_int_t)info->band, "lungBegin", begins(p->source, info->lung_begin), "cornerBegin",
-      begins(p->source, p->order.corner_begin), "hasVolume", (int)info->has_volume, "hasResting",
-      (int)(p->source->info->has_rest), "colours", colours(), "breathVolume", breath->volume,
-      "breathLargest", breath->largest, "breathScale", breath->scale, "metadata", metadata, "title",
+      begins(p->source, p->order.corner_begin), "hasResting", (int)(p->source->info->has_rest),
+      "colours", colours(), "breathVolume", p->shown->breath, "metadata", metadata, "title",
       title != NULL ? title : json_string("lungs"), "middle", supine_template_numbers(p->middle, 3),
       "placeUnit", p->place_unit, "unit", p->unit, "inside", describe_inside(p), "from",
       describe_from(p), "references",
@@ -295,7 +295,7 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
     const export_source *inside = p->shown->inside;
     write_rows(p, file, "inside-vertices", inside, 3, place_row);
     write_rows(p, file, "inside-coefficients", inside, 3 * k, inside_row);
-    write_corners(p, file, "inside-triangles", inside, inside->triangles);
+    write_corners(p, file, "inside-triangles", inside, inside->info->triangles);
     write_tensor(file, "inside-parts", p->shown->parts->of,
                  inside->info->vertex_count * sizeof *p->shown->parts->of);
   }

@@ -105,13 +105,13 @@ supine_status supine_export_order_make(const export_source *source, bool packed,
   }
   for (size_t v = 0; v < info->vertex_count; ++v) {
     order->vertex[v] = (uint32_t)v;
-    level[3 * v] = source->vertices[3 * v + 2];
+    level[3 * v] = source->info->vertices[3 * v + 2];
   }
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     uint32_t *corners = order->corners + at;
     order->corner_begin[lung] = at;
     for (size_t t = 0; t < info->triangle_count; ++t) {
-      const uint32_t *corner = source->triangles + 3 * t;
+      const uint32_t *corner = source->info->triangles + 3 * t;
       if (corner[0] >= info->lung_begin[lung] && corner[0] < info->lung_begin[lung + 1]) {
         memcpy(order->corners + at, corner, 3 * sizeof *corner);
         at += 3;

@@ -46,7 +46,7 @@ void supine_export_targets_weights(const export_source *source, const export_tar
 /* Find the smallest amount of each field over directions and the breath, as its offset, and the
  * range above it, as its unit. Gains are monotonic in the volume, so both ends of the breath
  * suffice. */
-static supine_status find_ranges(const export_source *source, const export_breath *breath,
+static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {
   double amounts[EXPORT_TARGETS_MAX];
   supine_pose pose;
@@ -82,7 +82,7 @@ static void find_middle(const export_source *source, export_targets *targets) {
   }
 }
 
-supine_status supine_export_targets_choose(const export_source *source, const export_breath *breath,
+supine_status supine_export_targets_choose(const export_source *source, double breath,
                                            export_targets *targets, supine_error *error) {
   const supine_basis_info *info = source->info;
   const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
@@ -123,7 +123,7 @@ static void add_fields(const export_source *source, size_t count, const double *
 void supine_export_targets_base(const export_source *source, const export_targets *targets,
                                 size_t lung, size_t vertex, double xyz[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
-    xyz[axis] = (double)source->vertices[3 * vertex + axis] - targets->middle[axis];
+    xyz[axis] = (double)source->info->vertices[3 * vertex + axis] - targets->middle[axis];
   }
   add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
 }
@@ -202,8 +202,7 @@ static void round_changes(const export_source *source, const export_targets *tar
   }
 }
 
-supine_status supine_export_targets_normals(const export_source *source,
-                                            const export_breath *breath,
+supine_status supine_export_targets_normals(const export_source *source, double breath,
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};

@@ -31,7 +31,7 @@ typedef struct export_targets {
 
 /** Choose the targets of every lung.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume */
-supine_status supine_export_targets_choose(const export_source *source, const export_breath *breath,
+supine_status supine_export_targets_choose(const export_source *source, double breath,
                                            export_targets *targets, supine_error *error);
 
 /** Compute a lung's weights [count] in a pose. */
@@ -51,8 +51,7 @@ void supine_export_targets_base(const export_source *source, const export_target
  * @param order  [N] order in which vertices are written, to round what targets add so that it
  *               compresses well; NULL: do not round
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_export_targets_normals(const export_source *source,
-                                            const export_breath *breath,
+supine_status supine_export_targets_normals(const export_source *source, double breath,
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error);
 

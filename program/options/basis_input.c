@@ -19,6 +19,16 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
   return supine_basis_open_with(path, &options, basis, error);
 }
 
+supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
+                                          supine_error *error) {
+  return supine_basis_get_info(basis)->has_volume
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                                "%s: its surface is open and encloses no volume: close the mesh "
+                                "before 'supine precompute'",
+                                path);
+}
+
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error) {
   const char *axes = supine_basis_metadata(basis, "scan_axes");

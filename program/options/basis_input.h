@@ -19,6 +19,11 @@ extern const supine_option supine_options_as_scanned[];
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
+/* Check that the surface of the basis in file `path` encloses a volume.
+ * @retval SUPINE_ERROR_OPEN_SURFACE */
+supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
+                                          supine_error *error);
+
 /* Set the axes and unit of `save` to those of the scan where `wanted`.
  * @retval SUPINE_ERROR_FORMAT  the basis does not state them */
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,

@@ -8,6 +8,7 @@
 
 #include "program/render/render.h"
 #include "sh/base/library.h"
+#include "sh/base/output.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \
@@ -502,8 +503,9 @@ supine_status supine_render_picture_draw(supine_renderer *renderer, const supine
   return status;
 }
 
-supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
-                                          FILE *file, supine_error *error) {
+supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
+                                         const char *path, supine_error *error) {
+  supine_output output = {0};
   supine_status status = begin(picture, error);
   if (status != SUPINE_OK) {
     return status;
@@ -512,8 +514,15 @@ supine_status supine_render_picture_write(supine_renderer *renderer, const supin
       cairo.image_surface_create(CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height);
   status = draw_on(surface, renderer, picture, error);
   if (status == SUPINE_OK) {
-    status = write_png(surface, file, error);
+    status = supine_output_open(path, &output, error);
   }
+  if (status == SUPINE_OK) {
+    status = write_png(surface, output.file, error);
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* committing reports a failed write */
+      status = supine_output_commit(&output, error);
+    }
+  }
+  supine_output_abandon(&output);
   cairo.surface_destroy(surface);
   return status;
 }

@@ -157,11 +157,11 @@ void supine_render_picture_extent(supine_renderer *renderer, const supine_pictur
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
-/** Compose a picture and write it as PNG.
+/** Compose a picture and write it as a PNG file.
  * @retval SUPINE_ERROR_ARGUMENT  too large, or too small for so many panels
  * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
-supine_status supine_render_picture_write(supine_renderer *renderer, const supine_picture *picture,
-                                          FILE *file, supine_error *error);
+supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
+                                         const char *path, supine_error *error);
 
 /** An animation for a WebP file that repeats forever. */
 typedef struct supine_animation supine_animation;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the results of 'supine compare', and print them as text, JSON, CSV and HTML. */
+/* Compute the results of 'supine compare', and print them as text, JSON and HTML. */
 #ifndef SUPINE_COMPARISON_H
 #define SUPINE_COMPARISON_H
 
@@ -16,29 +16,25 @@ enum { SUPINE_COMPARISON_SLABS = 10 };
 typedef struct supine_compared_posture {
   supine_pose pose;
   supine_distance_statistics displacement; /* from the comparison's reference, mm */
-  double expected_error; /* expected error of the displacement, mm RMS; 0 if unknown */
-  /* Closed surfaces only: */
-  double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, tissue included, mL */
-  double gain[SUPINE_LUNGS_MAX];             /* share of each lung in the breath, mL */
+  double expected_error;           /* expected error of the displacement, mm RMS; 0 if unknown */
+  double volume[SUPINE_LUNGS_MAX]; /* volume of each lung, tissue included, mL */
+  double gain[SUPINE_LUNGS_MAX];   /* share of each lung in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* all lungs together, uppermost first */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
   const char *path;    /* file of the basis, for output */
   const char *command; /* name of the running command, for messages */
+  const char *made_by; /* the command line */
   bool allow_folds;
   const supine_basis *basis;
   supine_state state; /* holds the volume of every posture; its gravity is supine */
-  double rms;         /* if > 0: RMS displacement of every posture, mm, instead of a volume */
   supine_from from;
   double breath; /* volume that a breath adds, mL */
   supine_posture_list postures;
   supine_reference_pose reference; /* displacements are measured from this pose */
   supine_compare *compare;
   supine_compared_posture *posture; /* [count] */
-  supine_distance_statistics *pair; /* [count, count] distances, mm: symmetric, diagonal 0 */
-  double *pair_error;               /* [count, count] their expected errors, mm RMS: likewise */
-  double constant, odd, even;       /* shares of energy, 0 to 1: l = 0, odd l, even l > 0 */
   size_t directions;                /* sampled directions of gravity that reach the volume */
   double farthest[3],
       farthest_rms; /* of these, the one farthest from supine; its RMS distance, mm */
@@ -50,7 +46,7 @@ supine_status supine_report_find(supine_comparison *comparison, supine_error *er
 /* Free what supine_report_find allocated. */
 void supine_report_free(supine_comparison *comparison);
 
-/* Print the volume of all postures: "at rest", "at rest + 300 mL" or "5 mm RMS displacement". */
+/* Print the volume of all postures: "at rest" or "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
 /* Return the RMS distance of a direction of gravity from supine, mm; NaN if the lungs cannot reach
@@ -67,7 +63,6 @@ double supine_report_gain(const supine_comparison *comparison, size_t posture);
  * jansson fails. */
 void supine_report_text(const supine_comparison *comparison, FILE *file);
 bool supine_report_json(const supine_comparison *comparison, FILE *file);
-void supine_report_csv(const supine_comparison *comparison, FILE *file);
 
 /* Print the comparison as HTML. If pictures cannot be drawn, print the reason in their place. Write
  * errors stay in the stream.

@@ -58,10 +58,8 @@ static void print_finding(const supine_comparison *c, size_t posture, FILE *to) 
   double ml[SUPINE_LUNGS_MAX];
   bool told[SUPINE_LUNGS_MAX] = {false};
   print_where(c->postures.item[posture].name, to);
-  if (info->has_volume) {
-    find_changes(c, posture, percent, ml);
-  }
-  for (size_t i = 0; info->has_volume && i < info->lung_count; ++i) {
+  find_changes(c, posture, percent, ml);
+  for (size_t i = 0; i < info->lung_count; ++i) {
     size_t most = info->lung_count;
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       if (!told[lung] && (most == info->lung_count || fabs(ml[lung]) > fabs(ml[most]))) {
@@ -77,9 +75,8 @@ static void print_finding(const supine_comparison *c, size_t posture, FILE *to) 
                     percent[most]);
     }
   }
-  (void)fprintf(to, "%s the surface moves %.1f mm on average, %.1f mm at most.",
-                info->has_volume ? ";" : "", c->posture[posture].displacement.mean,
-                c->posture[posture].displacement.max);
+  (void)fprintf(to, "; the surface moves %.1f mm on average, %.1f mm at most.",
+                c->posture[posture].displacement.mean, c->posture[posture].displacement.max);
 }
 
 static json_t *printed(const supine_comparison *c, size_t posture,
@@ -145,10 +142,8 @@ json_t *supine_report_postures(const supine_comparison *c) {
     double percent[SUPINE_LUNGS_MAX] = {0};
     double ml[SUPINE_LUNGS_MAX] = {0};
     const char *words = "";
-    if (info->has_volume) {
-      find_changes(c, i, percent, ml);
-    }
-    for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
+    find_changes(c, i, percent, ml);
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)json_array_append_new(
           lungs,
           json_pack("{s:o, s:o}", "ml", json_sprintf("%.0f", c->posture[i].volume[lung]), "percent",
@@ -160,14 +155,12 @@ json_t *supine_report_postures(const supine_comparison *c) {
       }
     }
     (void)json_array_append_new(
-        list,
-        json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name",
-                  supine_options_posture_label(c->postures.item[i].name), "line",
-                  supine_report_line(i), "held", lungs, "mean",
-                  json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
-                  json_sprintf("%.1f", c->posture[i].displacement.max), "published", words, "ratio",
-                  info->has_volume ? json_sprintf("%.2f", supine_report_lowest_over_uppermost(c, i))
-                                   : json_string("")));
+        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name",
+                        supine_options_posture_label(c->postures.item[i].name), "line",
+                        supine_report_line(i), "held", lungs, "mean",
+                        json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
+                        json_sprintf("%.1f", c->posture[i].displacement.max), "published", words,
+                        "ratio", json_sprintf("%.2f", supine_report_lowest_over_uppermost(c, i))));
   }
   return list;
 }

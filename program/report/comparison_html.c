@@ -20,28 +20,10 @@ extern const supine_asset
 static json_t *lungs(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_array();
-  for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
     (void)json_array_append_new(list, json_string(info->lung_names[lung]));
   }
   return list;
-}
-
-/* Return which two postures differ most, in words. */
-static json_t *farthest_pair(const supine_comparison *c) {
-  const size_t count = c->postures.count;
-  size_t most = 0;
-  for (size_t i = 0; i < count * count; ++i) {
-    most = c->pair[i].rms > c->pair[most].rms ? i : most;
-  }
-  return json_sprintf("%s and %s differ most: %.1f mm RMS",
-                      supine_options_posture_label(c->postures.item[most / count].name),
-                      supine_options_posture_label(c->postures.item[most % count].name),
-                      c->pair[most].rms);
-}
-
-/* Format a share in %; "0 %" instead of "0.00 %". */
-static json_t *percent(double share) {
-  return fabs(100.0 * share) < 0.005 ? json_string("0 %") : json_sprintf("%.2f %%", 100.0 * share);
 }
 
 /* Return today's date, or that of SOURCE_DATE_EPOCH, which makes reports reproducible. */
@@ -60,43 +42,13 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
   (void)json_array_append_new(list, json_pack("{s:s, s:o}", "name", name, "value", value));
 }
 
-/* Print the command that repeats this comparison, truncated to `size` bytes. */
-static void write_command(const supine_comparison *c, const char *file, char *command,
-                          size_t size) {
-  FILE *to = fmemopen(command, size, "w");
-  if (to == NULL) {
-    return;
-  }
-  char state[160];
-  (void)supine_state_print(&c->state, state, sizeof state);
-  (void)fprintf(to, "supine compare %s ", file);
-  if (c->rms > 0.0) {
-    (void)fprintf(to, "--rms %.9g", c->rms);
-  } else if (strchr(state, ':') != NULL) { /* the posture, supine, ends there */
-    (void)fprintf(to, "--volume %s", strchr(state, ':') + 1);
-  }
-  if (c->from.given) {
-    (void)supine_state_print(&c->from.state, state, sizeof state);
-    (void)fprintf(to, " --from %s", state);
-  }
-  (void)fprintf(to, "%s --breath %.9g --postures ", c->allow_folds ? " --allow-folds" : "",
-                c->breath);
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    (void)fprintf(to, "%s%s", i > 0 ? "," : "", c->postures.item[i].name);
-  }
-  (void)fclose(to);
-  command[size - 1] = '\0';
-}
-
 /* Return {{provenance}}: the command, the program, the basis and its metadata. */
 static json_t *provenance(const supine_comparison *c, json_t *file) {
   static const char *const keys[] = {"made_by", "assumed",           "scanned",     "law",
                                      "patient", "error_rms_percent", "attribution", "checksum"};
   json_t *list = json_array();
-  char command[2048] = "";
   json_t *today = date();
-  write_command(c, json_string_value(file), command, sizeof command);
-  add_fact(list, "command", json_string(command));
+  add_fact(list, "command", json_string(c->made_by));
   add_fact(list, "program",
            json_sprintf("supine " SUPINE_VERSION ", %s", json_string_value(today)));
   json_decref(today);
@@ -121,14 +73,13 @@ static json_t *facts(const supine_comparison *c) {
   supine_report_volume(c, volume, sizeof volume);
   json_t *list = provenance(c, file);
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o, s:o, s:o, s:o}", "file", file,
-      "provenance", list, "date", date(), "count",
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:I, s:o, s:o}", "file", file, "provenance", list,
+      "date", date(), "count",
       json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
       volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
       json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
       "directions", (json_int_t)c->directions, "farthest", supine_report_direction(c->farthest),
-      "farthest_rms", json_sprintf("%.2f", c->farthest_rms), "constant", percent(c->constant),
-      "odd", percent(c->odd), "even", percent(c->even));
+      "farthest_rms", json_sprintf("%.2f", c->farthest_rms));
 }
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
@@ -142,14 +93,10 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
                             supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->farthest_rms, false,
                                               "RMS distance from supine, mm"));
   if (c->postures.count > 1) {
-    (void)json_object_set_new(data, "pair", farthest_pair(c));
     (void)json_object_set_new(data, "outlined",
                               json_pack("{s:o}", "outlines", supine_report_outlines(c)));
   }
-  if (supine_basis_get_info(c->basis)->has_volume) {
-    (void)json_object_set_new(data, "slabs",
-                              json_pack("{s:o}", "profiles", supine_report_profiles(c)));
-  }
+  (void)json_object_set_new(data, "profiles", supine_report_profiles(c));
   json_t *pictures = supine_report_pictures(c, error);
   if (pictures != NULL) {
     (void)json_object_set_new(data, "pictures", pictures);

@@ -53,28 +53,10 @@ static json_t *postures(const supine_comparison *c) {
       (void)json_object_set_new(posture, "expected_error_mm",
                                 json_real(c->posture[i].expected_error));
     }
-    if (supine_basis_get_info(c->basis)->has_volume) {
-      (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
-      (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
-      (void)json_object_set_new(posture, "slabs", slabs(c, i));
-    }
+    (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
+    (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
+    (void)json_object_set_new(posture, "slabs", slabs(c, i));
     (void)json_array_append_new(list, posture);
-  }
-  return list;
-}
-
-static json_t *pairs(const supine_comparison *c) {
-  json_t *list = json_array();
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    for (size_t j = i + 1; j < c->postures.count; ++j) {
-      const size_t at = i * c->postures.count + j;
-      json_t *pair = json_pack("{s:s, s:s, s:o}", "a", c->postures.item[i].name, "b",
-                               c->postures.item[j].name, "distance_mm", statistics(&c->pair[at]));
-      if (supine_report_has_errors(c)) {
-        (void)json_object_set_new(pair, "expected_error_mm", json_real(c->pair_error[at]));
-      }
-      (void)json_array_append_new(list, pair);
-    }
   }
   return list;
 }
@@ -86,13 +68,12 @@ bool supine_report_json(const supine_comparison *c, FILE *file) {
   (void)supine_text_make_utf8(file_name);
   supine_report_volume(c, volume, sizeof volume);
   json_t *root =
-      json_pack("{s:s, s:s, s:s, s:I, s:f, s:o, s:o, s:{s:f, s:f, s:f}, "
+      json_pack("{s:s, s:s, s:s, s:I, s:f, s:o, "
                 "s:{s:I, s:{s:o, s:f}}}",
                 "file", file_name, "volume", volume, "displacement_from", c->reference.name,
                 "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
-                supine_compare_area(c->compare), "postures", postures(c), "pairs", pairs(c),
-                "energy", "constant", c->constant, "odd", c->odd, "even", c->even, "sphere",
-                "directions", (json_int_t)c->directions, "farthest_from_supine", "gravity",
+                supine_compare_area(c->compare), "postures", postures(c), "sphere", "directions",
+                (json_int_t)c->directions, "farthest_from_supine", "gravity",
                 direction(c->farthest), "rms_mm", c->farthest_rms);
   const bool good =
       root != NULL && json_dumpf(root, file, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;

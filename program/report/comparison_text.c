@@ -34,11 +34,11 @@ static void print_error(const supine_comparison *c, double rms, FILE *file) {
 
 static void print_postures(const supine_comparison *c, int width, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
-  (void)fprintf(file, "\nDisplacement from %s, mm%s\n%-*s %9s %9s %9s %9s", c->reference.name,
-                info->has_volume ? ", and what each lung holds, mL" : "", width, "posture", "mean",
-                "RMS", "95 %", "largest");
+  (void)fprintf(file,
+                "\nDisplacement from %s, mm, and what each lung holds, mL\n%-*s %9s %9s %9s %9s",
+                c->reference.name, width, "posture", "mean", "RMS", "95 %", "largest");
   print_error_head(c, file);
-  for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
     (void)fprintf(file, " %6s lung", info->lung_names[lung]);
   }
   (void)fputc('\n', file);
@@ -46,27 +46,10 @@ static void print_postures(const supine_comparison *c, int width, FILE *file) {
     (void)fprintf(file, "%-*s ", width, supine_options_posture_label(c->postures.item[i].name));
     print_statistics(&c->posture[i].displacement, file);
     print_error(c, c->posture[i].expected_error, file);
-    for (size_t lung = 0; info->has_volume && lung < info->lung_count; ++lung) {
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
       (void)fprintf(file, " %11.2f", c->posture[i].volume[lung]);
     }
     (void)fputc('\n', file);
-  }
-}
-
-static void print_pairs(const supine_comparison *c, int width, FILE *file) {
-  (void)fprintf(file, "\nBetween postures, mm\n%-*s  %-*s %9s %9s %9s %9s", width, "posture", width,
-                "and", "mean", "RMS", "95 %", "largest");
-  print_error_head(c, file);
-  (void)fputc('\n', file);
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    for (size_t j = i + 1; j < c->postures.count; ++j) {
-      (void)fprintf(file, "%-*s  %-*s ", width,
-                    supine_options_posture_label(c->postures.item[i].name), width,
-                    supine_options_posture_label(c->postures.item[j].name));
-      print_statistics(&c->pair[i * c->postures.count + j], file);
-      print_error(c, c->pair_error[i * c->postures.count + j], file);
-      (void)fputc('\n', file);
-    }
   }
 }
 
@@ -112,17 +95,7 @@ static void print_slabs(const supine_comparison *c, FILE *file) {
   }
 }
 
-/* Format a share in %; "0 %" instead of "0.000 %". */
-static const char *percent(double share, char text[32]) {
-  if (fabs(share) < 5e-6) {
-    return "0 %";
-  }
-  (void)snprintf(text, 32, "%.3f %%", 100.0 * share);
-  return text;
-}
-
 void supine_report_text(const supine_comparison *c, FILE *file) {
-  char text[3][32];
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   const int width = widest_name(c);
   char volume[160];
@@ -130,23 +103,15 @@ void supine_report_text(const supine_comparison *c, FILE *file) {
   (void)fprintf(file, "%s, %s: %zu vertices, %.0f cm2\n", c->path, volume, info->vertex_count,
                 supine_compare_area(c->compare) / 100.0);
   print_postures(c, width, file);
-  if (c->postures.count > 1) {
-    print_pairs(c, width, file);
-  }
   if (supine_report_has_errors(c)) {
     (void)fputs("error: the expected error, " SUPINE_EXPECTED_MEANING ".\n" SUPINE_EXPECTED_SUPPORT
                 "\n",
                 file);
   }
-  if (info->has_volume) {
-    print_gains(c, width, file);
-    print_slabs(c, file);
-  }
+  print_gains(c, width, file);
+  print_slabs(c, file);
   (void)fprintf(file,
                 "\nOver all directions of gravity (%zu sampled)\n"
                 "  farthest from supine  %6.3f,%6.3f,%6.3f %9.3f mm RMS\n",
                 c->directions, c->farthest[0], c->farthest[1], c->farthest[2], c->farthest_rms);
-  (void)fprintf(file,
-                "  energy                constant %s, odd %s (reverses with gravity), even %s\n",
-                percent(c->constant, text[0]), percent(c->odd, text[1]), percent(c->even, text[2]));
 }

@@ -185,26 +185,6 @@ double supine_compare_rms(const supine_compare *compare, const supine_pose *pose
   return sqrt(fmax(square, 0));
 }
 
-supine_status supine_compare_pose(const supine_compare *compare, const supine_state *state,
-                                  double rms, supine_pose *pose, supine_error *error) {
-  if (!(rms > 0)) {
-    return supine_basis_pose(compare->basis, state, pose, error);
-  }
-  if (supine_basis_weights(compare->basis, state->gravity, pose->weights) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
-  }
-  supine_pose_fill(pose, 1);
-  const double one = supine_compare_rms(compare, pose, NULL);
-  if (!(one > 0)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "no vertex moves in this direction of gravity: no gain gives an RMS of "
-                            "%g mm",
-                            rms);
-  }
-  supine_pose_fill(pose, rms / one);
-  return SUPINE_OK;
-}
-
 void supine_compare_energy(const supine_compare *compare, double *energy) {
   const size_t count = compare->basis->info.mode_count;
   const size_t terms = supine_sh_count(compare->basis->info.band);

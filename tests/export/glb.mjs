@@ -2,7 +2,7 @@
 // .glb files: Khronos' validator has nothing to say, and three.js, given weights from Y_lm(g) as
 // the file's own extras describe them, makes the positions that the C evaluator makes.
 import assert from 'node:assert/strict';
-import { readFileSync, statSync, writeFileSync } from 'node:fs';
+import { readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 import {
   evaluate, folder, inOrder, largestDistance, load, loadCommon, matchPoints, randomDirections, randomSource, supine,
@@ -16,7 +16,6 @@ const { MeshoptDecoder } = await load('three/examples/jsm/libs/meshopt_decoder.m
 
 const PLAIN_MM = 0.001;
 const COUNTS_MM = 0.1; // base and targets are in counts of 0.045 mm
-const PRINTED_MM = 0.001; // of a table's numbers
 const BREATH = 1000; // mL
 
 /** Asserts that the validator finds neither error nor warning. */
@@ -204,50 +203,6 @@ async function checkColours(basis) {
   assert.ok(third(0) < third(Math.floor(order.length / 3)) && third(Math.floor(order.length / 3)) < third(2 * Math.floor(order.length / 3)));
 }
 
-/** What is inside: its parts have names, lungs are seen through, and each goes where `deform` says. */
-async function checkInside(basis, words, tolerance, rigid = []) {
-  const [points, ball, inside, path, moved] =
-    ['points.csv', 'ball.ply', 'inside.safetensors', 'inside.glb', 'moved.csv'].map((n) => join(folder, n));
-  writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\nfiducial,70,-160,-60\n');
-  supine('phantom', '-o', ball, '--vertices', '100', '--volume', '5000'); // a mesh within the lungs
-  supine('embed', basis, points, ball, ...rigid, '-o', inside);
-  supine('export', basis, '--inside', inside, '-o', path, ...words);
-  await validate(path);
-  const { gltf, meshes, lungs, extras } = await open(path);
-  assert.ok(lungs[0].material.transparent && lungs[0].material.opacity < 0.5);
-  const content = meshes.filter((m) => ['nodule', 'fiducial', 'ball'].includes(m.material.name));
-  assert.equal(content.length, rigid.length ? 3 : 4); // the ball, unless rigid, is in both lungs
-  assert.ok(content.every((m) => !m.material.transparent));
-  for (const gravity of [[0, -1, 0], [0.6, 0, -0.8]]) {
-    supine('deform', inside, '--gravity', gravity.join(','), '--volume', `${extras.rest ? 'rest' : 'scan'}+300`, '-o', moved);
-    const rows = readFileSync(moved, 'utf8').trim().split('\n').slice(1).map((row) => row.split(','));
-    const wanted = weightsFor(extras, lungs, gravity, 300).map(({ weights }) => weights);
-    content.forEach((m) => setWeights([m], [wanted[m.userData.supine?.lung ?? m.parent.userData.supine.lung]]));
-    for (const part of ['nodule', 'fiducial', 'ball']) {
-      const truth = rows.filter((row) => row[0] === part);
-      const places = content.filter((m) => m.material.name === part).flatMap((m) => {
-        const xyz = morphed(m, extras);
-        return [...new Set(m.geometry.index.array)].map((c) => [...xyz.slice(3 * c, 3 * c + 3)]);
-      });
-      for (let k = 0; k < 3; ++k) { // a ball's middle is its point
-        const [is, should] = [mean(places.map((p) => p[k])), mean(truth.map((row) => +row[2 + k]))];
-        assert.ok(Math.abs(is - should) < tolerance + PRINTED_MM, `${part}: ${is} and not ${should}`);
-      }
-      if (rigid.includes(part)) { // which morph targets shift and do not turn
-        for (const m of content.filter((mesh) => mesh.material.name === part)) {
-          const corners = [...new Set(m.geometry.index.array)];
-          const xyz = morphed(m, extras);
-          m.morphTargetInfluences.fill(0);
-          const base = morphed(m, extras);
-          const across = (at, c) => Math.hypot(...[0, 1, 2].map((k) => at[3 * c + k] - at[3 * corners[0] + k]));
-          for (const c of corners) assert.ok(Math.abs(across(xyz, c) - across(base, c)) < tolerance, `${part} is deformed`);
-        }
-      }
-    }
-  }
-  assert.ok(gltf.scene.getObjectByName('inside_left_lung'));
-}
-
 const mesh = join(folder, 'lungs.ply');
 supine('phantom', '-o', mesh, '--vertices', '600');
 const [modes, paper, many] = ['modes', 'paper', 'harmonics'].map((name) => join(folder, `${name}.safetensors`));
@@ -260,5 +215,3 @@ for (const basis of [modes, paper, many]) {
 }
 await checkAnimations(modes);
 await checkColours(modes);
-await checkInside(modes, ['--plain'], PLAIN_MM);
-await checkInside(modes, ['--animate'], COUNTS_MM, ['--rigid', 'ball']);

@@ -2,7 +2,6 @@
 // The page in headless Chromium: it loads from disk without a request or a complaint, computes the
 // C evaluator's positions on the graphics side, and answers to its controls.
 import assert from 'node:assert/strict';
-import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { browser, evaluateFor, openLungs as open, picture, press } from './browser.mjs';
 import { folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
@@ -94,8 +93,7 @@ async function checkPointer(page) {
 }
 
 const mesh = join(folder, 'page.ply');
-const torn = join(folder, 'torn.obj');
-const bases = ['modes', 'harmonics', 'torn'].map((name) => join(folder, `${name}.safetensors`));
+const bases = ['modes', 'harmonics'].map((name) => join(folder, `${name}.safetensors`));
 supine('phantom', '-o', mesh, '--vertices', '2000');
 supine('precompute', mesh, '--law', 'paper', '-o', bases[0]);
 supine('precompute', mesh, '--law', 'paper', '-o', bases[1], '--band', '3', '--modes', 'harmonics');
@@ -118,16 +116,3 @@ assert.ok(await dark.page.evaluate(() => document.documentElement.scrollWidth <=
 assert.deepEqual(dark.complaints, []);
 await dark.page.close();
 
-// A surface with a hole has no volume: the breath is in millimetres.
-supine('deform', bases[0], '--posture', 'supine', '--volume', 'scan', '-o', torn);
-writeFileSync(torn, readFileSync(torn, 'utf8').replace(/^f .*\n/m, ''));
-supine('precompute', torn, '--law', 'paper', '-o', bases[2]);
-supine('export', bases[2], '-o', html, '--scale', '8');
-const { page: opened, complaints: last } = await open(html);
-const [scale, found] = await opened.evaluate(() => [
-  window.supine.moment([0, 1, 0], 8).gains[0], Array.from(window.supine.positions([0, 1, 0], 8))]);
-const [moved, rest] = await evaluateFor(opened, bases[2], [[[0, 1, 0], scale], [[0, 1, 0], 0]]);
-assert.ok(largestDistance(found, moved.xyz) < TOLERANCE_MM);
-assert.ok(Math.abs(largestDistance(found, rest.xyz) - 8) < TOLERANCE_MM);
-assert.match(await opened.locator('#depth-value').textContent(), /mm/);
-assert.deepEqual(last, []);

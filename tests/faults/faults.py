@@ -66,7 +66,6 @@ deform grid.safetensors --allow-folds --posture prone --inverse --field-out out/
 deform grid.safetensors --allow-folds --posture prone --image image.nrrd -o out/a.nrrd
 compare lungs.safetensors --postures supine,prone
 compare lungs.safetensors --postures supine,prone --json
-compare lungs.safetensors --postures supine,prone --csv out/a.csv
 compare lungs.safetensors --postures supine,prone -o out/a.html
 compare points.safetensors --postures supine,prone
 breathe lungs.safetensors --posture prone --fps 1 -o out/a.vtp

@@ -80,11 +80,9 @@ function readBasis() {
   basis.coefficients = takeRows('coefficients', n, basis.modes, basis.unit);
   basis.corners = takeTriangles('triangles', basis.triangles);
   basis.mixes = takeTensor('modes', Float64Array);
-  if (basis.hasVolume) {
-    basis.linear = takeTensor('volume_linear', Float64Array);
-    basis.quadratic = takeTensor('volume_quadratic', Float64Array);
-    basis.cubic = takeTensor('volume_cubic', Float64Array);
-  }
+  basis.linear = takeTensor('volume_linear', Float64Array);
+  basis.quadratic = takeTensor('volume_quadratic', Float64Array);
+  basis.cubic = takeTensor('volume_cubic', Float64Array);
   basis.words = Math.ceil(basis.normalModes / 3);
   basis.normals = basis.words ? takeNormals(n, basis.words) : new Uint32Array(0);
   basis.turns = basis.words ? takeTensor('normal_weights', Float64Array) : null;
@@ -284,14 +282,9 @@ function gainsFor(basis, forms, volumes, total) {
 }
 
 /** Return one moment: the weights of the modes, three gains of each lung, and `held`, the volume of each
- * lung with its tissue, mL. `depth` is mL above rest for a closed surface, else mm of the largest
- * displacement when supine. `folds` is true if the surface would fold before it holds that volume. */
+ * lung with its tissue, mL. `depth` is mL above rest. `folds` is true if the surface would fold before it holds that volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
-  if (!basis.hasVolume) {
-    const gains = new Float64Array(3 * basis.lungs).fill((depth / basis.breathLargest) * basis.breathScale);
-    return { gravity, weights, gains, held: null, folds: false };
-  }
   const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
   const volumes = volumesFor(basis, gravity);
   const gains = gainsFor(basis, forms, volumes, sumOf(volumes.rest) + depth);

@@ -116,7 +116,7 @@ function answerOf(basis, moment) {
   const { mean, largest } = moveBetween(basis, moment, basis.from, 1);
   if (largest < 0.05) return 'reference';
   if (moment.held) basis.fromHeld ??= heldBy(basis, basis.from);
-  const lungs = (moment.held ?? []).map((ml, lung) => `${basis.lungNames[lung].slice(0, 1).toUpperCase()} ${signed(Math.round((100 * ml) / basis.fromHeld[lung] - 100))} %, `);
+  const lungs = moment.held.map((ml, lung) => `${basis.lungNames[lung].slice(0, 1).toUpperCase()} ${signed(Math.round((100 * ml) / basis.fromHeld[lung] - 100))} %, `);
   return `${lungs.join('')}${mean.toFixed(1)}\u00a0mm`;
 }
 

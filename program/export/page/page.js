@@ -296,11 +296,10 @@ function start() {
     touch();
   });
 
-  const amount = (value) => `${value.toFixed(basis.hasVolume ? 0 : 1)} ${state.unit}`;
+  const amount = (value) => `${value.toFixed(0)} mL`;
 
   const holds = new Holds($('holds'), basis);
   const outlines = new Outlines($('outlines'), basis, state, () => { told = null; look(); });
-  $('holds-section').hidden = !basis.hasVolume;
 
   /** Write the changes in each posture on its card; `most` is the largest volume of a lung in them, mL. */
   let answered = { depth: null };
@@ -310,7 +309,7 @@ function start() {
     for (const { posture, answer } of buttons) {
       const moment = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), state.depth);
       answer.textContent = moment.folds ? 'would fold' : answerOf(basis, moment);
-      answered.most = Math.max(answered.most, ...(moment.folds ? [] : moment.held ?? []));
+      answered.most = Math.max(answered.most, ...(moment.folds ? [] : moment.held));
     }
   }
 
@@ -323,7 +322,7 @@ function start() {
     if (told?.moment === state.moment && told.stride <= stride) return;
     told = { moment: state.moment, stride };
     if (!state.playing && stride === 1) answerCards();
-    const above = basis.hasVolume && Math.round(state.depth) ? `${amount(state.depth)} above ${basis.resting ? 'rest' : 'the scan'}` : '';
+    const above = Math.round(state.depth) ? `${amount(state.depth)} above ${basis.resting ? 'rest' : 'the scan'}` : '';
     const { held } = state.moment;
     const measured = Math.round(state.depth) === 0 && basis.from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
     if (held) {
@@ -361,18 +360,17 @@ function start() {
       buttons.forEach(({ button }, i) => button.setAttribute('aria-pressed', String(i === pressed)));
     });
     write('gravity', `gravity  L ${gravity[0].toFixed(2)}  P ${gravity[1].toFixed(2)}  H ${gravity[2].toFixed(2)}`.replaceAll('-', '\u2212').replaceAll('\u22120.00', '0.00'));
-    const digits = basis.hasVolume ? 0 : 1;
     setSlider('tilt', state.standing.tilt, `${state.standing.tilt} degrees`);
-    setSlider('depth', state.depth, amount(state.depth), digits);
-    write('depth-value', basis.hasVolume ? volumeWords() : amount(state.depth));
-    setSlider('tidal', state.tidal, amount(state.tidal), digits);
+    setSlider('depth', state.depth, amount(state.depth), 0);
+    write('depth-value', volumeWords());
+    setSlider('tidal', state.tidal, amount(state.tidal), 0);
     setSlider('rate', state.rate, `${state.rate} per minute`);
     changed('playing', state.playing, () => {
       $('play').setAttribute('aria-pressed', String(state.playing));
       $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
     });
     const held = state.moment?.held?.map((ml, lung) => `${basis.lungNames[lung]} ${ml.toFixed(0)} mL`).join('   ');
-    write('held', held ? `${held}, gas and tissue` : 'open surface: the largest displacement, supine, instead of a volume');
+    write('held', `${held}, gas and tissue`);
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
     changed('beside', state.beside, () => { $('left-name').hidden = $('right-name').hidden = !state.beside; });
     if (state.beside) {
@@ -730,13 +728,7 @@ function start() {
   for (const end of ['depth', 'depth-number']) $(end).step = state.tidal / 100;
   for (const end of ['tidal-number', 'depth-number']) $(end).step = 'any';
   document.querySelector('[name=kind][value=expansion]').disabled = basis.words === 0;
-  if (!basis.hasVolume) {
-    document.querySelector('[for="tidal"]').textContent = 'Depth';
-    write('depth-name', 'Largest displacement');
-    write('depth-unit', 'mm');
-    write('tidal-unit', 'mm');
-  }
-  else write('depth-name', `Above ${basis.resting ? 'rest' : 'the scan'}`);
+  write('depth-name', `Above ${basis.resting ? 'rest' : 'the scan'}`);
   write('ghost-name', `${basis.from.name.replace(/^./, (c) => c.toUpperCase())} as a ghost`);
   showFacts(basis);
 

@@ -201,7 +201,7 @@ class Picture {
       while (begin.length < basis.lungs && t >= basis.cornerBegin[begin.length]) begin.push(count);
       for (let i = 0; i < 3; ++i) {
         const [a, b] = [corners[t + i], corners[t + ((i + 1) % 3)]];
-        if (a < b || !basis.hasVolume) {
+        if (a < b) {
           pairs[count++] = a;
           pairs[count++] = b;
         }

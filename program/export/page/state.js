@@ -68,9 +68,8 @@ class State {
     this.standing = { q: POSTURES[2].q, tilt: 0 }; // the posture, and the tilt on top of it
     this.q = POSTURES[2].q;                        // the rotation shown, on its way to `standing`
     this.turning = null;
-    this.unit = basis.hasVolume ? 'mL' : 'mm';
-    this.tidal = basis.hasVolume ? basis.breathVolume : basis.breathLargest;
-    this.depth = basis.hasVolume ? 0 : this.tidal;
+    this.tidal = basis.breathVolume;
+    this.depth = 0;
     this.depthMax = Math.max(2 * this.tidal, -restFor(basis, gravityOf(POSTURES[0].q)));
     this.rate = 12;
     this.phase = 0.5;

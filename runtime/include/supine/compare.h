@@ -36,16 +36,6 @@ SUPINE_API void supine_compare_destroy(supine_compare *compare);
 /** Return the area of the reference surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
 
-/** Compute the pose of a state: by its volume (supine_basis_pose) if `rms` is 0; else, for open
- * surfaces, with one gain for which the RMS displacement is `rms`.
- * @param rms  mm, or 0
- *
- * Statuses as supine_basis_pose; SUPINE_ERROR_NUMERICAL also if no vertex moves in this direction.
- */
-SUPINE_API supine_status supine_compare_pose(const supine_compare *compare,
-                                             const supine_state *state, double rms,
-                                             supine_pose *pose, supine_error *error);
-
 /** Compute the RMS distance between two poses, mm, from the Gram matrices alone:
  *
  *     d^2 = sum over lungs and axes of q^T G q,     q = A w - A' w'
