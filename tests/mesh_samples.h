@@ -65,20 +65,6 @@ static inline const char *sample_text(void **state, const char *name, const char
   return sample_write(state, name, text, strlen(text), path);
 }
 
-/* Read a whole file (malloc). */
-static inline unsigned char *sample_read(const char *path, size_t *size) {
-  FILE *file = fopen(path, "rb");
-  assert_non_null(file);
-  assert_int_equal(fseek(file, 0, SEEK_END), 0);
-  *size = (size_t)ftell(file);
-  rewind(file);
-  unsigned char *bytes = malloc(*size + 1);
-  assert_non_null(bytes);
-  assert_int_equal(fread(bytes, 1, *size, file), *size);
-  assert_int_equal(fclose(file), 0);
-  return bytes;
-}
-
 /* Make and remove the folder of a group; removal fails if a test has left a file in it. */
 static inline int sample_folder_create(void **state) {
   static char folder[] = "/tmp/supine-mesh-XXXXXX";

@@ -3,14 +3,13 @@
 #ifndef SUPINE_PROGRAM_HELPERS_H
 #define SUPINE_PROGRAM_HELPERS_H
 
-#include "test.h"
+#include "folder.h"
 
 #include <dirent.h>
 #include <sys/wait.h>
 
 #include <supine/status.h>
 
-static char folder[] = "/tmp/supine-program-XXXXXX";
 static char printed[65536]; /* by the last run, to stdout and stderr */
 
 /* Run "supine ARGUMENTS" in the folder; return its exit code, or -1 after a signal or a timeout. */
@@ -40,23 +39,6 @@ static void expect(int code, const char *words, int got) {
 /* Run, and assert the exit code and that the output contains `words`. */
 #define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
 
-/* Read a file of the folder and append a NUL (malloc). */
-static char *read_file(const char *name, size_t *size) {
-  char path[256];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "rb");
-  assert_non_null(file);
-  assert_int_equal(fseek(file, 0, SEEK_END), 0);
-  *size = (size_t)ftell(file);
-  rewind(file);
-  char *text = malloc(*size + 1);
-  assert_non_null(text);
-  assert_int_equal(fread(text, 1, *size, file), *size);
-  text[*size] = '\0';
-  (void)fclose(file);
-  return text;
-}
-
 /* Count the files of the folder whose names begin with `prefix`. */
 static size_t count_files(const char *prefix) {
   size_t count = 0;
@@ -67,13 +49,6 @@ static size_t count_files(const char *prefix) {
   }
   (void)closedir(entries);
   return count;
-}
-
-static int remove_folder(void **state) {
-  char command[256];
-  (void)state;
-  (void)snprintf(command, sizeof command, "rm -r %s", folder);
-  return system(command); /* NOLINT(cert-env33-c): removes what the tests made */
 }
 
 #endif

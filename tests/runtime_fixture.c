@@ -241,25 +241,12 @@ void fixture_write(const fixture *f, const char *path) {
   }
 }
 
-unsigned char *fixture_read(const char *path, size_t *size) {
-  FILE *file = fopen(path, "rb");
-  assert_non_null(file);
-  assert_int_equal(fseek(file, 0, SEEK_END), 0);
-  *size = (size_t)ftell(file);
-  rewind(file);
-  unsigned char *bytes = malloc(*size + 1);
-  assert_non_null(bytes);
-  assert_int_equal(fread(bytes, 1, *size, file), *size);
-  (void)fclose(file);
-  return bytes;
-}
-
 unsigned char *fixture_bytes(const fixture *f, size_t *size) {
   char *folder = fixture_folder();
   char path[256];
   (void)snprintf(path, sizeof path, "%s/basis.safetensors", folder);
   fixture_write(f, path);
-  unsigned char *bytes = fixture_read(path, size);
+  unsigned char *bytes = test_read(path, size);
   fixture_folder_remove(folder);
   return bytes;
 }

@@ -53,9 +53,6 @@ void fixture_write(const fixture *f, const char *path);
 /* Return the content of the basis file (malloc). */
 unsigned char *fixture_bytes(const fixture *f, size_t *size);
 
-/* Read a whole file (malloc). */
-unsigned char *fixture_read(const char *path, size_t *size);
-
 /* Compute deformed positions [N, 3] in double precision. */
 void fixture_deform(const fixture *f, const double *weights, const double *scales, double *xyz);
 

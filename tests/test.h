@@ -44,4 +44,19 @@ static inline void test_write(const char *path, const char *text) {
   assert_int_equal(fclose(file), 0);
 }
 
+/* Read a whole file, and append a NUL (malloc). */
+static inline void *test_read(const char *path, size_t *size) {
+  FILE *file = fopen(path, "rb");
+  assert_non_null(file);
+  assert_int_equal(fseek(file, 0, SEEK_END), 0);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  char *bytes = malloc(*size + 1);
+  assert_non_null(bytes);
+  assert_int_equal(fread(bytes, 1, *size, file), *size);
+  assert_int_equal(fclose(file), 0);
+  bytes[*size] = '\0';
+  return bytes;
+}
+
 #endif

@@ -51,7 +51,7 @@ static uint32_t word(const unsigned char *at) {
  */
 static json_t *read_glb(unsigned char **bytes, const unsigned char **numbers) {
   size_t size = 0;
-  *bytes = fixture_read(out, &size);
+  *bytes = test_read(out, &size);
   assert_true(size > 28);
   assert_int_equal(word(*bytes), 0x46546C67); /* "glTF" */
   assert_int_equal(word(*bytes + 4), 2);

@@ -51,7 +51,7 @@ TEST(test_base64_known_texts_literal) {
 /* Return the page as a string (malloc). */
 static char *read_page(void) {
   size_t size = 0;
-  char *page = (char *)fixture_read(out, &size);
+  char *page = test_read(out, &size);
   page[size] = '\0';
   return page;
 }

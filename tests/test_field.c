@@ -1,30 +1,22 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Displacement fields on a grid: forward, inverse, warped images, and the same by plastimatch and
  * elastix. */
+#include "folder.h"
 #include "inside_helpers.h"
 
-#include "precompute/inside/embed.h"
 #include "precompute/inside/content.h"
+#include "precompute/inside/embed.h"
 #include "program/field/cell.h"
 #include "sh/base/vec3.h"
 
 #include "tests/poses.h"
 
-static char folder[] = "/tmp/supine-field-XXXXXX";
 static supine_basis *surface;
 static supine_basis *grid;
 
 /* Half of the affine and of the quadratic motion: up to about 20 mm. */
 static const double weights[HELPER_MODES] = {0.5, 0.4, 0.0};
 static const double scales[2] = {1.0, 1.0};
-
-static const char *in_folder(const char *name) {
-  static char path[4][96];
-  static size_t next;
-  next = (next + 1) % 4;
-  (void)snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
-  return path[next];
-}
 
 static supine_field inverse_kept;
 
@@ -45,8 +37,7 @@ static void make_grid(double spacing) {
 }
 
 static int setup(void **state) {
-  (void)state;
-  if (mkdtemp(folder) == NULL) {
+  if (folder_make(state) != 0) {
     return -1;
   }
   helper_write_basis(in_folder("surface"), 10, 2);
@@ -57,13 +48,10 @@ static int setup(void **state) {
 }
 
 static int teardown(void **state) {
-  (void)state;
   supine_field_free(&inverse_kept);
-  char command[64];
   supine_basis_close(surface);
   supine_basis_close(grid);
-  (void)snprintf(command, sizeof command, "rm -r %s", folder);
-  return system(command); /* NOLINT(cert-env33-c) */
+  return folder_remove(state);
 }
 
 static supine_field made_field(void) {

@@ -2,11 +2,11 @@
 /* Fields of another simulator: loading, fitting, cross-validation, and refused input. */
 #include <sys/stat.h>
 
+#include "folder.h"
 #include "precompute/fields.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
-#include "test.h"
 #include <supine/runtime.h>
 #include <supine/safetensors.h>
 
@@ -17,21 +17,11 @@
 
 #include "tests/poses.h"
 
-static char folder[] = "/tmp/supine-fields-XXXXXX";
 static supine_lungs lungs;
 
-static const char *in_folder(const char *name) {
-  static char path[4][128];
-  static size_t next;
-  next = (next + 1) % 4;
-  (void)snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
-  return path[next];
-}
-
 static int setup(void **state) {
-  (void)state;
   supine_mesh mesh = {0};
-  if (mkdtemp(folder) == NULL || supine_phantom_create(400, 2500.0, &mesh, NULL) != SUPINE_OK ||
+  if (folder_make(state) != 0 || supine_phantom_create(400, 2500.0, &mesh, NULL) != SUPINE_OK ||
       supine_lungs_create(&mesh, 1, NULL, &lungs, NULL) != SUPINE_OK) {
     return -1;
   }
@@ -40,11 +30,8 @@ static int setup(void **state) {
 }
 
 static int teardown(void **state) {
-  (void)state;
-  char command[64];
   supine_lungs_free(&lungs);
-  (void)snprintf(command, sizeof command, "rm -r %s", folder);
-  return system(command); /* NOLINT(cert-env33-c) */
+  return folder_remove(state);
 }
 
 /* Compute displacements by the full physics for random directions. */

@@ -306,7 +306,7 @@ static void check_glsl(EGLenum api, const char *version) {
   print_message("%s\n", (const char *)gl.GetString(GL_VERSION));
   make_framebuffer(&gl);
   size_t length = 0;
-  unsigned char *library = fixture_read(SUPINE_GLSL, &length);
+  unsigned char *library = test_read(SUPINE_GLSL, &length);
   library[length] = '\0';
   static const size_t modes[] = {1, 4, 6, 11, 16};
   for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {

@@ -1,31 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Images: NRRD and NIfTI round trips in every orientation and type, and invalid files. */
+#include "folder.h"
 #include "mesh/io/image.h"
-#include "test.h"
 
 #include "sh_helpers.h"
-
-static char folder[] = "/tmp/supine-image-XXXXXX";
-
-static const char *in_folder(const char *name) {
-  static char path[4][96];
-  static size_t next;
-  next = (next + 1) % 4;
-  (void)snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
-  return path[next];
-}
-
-static int setup(void **state) {
-  (void)state;
-  return mkdtemp(folder) != NULL ? 0 : -1;
-}
-
-static int teardown(void **state) {
-  (void)state;
-  char command[64];
-  (void)snprintf(command, sizeof command, "rm -r %s", folder);
-  return system(command); /* NOLINT(cert-env33-c) */
-}
 
 /* Make an image of 5 x 4 x 3 voxels in any orientation. */
 static supine_image made(supine_image_voxel voxel, uint64_t seed) {
@@ -283,4 +261,4 @@ TEST(test_image_set_rounds_and_clips) {
   supine_image_free(&image);
 }
 
-TEST_GROUP(setup, teardown)
+TEST_GROUP(folder_make, folder_remove)

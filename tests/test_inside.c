@@ -1,23 +1,22 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Content inside the lungs: location, motion, and the file. */
+#include "folder.h"
 #include "inside_helpers.h"
 
 #include "precompute/inside/biharmonic.h"
-#include "precompute/inside/embed.h"
 #include "precompute/inside/content.h"
+#include "precompute/inside/embed.h"
 #include "sh/base/vec3.h"
 
 #include "tests/poses.h"
 
-static char folder[] = "/tmp/supine-inside-XXXXXX";
 static char surface_path[64];
 static char inside_path[64];
 static supine_basis *surface;
 static supine_inside_shells shells;
 
 static int setup(void **state) {
-  (void)state;
-  if (mkdtemp(folder) == NULL) {
+  if (folder_make(state) != 0) {
     return -1;
   }
   (void)snprintf(surface_path, sizeof surface_path, "%s/surface", folder);
@@ -28,12 +27,9 @@ static int setup(void **state) {
 }
 
 static int teardown(void **state) {
-  (void)state;
-  char command[64];
   supine_inside_shells_free(&shells);
   supine_basis_close(surface);
-  (void)snprintf(command, sizeof command, "rm -r %s", folder);
-  return system(command); /* NOLINT(cert-env33-c) */
+  return folder_remove(state);
 }
 
 static double distance(const double a[3], const double b[3]) {

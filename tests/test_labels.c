@@ -1,38 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Surfaces from label maps: accuracy with known lungs, label conventions, the report, and refused
  * maps. */
+#include "folder.h"
 #include "mesh/anatomy.h"
 #include "mesh/labels/labels.h"
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
 #include "precompute/inside/surface.h"
 #include "precompute/lungs/phantom.h"
-#include "test.h"
 
 #include "labels_helpers.h"
 #include "sh_helpers.h"
-
-static char folder[] = "/tmp/supine-labels-XXXXXX";
-
-static const char *in_folder(const char *name) {
-  static char path[8][96];
-  static size_t next;
-  next = (next + 1) % 8;
-  (void)snprintf(path[next], sizeof path[next], "%s/%s", folder, name);
-  return path[next];
-}
-
-static int setup(void **state) {
-  (void)state;
-  return mkdtemp(folder) != NULL ? 0 : -1;
-}
-
-static int teardown(void **state) {
-  (void)state;
-  char command[64];
-  (void)snprintf(command, sizeof command, "rm -r %s", folder);
-  return system(command); /* NOLINT(cert-env33-c) */
-}
 
 static size_t voxels(const supine_image *image) {
   return image->size[0] * image->size[1] * image->size[2];
@@ -784,4 +762,4 @@ TEST(test_labels_interrupted_anywhere_nothing_leaks) {
   supine_image_free(&image);
 }
 
-TEST_GROUP(setup, teardown)
+TEST_GROUP(folder_make, folder_remove)

@@ -56,7 +56,7 @@ static unsigned char *saved_box(void **state, const char *name, size_t *size) {
   supine_mesh box = sample_box();
   assert_int_equal(supine_mesh_save(sample_path(state, name, path), &box, NULL, NULL), SUPINE_OK);
   supine_mesh_free(&box);
-  unsigned char *bytes = sample_read(path, size);
+  unsigned char *bytes = test_read(path, size);
   assert_int_equal(unlink(path), 0);
   return bytes;
 }

@@ -128,7 +128,7 @@ TEST(test_save_ply_displacement_rows) {
     char path[256];
     save(sample_path(state, "a.ply", path), &mesh, &options);
     size_t size = 0;
-    unsigned char *bytes = sample_read(path, &size);
+    unsigned char *bytes = test_read(path, &size);
     (void)find(bytes, size, "property float displacement_x\n");
     const unsigned char *rows = (const unsigned char *)find(bytes, size, "end_header\n");
     const float s = ras ? -1.0F : 1.0F;
@@ -157,7 +157,7 @@ TEST(test_save_expected_error_stays_in_millimetres) {
     char path[256];
     size_t size = 0;
     save(sample_path(state, "a.ply", path), &mesh, &options);
-    unsigned char *bytes = sample_read(path, &size);
+    unsigned char *bytes = test_read(path, &size);
     (void)find(bytes, size, "property float expected_error_mm\n");
     const unsigned char *rows = (const unsigned char *)find(bytes, size, "end_header\n");
     for (size_t i = 0; i < 4; ++i) {
@@ -166,7 +166,7 @@ TEST(test_save_expected_error_stays_in_millimetres) {
     free(bytes);
     assert_int_equal(unlink(path), 0);
     save(sample_path(state, "a.vtp", path), &mesh, &options);
-    bytes = sample_read(path, &size);
+    bytes = test_read(path, &size);
     (void)find(bytes, size, "Name=\"expected_error_mm\" NumberOfComponents=\"1\"");
     free(bytes);
     assert_int_equal(unlink(path), 0);
@@ -182,7 +182,7 @@ TEST(test_save_stl_layout_and_normals) {
   char path[256];
   save(sample_path(state, "a.stl", path), &mesh, &options);
   size_t size = 0;
-  unsigned char *bytes = sample_read(path, &size);
+  unsigned char *bytes = test_read(path, &size);
   assert_int_equal(size, 84 + 4 * 50);
   assert_memory_equal(bytes, "SPACE=LPS", 9);
   assert_int_equal(bytes[80], 4);
@@ -228,7 +228,7 @@ TEST(test_save_vtp_layout) {
   char path[256];
   save(sample_path(state, "a.vtp", path), &mesh, &options);
   size_t size = 0;
-  unsigned char *bytes = sample_read(path, &size);
+  unsigned char *bytes = test_read(path, &size);
   (void)find(bytes, size,
              "<!-- SPACE=LPS mm a - - b -?"
              "?-  -->\n");
@@ -354,7 +354,7 @@ TEST(test_save_vtp_axes_units_and_rounding) {
   char path[256];
   save(sample_path(state, "a.vtp", path), &mesh, &options);
   size_t size = 0;
-  unsigned char *bytes = sample_read(path, &size);
+  unsigned char *bytes = test_read(path, &size);
   (void)find(bytes, size, ">82 65 83 0<");
   char units[64] = {0};
   for (const char *c = "m, mL, s"; *c != '\0'; ++c) {
@@ -459,13 +459,13 @@ TEST(test_save_failure_leaves_old_file) {
   mesh.vertices[0] = (double)NAN;
   assert_int_equal(supine_mesh_save(path, &mesh, NULL, NULL), SUPINE_ERROR_MESH);
   size_t size = 0;
-  unsigned char *bytes = sample_read(path, &size);
+  unsigned char *bytes = test_read(path, &size);
   assert_int_equal(size, 8);
   assert_memory_equal(bytes, "precious", 8);
   free(bytes);
   mesh.vertices[0] = 0.0;
   assert_int_equal(supine_mesh_save(path, &mesh, NULL, NULL), SUPINE_OK);
-  bytes = sample_read(path, &size);
+  bytes = test_read(path, &size);
   assert_memory_equal(bytes, "ply\n", 4);
   free(bytes);
   supine_mesh_free(&mesh);

@@ -41,8 +41,7 @@ static void write_open_mesh(void) {
 }
 
 static int setup(void **state) {
-  (void)state;
-  if (mkdtemp(folder) == NULL) {
+  if (folder_make(state) != 0) {
     return -1;
   }
   write_open_mesh();
@@ -169,7 +168,7 @@ static void check_markup(const char *text) {
 
 static void check_report(const char *name) {
   size_t size = 0;
-  char *text = read_file(name, &size);
+  char *text = test_read(in_folder(name), &size);
   assert_int_equal(strlen(text), size);
   check_markup(text);
   assert_null(strstr(text, "http:"));
@@ -190,7 +189,7 @@ TEST(test_compare_without_breath_no_difference) {
   EXPECT(0, "0.000", "compare lungs.safetensors --volume scan --from scan -o still.html");
   assert_null(strstr(printed, "nan"));
   size_t size = 0;
-  char *text = read_file("still.html", &size);
+  char *text = test_read(in_folder("still.html"), &size);
   check_markup(text);
   assert_null(strstr(text, "nan,"));
   assert_null(strstr(text, "\"nan"));
@@ -424,7 +423,7 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
 /* Decode frame `wanted` of an animation, RGBA (malloc), and its information. */
 static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo *info, int *time) {
   size_t size = 0;
-  char *bytes = read_file(name, &size);
+  char *bytes = test_read(in_folder(name), &size);
   const WebPData data = {(const unsigned char *)bytes, size};
   WebPAnimDecoder *decoder = WebPAnimDecoderNew(&data, NULL);
   assert_non_null(decoder);
@@ -541,7 +540,7 @@ TEST(test_render_options_change_the_picture) {
     if (!render("lungs.safetensors --posture supine --size 260x380 %s -o v.png", variants[i])) {
       skip();
     }
-    png[i] = read_file("v.png", &size[i]);
+    png[i] = test_read(in_folder("v.png"), &size[i]);
     for (size_t j = 0; j < i; ++j) {
       assert_true(size[i] != size[j] || memcmp(png[i], png[j], size[i]) != 0);
     }
@@ -561,4 +560,4 @@ TEST(test_render_many_postures_accepted) {
   assert_int_equal(count_files("tiny.png"), 0);
 }
 
-TEST_GROUP(setup, remove_folder)
+TEST_GROUP(setup, folder_remove)

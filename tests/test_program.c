@@ -20,7 +20,7 @@ static void write_text(const char *name, const char *text) {
 /* Read a file of the folder into bytes [size]; return its length. */
 static size_t take_file(const char *name, char *bytes, size_t size) {
   size_t length = 0;
-  char *text = read_file(name, &length);
+  char *text = test_read(in_folder(name), &length);
   length = length < size ? length : size;
   memcpy(bytes, text, length);
   free(text);
@@ -28,8 +28,7 @@ static size_t take_file(const char *name, char *bytes, size_t size) {
 }
 
 static int setup(void **state) {
-  (void)state;
-  if (mkdtemp(folder) == NULL) {
+  if (folder_make(state) != 0) {
     return -1;
   }
   return run("phantom -o lungs.ply --vertices 500") != 0 ||
@@ -370,4 +369,4 @@ TEST(test_mesh_hostile_files_never_crash) {
   assert_int_equal(sweep_failures, 0);
 }
 
-TEST_GROUP(setup, remove_folder)
+TEST_GROUP(setup, folder_remove)

@@ -96,7 +96,7 @@ TEST(test_write_header_of_any_length_is_padded_to_eight_bytes) {
     value[length] = '\0';
     write_sample(path, value);
     size_t size = 0;
-    unsigned char *bytes = fixture_read(path, &size);
+    unsigned char *bytes = test_read(path, &size);
     uint64_t header = 0;
     memcpy(&header, bytes, sizeof header);
     assert_int_equal(header % 8, 0);
@@ -304,7 +304,7 @@ TEST(test_open_memory_any_alignment_same_content) {
   (void)snprintf(path, sizeof path, "%s/a", folder);
   write_sample(path, "v");
   size_t size = 0;
-  unsigned char *bytes = fixture_read(path, &size);
+  unsigned char *bytes = test_read(path, &size);
   for (size_t shift = 0; shift < 8; ++shift) {
     unsigned char *moved = malloc(size + shift);
     assert_non_null(moved);

@@ -25,14 +25,7 @@ static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precomput
   if (supine_precompute(lungs, options, path, NULL, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  FILE *file = fopen(path, "rb");
-  assert_non_null(file);
-  assert_int_equal(fseek(file, 0, SEEK_END), 0);
-  *size = (size_t)ftell(file);
-  rewind(file);
-  unsigned char *bytes = malloc(*size);
-  assert_int_equal(fread(bytes, 1, *size, file), *size);
-  (void)fclose(file);
+  unsigned char *bytes = test_read(path, size);
   (void)unlink(path);
   return bytes;
 }

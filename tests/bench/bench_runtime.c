@@ -23,6 +23,7 @@
 #include "sh/base/clock.h"
 #include "sh/base/parallel.h"
 #include "tests/runtime_fixture.h"
+#include "tests/test.h"
 
 enum { TILE = 16, ENTRIES_MAX = 64, REPEATS = 9, ENOUGH = 2000000 };
 
@@ -398,7 +399,7 @@ static bool run(const char *what) {
     bytes = fixture_bytes(made, &size);
     fixture_destroy(made);
   } else {
-    bytes = fixture_read(what, &size);
+    bytes = test_read(what, &size);
   }
   bool good = open_all(&work, bytes, size, &error) && !work.info->vector;
   if (good) {
