@@ -140,6 +140,16 @@ void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame
   }
 }
 
+/* Write points, in RAS where that is wanted; xyz is overwritten. */
+static void put_points(const supine_stream_frames *f, size_t count, float *xyz,
+                       unsigned char *bytes) {
+  for (size_t i = 0; f->ras && i < count; ++i) {
+    xyz[3 * i] = -xyz[3 * i];
+    xyz[3 * i + 1] = -xyz[3 * i + 1];
+  }
+  supine_stream_put_floats(3 * count, xyz, bytes);
+}
+
 /* Compute positions and expected errors of lungs located from observed points. Where that fails,
  * clear the location: the caller then computes the positions of the pose. Return false where memory
  * is short. */
@@ -153,13 +163,9 @@ static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
   const bool good = xyz != NULL && sigma != NULL && frame->errors != NULL;
   if (good &&
       supine_locate_positions(frame->moment.location, f->basis, xyz, sigma, NULL) == SUPINE_OK) {
-    supine_stream_put_points(count, xyz, f->ras, frame->points);
+    put_points(f, count, xyz, frame->points);
     const size_t head = supine_stream_attribute_head(count, frame->errors);
-    for (size_t i = 0; i < count; ++i) {
-      uint32_t word;
-      memcpy(&word, &sigma[i], sizeof word);
-      supine_stream_put32(frame->errors + head + 4 * i, word);
-    }
+    supine_stream_put_floats(count, sigma, frame->errors + head);
     frame->points_crc = supine_stream_crc64(0, frame->points, 12 * count);
     frame->placed = true;
   } else {
@@ -186,7 +192,7 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
     const size_t next = begin + PIECE < end ? begin + PIECE : end;
     unsigned char *bytes = p->frame->points + 12 * begin;
     supine_deform_range(p->frames->basis, &p->frame->moment.pose, begin, next, xyz);
-    supine_stream_put_points(next - begin, xyz, p->frames->ras, bytes);
+    put_points(p->frames, next - begin, xyz, bytes);
     p->crc[thread] = supine_stream_crc64(p->crc[thread], bytes, 12 * (next - begin));
   }
 }
@@ -221,13 +227,12 @@ static size_t put_weights(const supine_stream_frames *f, const supine_stream_mom
   const size_t modes = f->info->mode_count;
   const size_t count = modes + 3 * f->info->lung_count;
   const size_t head = supine_stream_ndarray_head(count, bytes);
+  float values[SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX];
   for (size_t i = 0; i < count; ++i) {
-    const float value = (float)(i < modes ? moment->pose.weights[i]
-                                          : moment->pose.gains[(i - modes) / 3][(i - modes) % 3]);
-    uint32_t word;
-    memcpy(&word, &value, sizeof word);
-    supine_stream_put32(bytes + head + 4 * i, word);
+    values[i] = (float)(i < modes ? moment->pose.weights[i]
+                                  : moment->pose.gains[(i - modes) / 3][(i - modes) % 3]);
   }
+  supine_stream_put_floats(count, values, bytes + head);
   return head + 4 * count;
 }
 

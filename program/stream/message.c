@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read messages from untrusted bytes; write headers, points, and the beginning of each content. */
 #include <ctype.h>
+#include <endian.h>
 #include <string.h>
 
 #include "program/stream/crc64.h"
@@ -53,10 +54,6 @@ void supine_stream_header_write(const supine_stream_header *header,
   put(bytes + 50, 8, header->crc);
 }
 
-void supine_stream_put32(unsigned char *bytes, uint32_t value) {
-  put(bytes, 4, value);
-}
-
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
   bytes[0] = 10; /* type: 32-bit floats */
   bytes[1] = 1;  /* number of dimensions */
@@ -84,35 +81,14 @@ size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
   return SUPINE_STREAM_ATTRIBUTE;
 }
 
-/* Points that are converted to big-endian together, by vector instructions. */
-enum { BUNCH = 16 };
-
-SUPINE_CLONES static void put_bunch(const float *xyz, const uint32_t *sign, unsigned char *bytes) {
-  uint32_t word[3 * BUNCH];
-  memcpy(word, xyz, sizeof word);
-  for (size_t i = 0; i < 3 * BUNCH; ++i) {
-    word[i] ^= sign[i];
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    word[i] = __builtin_bswap32(word[i]);
-#endif
+SUPINE_CLONES void supine_stream_put_floats(size_t count, const float *values,
+                                            unsigned char *bytes) {
+  for (size_t i = 0; i < count; ++i) {
+    uint32_t word;
+    memcpy(&word, values + i, sizeof word);
+    word = htobe32(word);
+    memcpy(bytes + 4 * i, &word, sizeof word);
   }
-  memcpy(bytes, word, sizeof word);
-}
-
-void supine_stream_put_points(size_t count, const float *xyz, int flip, unsigned char *bytes) {
-  uint32_t sign[3 * BUNCH];
-  for (size_t i = 0; i < 3 * BUNCH; ++i) {
-    sign[i] = flip != 0 && i % 3 < 2 ? 0x80000000u : 0u;
-  }
-  const size_t whole = count - count % BUNCH;
-  for (size_t i = 0; i < whole; i += BUNCH) {
-    put_bunch(xyz + 3 * i, sign, bytes + 12 * i);
-  }
-  float rest[3 * BUNCH] = {0.0F};
-  unsigned char last[12 * BUNCH];
-  memcpy(rest, xyz + 3 * whole, 12 * (count - whole));
-  put_bunch(rest, sign, last);
-  memcpy(bytes + 12 * whole, last, 12 * (count - whole));
 }
 
 /* --- reading ---------------------------------------------------------------------------------- */

@@ -80,9 +80,6 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
                                          supine_stream_message *message, supine_error *error);
 
-/** Write a number of 4 bytes, big-endian. */
-void supine_stream_put32(unsigned char *bytes, uint32_t value);
-
 /** Write the beginning of an NDARRAY of `count` 32-bit floats; return its size, 4. */
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 
@@ -96,8 +93,7 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 enum { SUPINE_STREAM_ATTRIBUTE = 24 };
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 
-/** Write points as big-endian floats.
- * @param flip  1: negate x and y, from LPS to RAS */
-void supine_stream_put_points(size_t count, const float *xyz, int flip, unsigned char *bytes);
+/** Write big-endian 32-bit floats. */
+void supine_stream_put_floats(size_t count, const float *values, unsigned char *bytes);
 
 #endif

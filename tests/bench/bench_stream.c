@@ -105,7 +105,7 @@ static void make_pose(double time, uint64_t stamp, unsigned char bytes[SUPINE_ST
                              1,
                              0}; /* head */
   unsigned char *body = bytes + SUPINE_STREAM_HEADER;
-  supine_stream_put_points(4, columns, 0, body);
+  supine_stream_put_floats(12, columns, body);
   supine_stream_header header = {
       .version = 1, .stamp = stamp, .size = 48, .crc = supine_stream_crc64(0, body, 48)};
   strcpy(header.type, "TRANSFORM");

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Fuzz OpenIGTLink messages, with body size and checksum corrected so that the code behind the
  * checks is reached, and tables of recorded poses. */
+#include <endian.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -79,7 +80,8 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   supine_fuzz_expect(bytes != NULL, "memory for a seed");
   uint8_t *body = bytes + SUPINE_STREAM_HEADER;
   for (size_t i = 0; i < BODY; i += 4) {
-    supine_stream_put32(body + i, UINT32_C(0x3F800000) >> (i % 12)); /* 1.0F and smaller */
+    const uint32_t word = htobe32(UINT32_C(0x3F800000) >> (i % 12)); /* 1.0F and smaller */
+    memcpy(body + i, &word, sizeof word);
   }
   header.crc = supine_stream_crc64(0, body, BODY);
   supine_stream_header_write(&header, bytes);

@@ -2,6 +2,7 @@
 /* The server against peers on loopback: honest, slow, stuck, vanishing, hostile, and many. */
 #include "tests/test.h"
 
+#include <endian.h>
 #include <errno.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -189,8 +190,8 @@ static size_t make_pose(const double down[3], uint64_t stamp, unsigned char byte
   for (int i = 0; i < 3; ++i) {
     uint64_t word;
     memcpy(&word, &down[i], sizeof word);
-    supine_stream_put32(body + 4 + 8 * i, (uint32_t)(word >> 32));
-    supine_stream_put32(body + 8 + 8 * i, (uint32_t)word);
+    word = htobe64(word);
+    memcpy(body + 4 + 8 * i, &word, sizeof word);
   }
   return make_message("NDARRAY", "Patient", stamp, body, sizeof body, bytes);
 }
