@@ -151,29 +151,6 @@ TEST(test_force_some_vertices_same_as_all) {
   free(all);
 }
 
-/* The height range is the same whether directions share a search or not. */
-TEST(test_height_range_many_directions_equals_each_alone) {
-  const supine_lungs *lungs = *state;
-  enum { COUNT = 300 };
-  double g[3 * COUNT];
-  double low[COUNT];
-  double high[COUNT];
-  for (size_t d = 0; d < COUNT; ++d) {
-    const double longitude = 0.02 * (double)d;
-    const double z = cos(0.013 * (double)d);
-    g[3 * d] = sqrt(1.0 - z * z) * cos(longitude);
-    g[3 * d + 1] = sqrt(1.0 - z * z) * sin(longitude);
-    g[3 * d + 2] = z;
-  }
-  assert_int_equal(supine_physics_height_range(lungs, true, COUNT, g, low, high), SUPINE_OK);
-  for (size_t d = 0; d < COUNT; ++d) {
-    double one[2];
-    assert_int_equal(supine_physics_height_range(lungs, true, 1, g + 3 * d, one, one + 1),
-                     SUPINE_OK);
-    assert_true(one[0] == low[d] && one[1] == high[d]);
-  }
-}
-
 TEST(test_directions_box_model_literal_values) {
   /* A left lung 100 mm wide, 200 deep, 300 high, midline at its inner face x = 10. */
   double vertices[] = {10, 0, 0, 110, 0, 0, 10, 200, 0, 10, 0, 300, 60, 100, 150};

@@ -228,30 +228,6 @@ TEST(test_share_out_any_volume_follows_lines) {
   assert_true(fabs(ml[0] - 1.109 * 2000.0) < 1e-9 && fabs(ml[1] - 1.109 * 3000.0) < 1e-9);
 }
 
-/* In the fitted posture, splitting the gradient changes nothing. */
-TEST(test_deep_law_supine_equals_unsplit_form) {
-  static const double supine[3] = {0.0, 1.0, 0.0};
-  supine_lungs lungs = made_lungs();
-  const supine_model split = supine_physics_model(SUPINE_LAW_DEEP);
-  supine_model whole = split;
-  whole.force = (supine_force_law){.base = 0.7, .gain = 0.6};
-  double scale[2];
-  supine_solution solution[2] = {{0}};
-  assert_int_equal(supine_physics_solve(&lungs, &split, supine, &solution[0], NULL), SUPINE_OK);
-  assert_int_equal(supine_physics_solve(&lungs, &whole, supine, &solution[1], NULL), SUPINE_OK);
-  for (int k = 0; k < 2; ++k) {
-    assert_int_equal(supine_volume_scale(solution[k].cubic, 500.0, &scale[k], NULL), SUPINE_OK);
-  }
-  for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
-    const double a = scale[0] * solution[0].catch_[i];
-    const double b = scale[1] * solution[1].catch_[i];
-    assert_true(fabs(a - b) < 1e-10 * fabs(b));
-  }
-  supine_physics_solution_free(&solution[0]);
-  supine_physics_solution_free(&solution[1]);
-  supine_lungs_free(&lungs);
-}
-
 TEST(test_law_constants_equal_table) {
   static const struct {
     const char *name;

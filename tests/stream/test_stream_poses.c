@@ -16,38 +16,6 @@ static const char *file_of(const char *text) {
   return path;
 }
 
-TEST(test_poses_write_then_read_same) {
-  char path[256];
-  (void)snprintf(path, sizeof path, "%s/kept.csv", folder);
-  FILE *file = fopen(path, "w");
-  assert_non_null(file);
-  supine_stream_poses_begin(file);
-  supine_stream_pose pose[500];
-  uint64_t seed = 3;
-  for (int i = 0; i < 500; ++i) {
-    double v[3];
-    for (int k = 0; k < 3; ++k) {
-      v[k] = fixture_random(&seed);
-    }
-    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    pose[i] =
-        (supine_stream_pose){0.015 * i + 1e-9 * i, {v[0] / length, v[1] / length, v[2] / length}};
-    supine_stream_poses_add(file, &pose[i]);
-  }
-  assert_int_equal(fclose(file), 0);
-  supine_stream_poses poses;
-  supine_error error;
-  assert_int_equal(supine_stream_poses_load(path, &poses, &error), SUPINE_OK);
-  assert_int_equal(poses.count, 500);
-  for (int i = 0; i < 500; ++i) {
-    assert_true(poses.pose[i].seconds == pose[i].seconds);
-    for (int k = 0; k < 3; ++k) { /* they are normalised again */
-      assert_true(fabs(poses.pose[i].gravity[k] - pose[i].gravity[k]) < 4e-16);
-    }
-  }
-  supine_stream_poses_free(&poses);
-}
-
 TEST(test_poses_bad_files_refused) {
   static const struct {
     const char *text, *says;

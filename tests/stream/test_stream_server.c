@@ -327,21 +327,6 @@ TEST(test_server_each_pose_answered_by_weights) {
   stage_destroy(s);
 }
 
-TEST(test_server_bare_number_as_volume_refused) {
-  stage *s = stage_create();
-  const int peer = dial(stage_run(s));
-  supine_stream_header header;
-  unsigned char body[4096];
-  assert_true(say(peer, "VOLUME", "500")); /* the reference of a bare number is unknown */
-  assert_true(send_pose(peer, poses[1], 1));
-  (void)hear_stamp(peer, 1, &header, body);
-  expect_weights(s, poses[1], 30.0, body); /* as before */
-  (void)close(peer);
-  (void)stage_end(s);
-  assert_int_equal(atomic_load(&s->warnings), 1);
-  stage_destroy(s);
-}
-
 TEST(test_server_volume_above_rest_equals_basis_pose) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
