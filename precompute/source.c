@@ -75,12 +75,11 @@ static void find_in_map(const char *path, const supine_labels_report *report,
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
     const char *side = lung->side > 0 ? "left" : "right";
-    if (lung->cut > 0) {
-      supine_findings_add(
-          findings,
-          "%s: warning: the %s lung is cut off at the image's border (%zu voxel%s): give a scan "
-          "that shows all of it",
-          path, side, lung->cut, lung->cut == 1 ? "" : "s");
+    if (lung->cut) {
+      supine_findings_add(findings,
+                          "%s: warning: the %s lung is cut off at the image's border: give a scan "
+                          "that shows all of it",
+                          path, side);
     }
     if (lung->tunnels > 0) {
       supine_findings_add(findings,

@@ -9,8 +9,8 @@
 #include "mesh/io/image.h"
 #include "mesh/io/points.h"
 #include "mesh/labels/shapes.h"
-#include "precompute/inside/embed.h"
 #include "precompute/inside/content.h"
+#include "precompute/inside/embed.h"
 
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
@@ -227,7 +227,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   if (given->count == 1 && !wanted->has_grid) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "nothing to embed: give points (.csv, .fcsv, .mrk.json), meshes or an "
+                            "nothing to embed: give points (.csv, .mrk.json), meshes or an "
                             "image, or --grid MM");
   }
   if (labels && (!image || wanted->has_grid)) {
@@ -255,7 +255,7 @@ const supine_command supine_command_embed = {
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
     .about =
-        "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json or .fcsv "
+        "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json "
         "of 3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
         "nodules), the parts of a label map, or the nodes of a regular grid or of the voxels of an "
         "image (.nrrd, .nii, .nii.gz). Every command that reads a basis takes it.\n\nDisplacements "

@@ -127,7 +127,7 @@ TEST(test_labels_phantom_recovered) {
       assert_true(fabs(is->surface - 1e-3 * supine_mesh_volume(&out.surface[lung])) <
                   1e-9 * wanted);
       assert_int_equal(is->tunnels, 0);
-      assert_int_equal(is->cut, 0);
+      assert_false(is->cut);
     }
     const double rms = rms_from(truth, &out);
     printf("%d mm: %.3f mm RMS, %+.2f and %+.2f mL of the mask\n", h, rms,
@@ -387,23 +387,15 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   supine_image_free(&image);
 }
 
-TEST(test_labels_cut_at_the_border_counted) {
+TEST(test_labels_lungs_cut_at_the_border_reported) {
   supine_image image = helper_two_lungs(4.0);
   const size_t layer = image.size[0] * image.size[1];
-  size_t cut[2] = {0, 0};
   supine_image part = image;
   part.size[2] -= 20;
   part.values = (uint8_t *)image.values + 20 * layer;
-  for (size_t i = 0; i < layer; ++i) {
-    const uint8_t value = ((const uint8_t *)part.values)[i];
-    cut[0] += value == 2;
-    cut[1] += value == 1;
-  }
-  assert_true(cut[0] > 0 && cut[1] > 0);
   const supine_labels_options options = {.edge = 5.0};
   made out = surfaces_of_image(&part, "cut.nrrd", &options);
-  assert_int_equal(out.report.lung[0].cut, cut[0]);
-  assert_int_equal(out.report.lung[1].cut, cut[1]);
+  assert_true(out.report.lung[0].cut && out.report.lung[1].cut);
   check_closed(&out.surface[0]);
   release(&out);
   supine_image_free(&image);

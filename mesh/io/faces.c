@@ -7,14 +7,6 @@
 
 #include "mesh/io/read.h"
 
-/* Return twice the area of the triangle abc times the length of `normal`: positive if its corners
- * run counter-clockwise about `normal`. */
-static double turn(const double normal[3], const double *a, const double *b, const double *c) {
-  double own[3];
-  supine_normal(a, b, c, own);
-  return supine_dot(normal, own);
-}
-
 /* Compute a normal of the face, as long as twice its area: the sum over the triangles at its first
  * corner. */
 static void find_normal(const double *vertices, const uint32_t *corner, size_t count,
@@ -30,41 +22,34 @@ static void find_normal(const double *vertices, const uint32_t *corner, size_t c
   }
 }
 
-/* Report whether corner i can be cut off: a left turn there, with no other corner inside. */
-static bool is_ear(const double *vertices, const uint32_t *corner, size_t count, size_t i,
+/* Report whether all triangles of the fan from corner `start` face along `normal`. */
+static bool is_fan(const double *vertices, const uint32_t *corner, size_t count, size_t start,
                    const double normal[3]) {
-  const double *a = vertices + 3 * (size_t)corner[(i + count - 1) % count];
-  const double *b = vertices + 3 * (size_t)corner[i];
-  const double *c = vertices + 3 * (size_t)corner[(i + 1) % count];
-  bool ear = turn(normal, a, b, c) > 0.0;
-  for (size_t k = 2; ear && k + 1 < count; ++k) {
-    const double *p = vertices + 3 * (size_t)corner[(i + k) % count];
-    ear = !(turn(normal, a, b, p) > 0.0 && turn(normal, b, c, p) > 0.0 &&
-            turn(normal, c, a, p) > 0.0);
+  bool fan = true;
+  for (size_t i = 1; fan && i + 1 < count; ++i) {
+    double own[3];
+    supine_normal(vertices + 3 * (size_t)corner[start],
+                  vertices + 3 * (size_t)corner[(start + i) % count],
+                  vertices + 3 * (size_t)corner[(start + i + 1) % count], own);
+    fan = supine_dot(normal, own) > 0.0;
   }
-  return ear;
+  return fan;
 }
 
-/* Cut one ear after another into a triangle, starting at corner 1. A face that crosses itself may
- * have no ear; then cut off the next corner. `corner` is overwritten; `out` takes 3 (count - 2)
- * indices. */
-static void cut(const double *vertices, uint32_t *corner, size_t count, uint32_t *out) {
+/* Cut a face into the triangles at the first corner that sees all others inside the face; at
+ * corner 0 if none does. `out` takes 3 (count - 2) indices. */
+static void cut(const double *vertices, const uint32_t *corner, size_t count, uint32_t *out) {
   double normal[3];
+  size_t start = 0;
   find_normal(vertices, corner, count, normal);
-  size_t at = 1;
-  for (; count > 3; --count) {
-    size_t tried = 0;
-    while (tried < count && !is_ear(vertices, corner, count, (at + tried) % count, normal)) {
-      ++tried;
-    }
-    at = (at + tried) % count;
-    *out++ = corner[(at + count - 1) % count];
-    *out++ = corner[at];
-    *out++ = corner[(at + 1) % count];
-    memmove(corner + at, corner + at + 1, (count - at - 1) * sizeof *corner);
-    at = at == count - 1 ? 0 : at;
+  while (start < count && !is_fan(vertices, corner, count, start, normal)) {
+    ++start;
   }
-  memcpy(out, corner, 3 * sizeof *out);
+  for (size_t i = 1; i + 1 < count; ++i) {
+    *out++ = corner[start % count];
+    *out++ = corner[(start + i) % count];
+    *out++ = corner[(start + i + 1) % count];
+  }
 }
 
 static supine_status make_room(mesh_faces *faces, size_t triangles, supine_error *error) {

@@ -58,18 +58,6 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
   return SUPINE_OK;
 }
 
-/* Parse "LPS", "RAS", and the numbers that older versions of Slicer wrote. */
-static supine_axes slicer_axes(const char *text) {
-  supine_axes axes = SUPINE_AXES_LPS;
-  if (strncmp(text, "0", 1) == 0) {
-    return SUPINE_AXES_RAS;
-  }
-  char letters[4];
-  (void)snprintf(letters, sizeof letters, "%.3s", text);
-  (void)supine_mesh_axes_parse(letters, &axes);
-  return axes;
-}
-
 static supine_status read_csv(reading *r) {
   static const char *const columns[] = {"x", "y", "z", "name", "label"};
   enum { NAME = 3, LABEL, COLUMNS };
@@ -95,60 +83,12 @@ static supine_status read_csv(reading *r) {
   return status;
 }
 
-/* Read lines "id,x,y,z,...,label at 11,..."; comments begin with a hash. */
-static supine_status read_fcsv(reading *r) {
-  enum { LABEL = 11 };
-  FILE *file = fopen(r->path, "rb");
-  char *line = NULL;
-  size_t room = 0;
-  size_t number = 0;
-  supine_axes axes = SUPINE_AXES_RAS; /* older versions of Slicer did not name the axes */
-  supine_status status = SUPINE_OK;
-  if (file == NULL) {
-    return supine_error_set(r->error, SUPINE_ERROR_READ,
-                            "%s: cannot open: check the name and its permissions", r->path);
-  }
-  while (status == SUPINE_OK && getline(&line, &room, file) > 0) {
-    static const char system[] = "# CoordinateSystem =";
-    double at[3];
-    char *rest = line;
-    char *label = NULL;
-    bool good = true;
-    ++number;
-    line[strcspn(line, "\r\n")] = '\0';
-    if (strncmp(line, system, sizeof system - 1) == 0) {
-      axes = slicer_axes(line + sizeof system - 1 + strspn(line + sizeof system - 1, " "));
-    }
-    if (line[0] == '#' || line[0] == '\0') {
-      continue;
-    }
-    for (int field = 0; rest != NULL && field <= LABEL; ++field) {
-      char *text = strsep(&rest, ",");
-      char *end = text;
-      if (field >= 1 && field <= 3) {
-        at[field - 1] = strtod(text, &end);
-        good = good && end != text && *end == '\0' && isfinite(at[field - 1]);
-      }
-      good = good && (rest != NULL || field >= 3);
-      label = field == LABEL ? text : label;
-    }
-    status = good ? add(r, at, label, axes, 1.0)
-                  : supine_error_set(r->error, SUPINE_ERROR_FORMAT,
-                                     "%s:%zu: not a point: write id,x,y,z,...", r->path, number);
-  }
-  free(line);
-  (void)fclose(file);
-  return status;
-}
-
 /* Read the control points of one list. */
 static supine_status read_markup(reading *r, const json_t *markup) {
-  const json_t *system = json_object_get(markup, "coordinateSystem");
+  const char *system = json_string_value(json_object_get(markup, "coordinateSystem"));
   const char *unit = json_string_value(json_object_get(markup, "coordinateUnits"));
-  const supine_axes axes = json_is_string(system) ? slicer_axes(json_string_value(system))
-                           : json_is_integer(system)
-                               ? json_integer_value(system) == 0 ? SUPINE_AXES_RAS : SUPINE_AXES_LPS
-                               : SUPINE_AXES_LPS;
+  supine_axes axes = SUPINE_AXES_LPS;
+  (void)(system != NULL && supine_mesh_axes_parse(system, &axes));
   double scale = 1.0;
   (void)(unit != NULL && supine_mesh_unit_find(unit, &scale));
   const json_t *list = json_object_get(markup, "controlPoints");
@@ -192,16 +132,14 @@ static supine_status read_markups(reading *r) {
 }
 
 bool supine_mesh_points_named(const char *path) {
-  return supine_text_ends_in_any_case(path, ".csv") ||
-         supine_text_ends_in_any_case(path, ".fcsv") || supine_text_ends_in_any_case(path, ".json");
+  return supine_text_ends_in_any_case(path, ".csv") || supine_text_ends_in_any_case(path, ".json");
 }
 
 supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_options *options,
                                       supine_mesh_points *points, supine_error *error) {
   reading r = {.path = path, .options = options, .error = error};
-  supine_status status = supine_text_ends_in_any_case(path, ".fcsv")   ? read_fcsv(&r)
-                         : supine_text_ends_in_any_case(path, ".json") ? read_markups(&r)
-                                                                       : read_csv(&r);
+  supine_status status =
+      supine_text_ends_in_any_case(path, ".json") ? read_markups(&r) : read_csv(&r);
   if (status == SUPINE_OK && r.points.count == 0) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points: give at least one", path);
   }

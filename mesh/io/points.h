@@ -12,7 +12,7 @@ typedef struct supine_mesh_points {
 } supine_mesh_points;
 
 /** Read points from a CSV file with the columns x,y,z and optionally name (or label), or from 3D
- * Slicer's .fcsv or .mrk.json (placed control points, in the file's coordinate system).
+ * Slicer's .mrk.json (placed control points, in the file's coordinate system).
  * @param options  axes and units, overriding the file's; NULL: none
  * @param points   zero-initialised; written only on success
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
@@ -20,7 +20,7 @@ supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_o
                                       supine_mesh_points *points, supine_error *error);
 void supine_mesh_points_free(supine_mesh_points *points);
 
-/** Report whether the name ends in .csv, .fcsv or .json. */
+/** Report whether the name ends in .csv or .json. */
 bool supine_mesh_points_named(const char *path);
 
 #endif

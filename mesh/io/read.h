@@ -25,8 +25,8 @@ bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
 bool supine_mesh_text_is(mesh_text word, const char *expected);
 /** Parse decimal digits; return false for anything else or values beyond 2^63. */
 bool supine_mesh_text_count(mesh_text word, uint64_t *value);
-/** Remove the next word from `text` and parse it as a decimal number, nan or inf; false if there
- * is none or it is invalid. A 0 byte must follow the file's last. */
+/** Remove the next word from `text` and parse it as a number as strtod does; false if there is
+ * none or it is invalid. A 0 byte must follow the file's last. */
 bool supine_mesh_text_number(mesh_text *text, double *value);
 /** Parse three numbers, rounded to single precision. */
 bool supine_mesh_text_position(mesh_text *text, double position[3]);

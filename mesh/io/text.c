@@ -45,39 +45,6 @@ bool supine_mesh_text_is(mesh_text word, const char *expected) {
          strncasecmp((const char *)word.at, expected, length) == 0;
 }
 
-static size_t skip_digits(mesh_text *word) {
-  const unsigned char *begin = word->at;
-  while (word->at < word->end && is_digit(*word->at)) {
-    ++word->at;
-  }
-  return (size_t)(word->at - begin);
-}
-
-static void skip_sign(mesh_text *word) {
-  if (word->at < word->end && (*word->at == '-' || *word->at == '+')) {
-    ++word->at;
-  }
-}
-
-static bool is_number(mesh_text word) {
-  skip_sign(&word);
-  if (supine_mesh_text_is(word, "nan") || supine_mesh_text_is(word, "inf") ||
-      supine_mesh_text_is(word, "infinity")) {
-    return true;
-  }
-  size_t digits = skip_digits(&word);
-  if (word.at < word.end && *word.at == '.') {
-    ++word.at;
-    digits += skip_digits(&word);
-  }
-  if (digits > 0 && word.at < word.end && (*word.at == 'e' || *word.at == 'E')) {
-    ++word.at;
-    skip_sign(&word);
-    digits = skip_digits(&word);
-  }
-  return digits > 0 && word.at == word.end;
-}
-
 bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
   *value = 0;
   for (const unsigned char *p = word.at; p < word.end; ++p) {
@@ -91,9 +58,13 @@ bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
 
 bool supine_mesh_text_number(mesh_text *text, double *value) {
   mesh_text word;
-  const bool good = supine_mesh_text_word(text, &word) && is_number(word);
-  *value = good ? strtod((const char *)word.at, NULL) : 0.0; /* ends with the word */
-  return good;
+  char *end = NULL;
+  *value = 0.0;
+  if (!supine_mesh_text_word(text, &word)) {
+    return false;
+  }
+  *value = strtod((const char *)word.at, &end);
+  return (const unsigned char *)end == word.end;
 }
 
 bool supine_mesh_text_position(mesh_text *text, double position[3]) {

@@ -76,32 +76,24 @@ static uint64_t little(const unsigned char *bytes, size_t size) {
   return value;
 }
 
-static int sextet(char c) {
-  return c >= 'A' && c <= 'Z'   ? c - 'A'
-         : c >= 'a' && c <= 'z' ? c - 'a' + 26
-         : c >= '0' && c <= '9' ? c - '0' + 52
-         : c == '+'             ? 62
-         : c == '/'             ? 63
-                                : -1;
-}
-
 /* Decode base64 up to the first other character; streams may follow each other, each padded to
  * whole groups. Return the number of bytes.
  * @param bytes  room for 3 bytes for each 4 characters */
 static size_t base64(const char *at, const char *end, unsigned char *bytes) {
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   unsigned char *to = bytes;
   unsigned word = 0;
   int got = 0;
   int padding = 0;
   for (; at < end; ++at) {
-    const int value = *at == '=' ? 0 : sextet(*at);
-    if (value < 0 && isspace((unsigned char)*at)) {
+    const char *digit = memchr(digits, *at, 64);
+    if (isspace((unsigned char)*at)) {
       continue;
     }
-    if (value < 0) {
+    if (digit == NULL && *at != '=') {
       break;
     }
-    word = word << 6 | (unsigned)value;
+    word = word << 6 | (digit != NULL ? (unsigned)(digit - digits) : 0U);
     padding += *at == '=';
     if (++got == 4) {
       for (int k = 0; k < 3 - padding; ++k) {

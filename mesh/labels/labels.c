@@ -23,9 +23,7 @@ typedef struct work {
   double edge;
   supine_image image; /* freed when the mask is made */
   labels_mask both;
-  size_t from[3]; /* voxel of the image at the mask's first voxel inside the margin */
-  size_t cut[2];  /* voxels of each side at the image's border */
-  bool doubted;   /* by the header, the left lung is not left of the right one */
+  bool doubted; /* by the header, the left lung is not left of the right one */
 } work;
 
 static supine_status advance(work *w, double fraction, supine_error *error) {
@@ -112,29 +110,19 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
   if (supine_labels_mask_cut(&w->image, low, high, side, &w->both) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", w->path);
   }
-  memcpy(w->from, low, sizeof low);
   return SUPINE_OK;
 }
 
-/* Count voxels of each side in the image's first and last layers, where the lung is cut off. */
-static void count_cut(work *w, const size_t image_size[3]) {
-  const labels_mask *both = &w->both;
-  for (size_t k = LABELS_MARGIN; k < both->size[2] - LABELS_MARGIN; ++k) {
-    for (size_t j = LABELS_MARGIN; j < both->size[1] - LABELS_MARGIN; ++j) {
-      for (size_t i = LABELS_MARGIN; i < both->size[0] - LABELS_MARGIN; ++i) {
-        const size_t at[3] = {i - LABELS_MARGIN + w->from[0], j - LABELS_MARGIN + w->from[1],
-                              k - LABELS_MARGIN + w->from[2]};
-        bool border = false;
-        for (int a = 0; a < 3; ++a) {
-          border = border || (image_size[a] > 1 && (at[a] == 0 || at[a] + 1 == image_size[a]));
-        }
-        const uint8_t value = both->at[i + both->size[0] * (j + both->size[1] * k)];
-        if (border && value != 0) {
-          ++w->cut[value - 1];
-        }
-      }
-    }
+/* Report whether a lung's box reaches a face of the image, where the lung is cut off. */
+static bool is_cut(const work *w, const labels_mask *lung, size_t margin) {
+  bool cut = false;
+  for (int a = 0; a < 3; ++a) {
+    const size_t size = w->report->size[a];
+    const long first = w->both.from[a] + lung->from[a] + (long)margin;
+    const long last = first + (long)(lung->size[a] - 2 * margin) - 1;
+    cut = cut || (size > 1 && (first == 0 || last + 1 == (long)size));
   }
+  return cut;
 }
 
 /* Describe an image's axes, as "i to the left, j to the back, k to the head". */
@@ -193,16 +181,12 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   if (memchr(w->both.at, LABELS_EITHER, supine_labels_mask_count(&w->both)) != NULL) {
     status = supine_labels_part(w->path, &w->both, &report->parted, error);
   }
-  if (status == SUPINE_OK) {
-    count_cut(w, report->size);
-  }
   return status;
 }
 
 /* Undo closing where it entered the other lung. */
 static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
-  long offset[3];
-  supine_labels_mask_offset(mask, both, offset);
+  const long *offset = mask->from;
   for (long k = 0; k < (long)mask->size[2]; ++k) {
     for (long j = 0; j < (long)mask->size[1]; ++j) {
       for (long i = 0; i < (long)mask->size[0]; ++i) {
@@ -259,7 +243,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
     return SUPINE_OK;
   }
   lung->side = value == LABELS_LEFT ? 1 : -1;
-  lung->cut = w->cut[value - 1];
+  lung->cut = is_cut(w, &mask, margin);
   status = status == SUPINE_OK ? clean(w, value, &mask, lung) : status;
   if (status == SUPINE_OK && lung->mask < least_lung) {
     status = supine_error_set(error, SUPINE_ERROR_MESH,

@@ -35,7 +35,7 @@ typedef struct supine_labels_lung {
   double filled;   /**< volume of the cavities filled */
   double surface;  /**< volume of the surface */
   long tunnels;    /**< tunnels left through the lung: the surface's genus */
-  size_t cut;      /**< voxels at the image's border, where the lung is cut off */
+  bool cut;        /**< it reaches the image's border, where it is cut off */
 } supine_labels_lung;
 
 /** Geometry and labels read from a map, and what was repaired. */

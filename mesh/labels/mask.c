@@ -56,7 +56,8 @@ supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value,
   double voxel[3];
   for (int a = 0; a < 3; ++a) {
     mask->size[a] = high[a] - low[a] + 1 + 2 * margin;
-    voxel[a] = (double)low[a] - (double)margin;
+    mask->from[a] = (long)low[a] - (long)margin;
+    voxel[a] = (double)mask->from[a];
   }
   supine_labels_mask_place(from, voxel, mask->origin);
   mask->at = calloc(supine_labels_mask_count(mask), 1);
@@ -74,17 +75,6 @@ supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value,
     }
   }
   return SUPINE_OK;
-}
-
-void supine_labels_mask_offset(const labels_mask *mask, const labels_mask *other, long offset[3]) {
-  supine_image frame = {.channels = 1};
-  double voxel[3];
-  memcpy(frame.origin, other->origin, sizeof frame.origin);
-  memcpy(frame.step, other->step, sizeof frame.step);
-  supine_image_locate(&frame, mask->origin, voxel);
-  for (int a = 0; a < 3; ++a) {
-    offset[a] = lround(voxel[a]);
-  }
 }
 
 /* Read the labels [count] of one row; false if a voxel, then put into `bad`, is not a label. */
@@ -165,6 +155,7 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   }
   for (int a = 0; a < 3; ++a) {
     mask->size[a] = high[a] - low[a] + 1 + (size_t)2 * LABELS_MARGIN;
+    mask->from[a] = (long)low[a] - LABELS_MARGIN;
     mask->spacing[a] = supine_length(image->step[a]);
     memcpy(mask->step[a], image->step[a], sizeof mask->step[a]);
   }

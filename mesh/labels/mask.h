@@ -11,6 +11,7 @@
 /** Voxels with a margin of 0 around the nonzero ones. */
 typedef struct labels_mask {
   size_t size[3];
+  long from[3];      /**< voxel 0 in the image or mask that it was cut from */
   double origin[3];  /**< centre of voxel 0, mm, LPS */
   double step[3][3]; /**< mm, LPS */
   double spacing[3]; /**< the steps' lengths, mm */
@@ -26,8 +27,6 @@ double supine_labels_voxel_ml(const labels_mask *mask);
  * there are none. @retval SUPINE_ERROR_MEMORY */
 supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
                                          labels_mask *mask);
-/** Find the offset of `mask` in `other`, of the same frame, in voxels. */
-void supine_labels_mask_offset(const labels_mask *mask, const labels_mask *other, long offset[3]);
 void supine_labels_mask_free(labels_mask *mask);
 /** Convert a position in voxels to mm. */
 void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], double place[3]);

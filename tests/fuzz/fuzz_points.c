@@ -39,9 +39,6 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
     const char *text;
   } texts[] = {{".csv", "x,y,z,name\n1,2,3,a\n-4e1,5.5,6,\"b, \"\"c\"\"\"\n"},
                {".csv", "# list\nID;Label;Z;Y;X\n1;n 1;1,5;2;3\n"},
-               {".fcsv", "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
-                         "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc\n"
-                         "a_0,60,10,-20,0,0,0,1,1,1,0,F-1,,\n"},
                {".json", "{\"markups\":[{\"coordinateSystem\":\"RAS\",\"coordinateUnits\":\"mm\","
                          "\"controlPoints\":[{\"label\":\"a\",\"position\":[1,-2.5,3e1],"
                          "\"positionStatus\":\"defined\"}]}]}"}};
