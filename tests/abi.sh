@@ -1,9 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What programs that were linked with an older run-time library would miss: tests/abi.sh [REVISION]
+# Check that programs linked with an older run-time library still run: tests/abi.sh [REVISION]
 #
-# Compares the library of REVISION with the one that is here, by abidiff (Debian's abigail-tools). By
-# default that is the last tag's; while there is none, that of the commit which gave this version its number. Ends with 0 where nothing changed, and with abidiff's code and report else.
+# Compare the library of REVISION with the current one by abidiff (Debian's abigail-tools). The default is
+# the last tag or, if there is none, the commit that set the current version number. Exit with 0 if nothing
+# changed, else with abidiff's report and code.
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
 revision=${1:-$(git -C "$source" describe --tags --abbrev=0 2>/dev/null ||

@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What readers of the code that do not run it say: tests/analyse.sh [cppcheck|clang-tidy|clang]
+# Run static analysis: tests/analyse.sh [cppcheck|clang-tidy|clang]
 #
-# cppcheck and clang-tidy (.clang-tidy) on every source, and a build of all by clang whose warnings
-# are errors; all three where none is named. Says nothing and ends with 0 where nothing is found.
+# Run cppcheck and clang-tidy (.clang-tidy) on every source, and build everything by clang with warnings as
+# errors; all three by default. Print nothing and exit with 0 if nothing is found.
 set -eu
 cd "$(dirname "$0")/.."
 what=${1:-all}
@@ -22,7 +22,7 @@ if [ "$what" = all ] || [ "$what" = clang ]; then
 fi
 if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
   command -v clang-tidy >/dev/null || { echo "clang-tidy is not installed"; exit 1; }
-  # What is built here; the file that defines what analyse.h redefines does without it.
+  # All sources of the build; the source that defines supine_error_set does not get analyse.h.
   {
     sed -n 's|^ *"file": "\(.*\)",*$|\1|p' build/clang/compile_commands.json | sort -u |
       grep -E "^$PWD/(sh|mesh|precompute|runtime|supine)[/.]" | grep -v '/sh/base/status\.c$' |

@@ -1,13 +1,13 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Which lines the tests reach: tests/coverage.sh [quick]
+# Count the lines that the tests reach: tests/coverage.sh [quick]
 #
-# Builds with gcov's counters, runs the tests, in two minutes the quick ones alone, and prints the
-# lines of each file that none reaches and the share of all. Wants gcovr (Debian has it). Ends with 1
-# below the share that is promised, 90 % in all; of the quick tests it is a lower bound.
+# Build with gcov, run all tests (or the quick ones, two minutes), and print the unreached lines of each
+# file and the total share; with the quick tests it is a lower bound. Needs gcovr (in Debian). Exit with 1
+# if the share is below 90 %.
 set -eu
 cd "$(dirname "$0")/.."
-# What reaches little that others do not, for the time that counting makes of it.
+# Tests that are slow with gcov and reach few lines that others do not reach.
 slow='precompute|thread_count|field|patient_expand|program|breathe|projection|deform|deform_lung|cohort'
 slow="$slow|inside|no_data_lost|labels_orientation|postures|lit_angles|faults|bids|reference|validation_lungs|house"
 slow="$slow|readme_example|series_vtk|stream_page|stream_slicer|stream_link|stream_unity.*|export_.*_node|mesh_hostile"

@@ -57,7 +57,7 @@ def tracked():
 
 
 def included(file):
-    """Rooms that a file includes from."""
+    """Return the folders that a file includes from."""
     with open(os.path.join(source, file), encoding="utf-8") as text:
         for name in re.findall(r'^#\s*include\s+[<"]([^>"]+)[>"]', text.read(), re.M):
             for path in [name] + [f"{room[:-len('/supine')]}/{name}" for room in PUBLIC]:
@@ -76,7 +76,7 @@ def check_includes(rooms, files):
 
 
 def check_systems(files):
-    """The library asks an operating system in one room alone."""
+    """Check that only posix.c and windows.c of the library use the operating system."""
     library = PUBLIC + ("runtime", "runtime/safetensors", "runtime/kernels", "runtime/compare")
     for file in files:
         if os.path.dirname(file) in library and os.path.basename(file) not in ("posix.c", "windows.c"):
@@ -87,7 +87,7 @@ def check_systems(files):
 
 
 def check_files_apart(files):
-    """No two files that include each other, nor longer circles."""
+    """Check that files do not include each other in circles."""
     graph = {f: set() for f in files}
     for file in files:
         for used, name in included(file):
@@ -101,7 +101,7 @@ def check_files_apart(files):
 
 
 def objects():
-    """What each object of the rooms defines and uses: (source without its ending, names, names)."""
+    """Yield the names that each object file defines and uses: (source without its ending, names, names)."""
     for folder, _, names in os.walk(build):
         match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
         for name in names if match else []:
@@ -114,7 +114,7 @@ def objects():
 
 
 def check_names(rooms):
-    """External names begin with their room's, and files do not use each other in circles."""
+    """Check that external names begin with the name of their folder, and files do not use each other in circles."""
     listed = list(objects())
     home = {name: file for file, defined, _ in listed for name in defined}
     for file, defined, _ in listed:
@@ -135,8 +135,8 @@ def check_names(rooms):
 
 
 def check_sizes(files):
-    """No function above 60 lines, none of more than 7 parameters, unless the comment above it says
-    why: a sentence with "lines" or "parameters" in it."""
+    """Check that functions have at most 60 lines and 7 parameters, unless the comment above says why, in a
+    sentence with the word "lines" or "parameters"."""
     begin = re.compile(r"^(?!(?:typedef|struct|enum|union)\b)(?:\w[\w ]*\n)?[A-Za-z_][^\n;:{}=#]*(?:\n +[^\n;{}=#]*)*\) \{$", re.M)
     head = re.compile(r"\b(\w+)\(([^;{}]*)\) \{$")
     for file in files:

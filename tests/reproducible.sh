@@ -1,10 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Built twice, in folders of other names and at other times: is every installed byte the same?
+# Check that two builds, in different folders and at different times, install the same bytes.
 #
 #     tests/reproducible.sh
 #
-# The package's changelog has a date, which SOURCE_DATE_EPOCH gives, as in every reproducible build.
+# The date in the package's changelog comes from SOURCE_DATE_EPOCH, as in every reproducible build.
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
 SOURCE_DATE_EPOCH=$(git -C "$source" log -1 --format=%ct)

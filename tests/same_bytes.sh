@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Are outputs the same bytes with 1, 2, 3 and 7 threads, and of several builds?
+# Check that outputs have the same bytes with 1, 2, 3 and 7 threads, and compare several builds.
 #
 #     tests/same_bytes.sh build/release/supine [build/debug/supine ...]
 #
-# Each writer runs with each number of threads in each build, on the first build's inputs. Ends with 1
-# where threads make a difference; what differs from build to build is named.
+# Run each writer with each number of threads in each build, on inputs made by the first build. Exit with 1
+# if threads make a difference; print outputs that differ between builds.
 set -eu
 export SOURCE_DATE_EPOCH=0
 work=$(mktemp -d)
@@ -21,7 +21,7 @@ printf 'name,x,y,z\na,60,-150,-100\nb,-70,-120,-90\n' >points.csv
 "$first" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1
 
 failed=0
-# made ENDING COMMAND...: the command's output by every build and number of threads.
+# made ENDING COMMAND...: compare the command's output from every build and number of threads.
 made() {
   ending=$1
   shift

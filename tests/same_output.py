@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a session's output is the golden one: same_output.py GOLDEN NOW.
+"""Compare the output of a session with the golden one: same_output.py GOLDEN NOW.
 
-What a command piped through `rounded` printed may differ by one in the last of a decimal's four digits, as halves
-are rounded up on one processor and down on another; everything else is the same to the letter."""
+Output piped through `rounded` may differ by one in the last of the four digits of a decimal number, as processors
+round halves differently; everything else must be identical."""
 import difflib
 import math
 import re
@@ -17,7 +17,7 @@ def lines_of(path):
 
 
 def close(a, b):
-    """Two numbers of four digits, the last of which may be the next one."""
+    """Return whether two numbers of four digits differ by at most one in the last."""
     a, b = float(a), float(b)
     largest = max(abs(a), abs(b))
     return a == b or abs(a - b) < 1.5 * 10.0 ** (math.floor(math.log10(largest)) - 3)

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# A dataset of four subjects, one broken and one without lungs, through the BIDS App's front:
+# Run the BIDS app on four subjects, one with a corrupt file and one without lungs:
 # test_bids.sh PROGRAM COHORT
 set -u
 SUPINE=$1

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The checksum of a basis file as supine/safetensors.h describes it, in another language.
+"""Verify the checksum of basis files by the description in supine/safetensors.h, independently of the C code.
 
     python3 test_checksum.py BASIS...
 
-XXH64 is written out here after its specification, so that nothing needs installing."""
+XXH64 is implemented here from its specification, so that no package is needed."""
 import json
 import struct
 import sys
@@ -68,7 +68,7 @@ def checksum(path):
     return f"xxh64:{total & MASK:016x}", metadata["checksum"]
 
 
-# Known answers: of nothing, and of what other implementations print for these.
+# Published values.
 assert xxh64(b"") == 0xEF46DB3751D8E999
 assert xxh64(b"a") == 0xD24EC4F1A98C6E5B
 assert xxh64(b"Nobody inspects the spammish repetition") == 0xFBCEA83C8A378BF1

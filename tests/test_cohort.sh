@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Forty made subjects, three of them broken, through the cohort's workflow:
+# Run the cohort workflow on forty synthetic subjects, three of them with corrupt files:
 #
 #     test_cohort.sh PROGRAM COHORT [SNAKEMAKE'S OPTIONS]     --cores 2 by default; --slurm --jobs 2
 set -u

@@ -1,12 +1,12 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What commands print, whole: test_command_output.sh PROGRAM FOLDER
+# Compare the whole output of commands with golden files: test_command_output.sh PROGRAM FOLDER
 #
-# Each FOLDER/*.txt is a session: lines "$ COMMAND", each followed by what it prints on both streams
-# and, where that is not 0, its exit code. Sessions run in a folder with lungs.ply, a phantom of
-# about 500 vertices, and lungs.safetensors, its basis. Digits beyond what processors agree on are
-# taken off by the filter `rounded` (same_output.py: the last may differ by one); times and residuals are masked by sed, both in the session
-# itself. To take what is printed now:
+# Each FOLDER/*.txt is a session: lines "$ COMMAND", each followed by its output on both streams and its
+# exit code if it is not 0. Sessions run in a folder with lungs.ply, a phantom of about 500 vertices, and
+# lungs.safetensors, its basis. Numbers that depend on the processor are cut by the filter `rounded`
+# (same_output.py lets the last digit differ by one); times and residuals are masked by sed. Both stand in
+# the session. To accept the current output:
 #
 #   SUPINE_GOLDEN_UPDATE=1 ctest --preset release -R command_output
 set -u
@@ -18,8 +18,8 @@ mkdir "$work/bin"
 ln -s "$program" "$work/bin/supine"
 cat >"$work/bin/rounded" <<'END'
 #!/bin/sh
-# rounded [DIGITS] [FILE]: four digits of each decimal number; 0 for what is rounding alone. Fewer
-# DIGITS where a number lies between two of four.
+# rounded [DIGITS] [FILE]: cut decimal numbers to four digits, and rounding errors to 0. Give fewer DIGITS
+# if a number is halfway between two numbers of four digits.
 digits=4
 case ${1-} in [1-9]) digits=$1; shift ;; esac
 exec awk -v digits="$digits" '{

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Displacement fields and images as other people's tools read them: nibabel, plastimatch, transformix.
+"""Read displacement fields and images with other tools: nibabel, plastimatch, transformix, VTK.
 
     test_foreign_tools.py SUPINE
 """
@@ -29,7 +29,7 @@ def run(*arguments):
 
 
 def read_nrrd(path):
-    """Vectors [k, j, i, 3] and origin, by the header's own words."""
+    """Read vectors [k, j, i, 3] and the origin as the header states them."""
     import gzip
     data = open(path, "rb").read()
     head, body = data.split(b"\n\n", 1)
@@ -46,7 +46,7 @@ def close(name, a, b, tolerance):
 
 
 def plastimatch_stats(path):
-    """Least, mean and greatest of each component."""
+    """Return minimum, mean and maximum of each component."""
     text = run("plastimatch", "stats", path)
     return numpy.array([[float(x) for x in re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text).groups()]
                         if re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text) else [numpy.nan] * 3
@@ -75,7 +75,7 @@ if shutil.which("plastimatch"):
     for ending in ("nrrd", "nii.gz", "mha"):
         close(f"plastimatch: f.{ending}", plastimatch_stats(f"f.{ending}"), wanted, 2e-3)
 
-# An image moved: written as .mha, read by nibabel's counterpart and by plastimatch's conversion.
+# A warped image as .mha, converted by plastimatch and read by nibabel.
 size = (40, 36, 38)
 grid = numpy.indices(size).sum(0) % 7
 nibabel.save(nibabel.Nifti1Image(grid.astype(numpy.int16), numpy.diag([-10.0, -10.0, 10.0, 1.0])), "in.nii.gz")
@@ -122,7 +122,7 @@ if shutil.which("transformix"):
     went = re.search(r"OutputPoint = \[ (\S+) (\S+) (\S+) \]", text)
     close("transformix", [float(x) for x in went.groups()] if went else [numpy.nan] * 3, point + vectors[k, j, i], 1e-2)
 
-# Surfaces as VTK writes them, in every form.
+# Surfaces written by VTK, in every encoding.
 try:
     import vtk
 except ImportError:
@@ -149,7 +149,7 @@ if vtk:
                     if not os.path.exists("v.ply") or open("v.ply", "rb").read() != open("wanted.ply", "rb").read():
                         faults.append(f"VTK's VTP, mode {mode}, header {header}, packed {packed}, encoded {encoded}")
 
-# A folder of TotalSegmentator's masks; outputs into a pipe; names that are not UTF-8.
+# A folder of TotalSegmentator masks; output to a pipe; names that are not UTF-8.
 os.mkdir("segmentations")
 where = numpy.indices((58, 46, 40)).transpose(1, 2, 3, 0) * [5, 4, 6] + [-141.3, -85.7, -113.9]
 x, y, z = numpy.moveaxis(where, -1, 0)

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the run-time library to a folder of its own and builds the example against it, through
-# CMake and through pkg-config; checks what the library needs and what it shows.
+# Install the run-time library to its own folder and build the example with it, by CMake and by pkg-config;
+# check the library's dependencies and exported names.
 #
 #     test_install.sh CMAKE BUILD_FOLDER EXAMPLE_FOLDER MAKE_BASIS CC CXX
 set -eu
@@ -17,7 +17,7 @@ check() {
   grep -q '^100 vertices; the first is at' "$work/out" || { cat "$work/out"; exit 1; }
 }
 
-# CMake. The folder has no other way to the headers.
+# CMake. The example has no other path to the headers.
 CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
 "$cmake" --build "$work/build" >>"$work/log"
 check "$work/build/example_static"
@@ -37,19 +37,19 @@ check "$work/static"
 "$work/static" "$work/basis.safetensors" pron 2>"$work/out" && exit 1
 grep -q "'prone'?" "$work/out"
 
-# Needs libc and libm alone, links against nothing of FFTW, GSL or assimp.
+# It needs only libc and libm, not FFTW, GSL or assimp.
 needed=$(objdump -p "$lib/libsupine_runtime.so" | awk '/NEEDED/ {print $2}' | sort | tr '\n' ' ')
 case $needed in
 "libc.so.6 libm.so.6 " | "ld-linux-x86-64.so.2 libc.so.6 libm.so.6 " | "libc.so.6 ") ;;
 *) echo "needs $needed"; exit 1 ;;
 esac
 
-# Shows supine_ names alone, each with a version; the archive defines none but those either.
+# It exports only supine_ names, each with a version; the archive defines no others either.
 nm -D --defined-only "$lib/libsupine_runtime.so" | awk '{print $3}' >"$work/names"
 grep -q '^supine_deform@@SUPINE_0$' "$work/names"
 if grep -Ev '^(supine_[a-z0-9_]*@@SUPINE_0|SUPINE_0.*)$' "$work/names"; then exit 1; fi
-# Exactly the functions that the installed headers declare; each header stands alone, in C and C++,
-# and names none that is not installed.
+# It exports exactly the functions that the installed headers declare. Each header compiles alone, in C and
+# C++, and includes no header that is not installed.
 for header in "$prefix"/include/supine/*.h; do
   name=supine/$(basename "$header")
   printf '#include <%s>\n' "$name" >"$work/one.c"
@@ -71,6 +71,6 @@ done
 nm --defined-only --extern-only "$lib/libsupine_runtime.a" | awk 'NF == 3 {print $3}' >"$work/names"
 if grep -v '^supine_' "$work/names"; then exit 1; fi
 
-# Undefined names of the archive are of libc, libm or its own.
+# Undefined names of the archive are in libc, libm or the archive itself.
 nm --undefined-only "$lib/libsupine_runtime.a" | awk '{print $2}' | sort -u >"$work/undefined"
 if grep -Ei 'fftw|gsl_|assimp|^ai[A-Z]|pthread|cblas' "$work/undefined"; then exit 1; fi

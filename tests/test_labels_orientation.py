@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a label map's lungs are, by nibabel, by VTK and by supine: all 8 flips of the axes, axes in
-another order, and oblique ones, by sform and by qform; and what is said of 21 wrong headers.
+"""Compare the position of a label map's lungs by nibabel, VTK and supine for all 8 flips of the axes, permuted
+and oblique axes, by sform and by qform; and check the messages for 21 wrong headers.
 
     test_labels_orientation.py SUPINE
 """
@@ -26,8 +26,8 @@ faults = 0
 
 
 def made_map():
-    """lungmask's labels in a frame along RAS: the right lung is the larger; both are wider at the
-    feet and reach deepest at the back."""
+    """Make labels as lungmask does, in a frame along RAS: the right lung is larger; both are wider at the feet and
+    reach lowest at the back."""
     affine = numpy.diag([*SPACING, 1.0])
     affine[:3, 3] = [-141.3, -85.7, -113.9]
     index = numpy.stack(numpy.meshgrid(*map(numpy.arange, SIZE), indexing="ij"), -1)
@@ -39,7 +39,7 @@ def made_map():
 
 
 def phantom_map(folder):
-    """lungmask's labels of synthetic lungs, whose shape tells their axes, in a frame along RAS."""
+    """Make labels of synthetic lungs, whose shape shows their axes, in a frame along RAS."""
     path = os.path.join(folder, "phantom.ply")
     subprocess.run([supine, "phantom", "--vertices", "8000", "-o", path], check=True, stdout=subprocess.DEVNULL)
     reader = vtk.vtkPLYReader()
@@ -75,8 +75,8 @@ def phantom_map(folder):
 
 
 def check_header(labels, affine, flips, folder):
-    """A header with axes of the patient reversed, 180 degrees about one or mirrored: the option that mends
-    it is named, and the axes are not said to hold. A right header: no axes are proposed."""
+    """Check the message for a header with reversed axes (rotated by 180 degrees or mirrored): it names the option
+    that corrects it. For a right header no axes are proposed."""
     global faults
     path = os.path.join(folder, "header.nii.gz")
     nibabel.save(nibabel.Nifti1Image(labels, numpy.diag([*(-1.0 if f else 1.0 for f in flips), 1.0]) @ affine), path)
@@ -95,7 +95,7 @@ def check_header(labels, affine, flips, folder):
 
 
 def turned(labels, affine, order, flips):
-    """The same lungs in the same place, stored along other axes."""
+    """Return the same lungs in the same place, stored along other axes."""
     change = numpy.zeros((4, 4))
     change[3, 3] = 1
     for new, old in enumerate(order):
@@ -116,7 +116,7 @@ def rotation(angles):
 
 
 def centres(labels, affine):
-    """Centre and volume of each label's voxels, LPS: left first."""
+    """Return centre and volume of each label's voxels, LPS, left first."""
     out = []
     for label in (2, 1):
         voxels = numpy.argwhere(labels == label)
@@ -126,7 +126,7 @@ def centres(labels, affine):
 
 
 def by_vtk(path):
-    """The same by VTK's reader, whose matrices take mm along the image's axes."""
+    """Return the same by VTK's reader, whose matrices apply to mm along the image's axes."""
     reader = vtk.vtkNIFTIImageReader()
     reader.SetFileName(path)
     reader.Update()
@@ -139,7 +139,7 @@ def by_vtk(path):
 
 
 def by_supine(path, folder):
-    """Centre and volume of each surface, from the file that --surfaces-out leaves."""
+    """Return centre and volume of each surface written by --surfaces-out."""
     out = os.path.join(folder, "surfaces.ply")
     result = subprocess.run([supine, "solve", path, "--labels", "lungmask", "--edge", "5",
                              "--posture", "prone", "--surfaces-out", out,
@@ -182,8 +182,7 @@ def check(name, labels, affine, folder, form):
     back = nibabel.load(path)
     wanted = centres(numpy.asarray(back.dataobj), back.affine)
     ours, said = by_supine(path, folder)
-    # Whatever axes the map is stored along, the lungs are not upside down; they are small for a full
-    # inflation, which is said.
+    # For all storage axes the only warning is that the lungs are small for full inflation.
     warned = [line for line in said.splitlines() if "warning" in line and "full inflation" not in line]
     if ours is None or warned:
         faults += 1
@@ -191,7 +190,7 @@ def check(name, labels, affine, folder, form):
         return
     for other, reader in ((ours, "supine"), (by_vtk(path), "vtk")):
         for (a, va), (b, vb) in zip(wanted, other):
-            # a tenth of a voxel, and one in a hundred of volume: what half a voxel of surface can do
+            # tolerance: a tenth of a voxel, and 1 % of volume
             if numpy.abs(a - b).max() > 0.1 * max(SPACING) or abs(va - vb) > 0.01 * va:
                 faults += 1
                 print(f"{name}: nibabel {a} {va:.1f} mL, {reader} {b} {vb:.1f} mL")

@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What is made from the tables of options: test_manual.sh PROGRAM FOLDER
+# Check manual pages and completions, made from the tables of options: test_manual.sh PROGRAM FOLDER
 set -u
 supine=$1
 cd "$2" || exit 1
@@ -25,7 +25,7 @@ for command in $commands; do
   fi
 done
 
-# complete WORDS...: what bash offers for the last of them.
+# complete WORDS...: print bash's completions of the last word.
 . ./supine.bash
 complete_words() {
   COMP_WORDS=(supine "$@")

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # No command loses data: test_no_data_lost.sh PROGRAM [KILLS [SIGNALS]]
 #
-# An output that is an input is refused, however it is named; outputs are tried before the work; full
-# disks, files that grow too large and signals leave the old file, and nothing else; KILLS times
-# (default 2) for each writer and signal it is ended at some moment.
+# An output that is also an input is refused under any name. Outputs are checked before the work begins. A
+# full disk, a size limit or a signal leaves the old file and no other: each writer is ended by each signal
+# at KILLS (default 2) moments.
 set -u
 export SOURCE_DATE_EPOCH=0 # a report that is made again is the same, also past midnight
 supine=$1
@@ -27,7 +27,7 @@ fail() {
 awk 'BEGIN { print "name,x,y,z"; for (i = 0; i < 300; ++i) printf "p%d,%d,%d,%d\n", i, 60 + i % 50, i % 40, i % 60 }' >points.csv
 "$supine" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1 || exit 1
 
-# refused INPUT ENDING COMMAND...: the command, with -o and each name of the input, changes nothing.
+# refused INPUT ENDING COMMAND...: run with -o and each name of the input; nothing changes.
 refused() {
   input=$1
   ending=$2
@@ -43,7 +43,7 @@ refused() {
   done
   rm -f "before$ending" "input$ending" "hard$ending" "soft$ending"
 }
-# The input has each output's ending in turn, so that nothing else is in the way.
+# Give the input the ending of each output, so that the command has no other reason to refuse it.
 refused lungs.ply .ply precompute input.ply
 refused lungs.ply .ply solve input.ply --posture prone
 refused lungs.safetensors .safetensors precompute lungs.ply --fields input.safetensors
@@ -64,18 +64,18 @@ printf 'seconds,w,x,y,z\n0,1,0,0,0\n' >poses.csv && cp poses.csv poses.before
 "$supine" precompute lungs.ply -o basis.stl >said 2>&1
 [ $? -eq 1 ] && [ ! -e basis.stl ] || fail "a basis named .stl: $(cat said)"
 
-# The output's folder is missing: said before the input is even read.
+# A missing output folder is reported before the input is read.
 "$supine" precompute missing.ply -o nowhere/a.safetensors >said 2>&1
 [ $? -eq 4 ] && grep -q 'nowhere/a.safetensors: .*No such file' said || fail "missing folder: $(cat said)"
 
-# A link stays one, and what it leads to is replaced.
+# A link is kept, and its target is replaced.
 mkdir far
 echo old >far/target.ply
 ln -s far/target.ply link.ply
 "$supine" deform lungs.safetensors --posture prone -o link.ply >/dev/null || fail "through a link"
 [ -L link.ply ] && [ "$(head -c 3 far/target.ply)" = ply ] || fail "the link did not stay"
 
-# writer NAME COMMAND...: runs "COMMAND -o NAME" to its end once, then under limits and signals.
+# writer NAME COMMAND...: run "COMMAND -o NAME" to its end once, then with limits and signals.
 writer() {
   name=$1
   shift

@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# From a law to a patient's basis and back: test_patient_command.sh PROGRAM
+# Fit a patient's law and use it: test_patient_command.sh PROGRAM
 #
-# Lungs are moved by a known law; fit finds it from surfaces and from landmarks, precompute makes a
-# basis of it, and validate finds the person's other states. Then what is refused.
+# Lungs are moved by a known law. fit recovers it from surfaces and from landmarks, precompute makes a basis
+# with it, and validate compares the basis with other states of the person. Bad input is refused.
 set -u
 supine=$1
 work=$(mktemp -d) || exit 1
@@ -34,7 +34,7 @@ surfaces() { # FILE: what validate says of its first state, mm RMS
   number rms_mm "$1"
 }
 
-# One person in several states, two meshings: a law far from the default.
+# One person in several states, with two meshes and a law far from the default.
 for mesh in p:20000 q:14000; do
   name=${mesh%:*}
   "$supine" phantom -o $name.ply --vertices ${mesh#*:} >/dev/null || fail phantom
@@ -52,8 +52,8 @@ pairs p_supine_full p_supine_rest empty
 pairs p_supine_rest p_prone_rest prone
 pairs p_supine_full p_prone_rest down
 
-# A gain of 0.70 comes back, whichever way round the two states are told; and the basis made of the
-# scan at rest meets the true prone surface.
+# A gain of 0.70 is recovered for either order of the two states, and the basis of the scan at rest reaches
+# the true prone surface.
 turns() { # NAME ARGUMENTS of fit
   name=$1
   shift
@@ -81,8 +81,8 @@ grep -q 'full inflation' fit.txt || fail "states are not told: $(head -3 fit.txt
 "$supine" info points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
   fail "info does not state the fit's error"
 
-# Without another option, scans of two meshings: a basis of either lies on the other within 0.2 mm RMS,
-# and within 0.6 mm at four times the volume between them.
+# With default options and two meshes, the basis of either scan reaches the other within 0.2 mm RMS, and
+# within 0.6 mm at four times the volume between them.
 chain() { # SCAN STATE ALLOWED...: a basis of the scan against other states
   scan=$1
   shift
@@ -112,12 +112,12 @@ chain q_supine_full rest p 0.2 rest+2000 p 0.2
   fail "validate where nothing moved"
 grep -q '"explained_percent": null' valid.json || fail "explained of nothing"
 
-# A scan that is no more than said to be at rest contradicts what is assumed of rest.
+# A scan at rest without its volume contradicts the assumed rest volume.
 "$supine" fit p_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
   fail "fit a fuller rest"
 grep -q 'at rest the lungs hold 51 % of full inflation' note || fail "no warning: $(cat note)"
 
-# What nothing knows is refused.
+# Unknown states are refused.
 "$supine" fit p_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \
   >fit.txt || fail "fit volumes alone"
 "$supine" precompute p_supine_rest.ply --patient known.json -o known.safetensors >out 2>&1 &&
@@ -133,14 +133,14 @@ done
   fail "validate volumes alone"
 near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json) mm"
 
-# A state that did not turn at all determines no gain.
+# A state in the same posture does not determine the gain.
 "$supine" fit --landmarks full.csv --other supine:full --state prone:rest:full.csv -o x.json \
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
 "$supine" fit p_supine_rest.ply p_supine_full.ply --other supine:full \
   --state prone:rest:p_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
 grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
 
-# A stiff part comes back, goes into the basis, and the basis lies on the state.
+# A stiff region is recovered and used in the basis, which reaches the other state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
 "$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
   --constants 5,2.2,9,1.1,20,1.4 --scale -30 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
@@ -157,8 +157,8 @@ grep -q 'correlation with height along gravity \(0.99\|1.00\);.* does not explai
 near "$(number explained_percent valid.json)" 100 2 || # regions are not of the lesion's shape
   fail "stiff: $(number explained_percent valid.json) % explained"
 
-# Several states, from one that is not the basis's surface: what a basis moved, it predicts; scales
-# are all but linear in volume; and there is a picture of nothing much.
+# Several states, from one that is not the basis's surface: the basis predicts states that it made itself,
+# scales are nearly linear in volume, and the picture shows small errors.
 "$supine" precompute rest.ply --band 3 -o full.safetensors >/dev/null || fail "precompute"
 "$supine" deform full.safetensors --posture supine --volume rest -o scan.ply >/dev/null ||
   fail "deform to rest"
@@ -198,7 +198,7 @@ near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001
   >valid.json || fail "validate from another state"
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
 
-# Points that a basis of no patient's law turns go by its surface's displacement.
+# With a basis without a patient's law, points move with the displacement of its surface.
 for posture in supine prone; do
   "$supine" deform scanned.safetensors --posture $posture --volume rest -o $posture.obj >/dev/null ||
     fail "deform to OBJ"
@@ -213,7 +213,7 @@ done
 near "$(number rms_mm valid.json)" 0 0.01 || fail "points are $(number rms_mm valid.json) mm off"
 near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
 
-# A shift between the scans is found, where it is asked for.
+# A shift between the scans is estimated if requested.
 awk '/^v / { print $1, $2 + 12, $3 - 5, $4 + 7; next } { print }' p_supine_full.obj >shifted.obj
 "$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj \
   --translation --json >valid.json || fail "validate a shift"
@@ -221,14 +221,14 @@ near "$(surfaces valid.json)" 0 1 || fail "shift: $(surfaces valid.json) mm"
 "$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj --json \
   >valid.json || fail "validate without a shift"
 near "$(surfaces valid.json)" 0 3 && fail "a shift was taken out unasked"
-# Half a breath more in the same posture.
+# Half a breath in the same posture.
 "$supine" deform p.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
   fail deform
 "$supine" fit p_supine_rest.ply p_supine_full.ply --state supine:half.ply --other supine:full \
   --law paper >fit.txt || fail "fit half a breath"
 grep -q 'supine.*: breath scale 0.[45]' fit.txt || fail "half a breath: $(grep scale fit.txt)"
 
-# What is refused, with its exit code.
+# Refused input and its exit codes.
 refused() { # CODE WORDS COMMAND...
   code=$1
   words=$2

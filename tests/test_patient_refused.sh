@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What 'supine fit' refuses, with what words and which exit code: test_patient_refused.sh PROGRAM
+# Check the messages and exit codes of 'supine fit' for refused input: test_patient_refused.sh PROGRAM
 #
-# Scans in different frames, units or sides, without overlap, mirrored, shuffled, twice the same, too
-# few, NaN: as landmarks, and as surfaces.
+# Landmarks and surfaces in different frames, units or sides, without overlap, mirrored, shuffled, repeated,
+# too few, or NaN.
 set -u
 supine=$1
 work=$(mktemp -d) || exit 1
@@ -24,7 +24,7 @@ refused() { # CODE WORDS ARGUMENTS of fit
   [ ! -e law.json ] || fail "fit $* left a file"
 }
 
-# Landmarks: sixty points over two lungs, moved as a breath would.
+# Landmarks: sixty points over two lungs, moved as by a breath.
 awk 'BEGIN {
   srand(11)
   print "x,y,z,to_x,to_y,to_z"

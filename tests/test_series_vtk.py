@@ -50,7 +50,7 @@ def check_surface(surface, points, triangles, rest, lung):
     assert np.abs(found - points).max() <= HALF_STEP * 1.01
     assert (vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3) == triangles).all()
     moved = vtk_to_numpy(data.GetArray("displacement"))
-    # The evaluator's own reference positions are within 0.0005 mm of the file's.
+    # The evaluator's reference positions differ from those in the file by at most 0.0005 mm.
     assert np.abs(moved - (points - rest)).max() <= HALF_STEP * 1.01 + 0.0006
     normals = vtk_to_numpy(data.GetNormals()).astype(float)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 0.01
@@ -89,7 +89,7 @@ with tempfile.TemporaryDirectory() as folder:
     frames = len(points)
     assert frames == 11 and np.ptp(exact["volume"].sum(1)) > 50  # it breathes: mL
 
-    # One file: the triangles once.
+    # The file holds the triangles once.
     for step in (0, 7, 3, 10):
         steps, surface = read("breath.vtp", step)
         fields = check_surface(surface, points[step], triangles, rest, lung)
@@ -110,13 +110,13 @@ with tempfile.TemporaryDirectory() as folder:
                       paper["vertices"].astype(float), paper["lung"])
         moved = np.abs(vtk_to_numpy(surface.GetPointData().GetArray("displacement"))).max()
         assert (moved > 1) == (step != 0), moved  # mm; the first frame is the scan
-    # Of what it took before it was compressed: points, displacement, magnitude, triangles, ends.
+    # Size relative to the uncompressed arrays: points, displacement, magnitude, triangles, offsets.
     n, m = len(rest), len(triangles)
     share = os.path.getsize("breath.vtp") / (frames * (28 * n + 16 * m))
     print(f"{frames} frames of {n} vertices: {share:.3f} of the bytes without compression")
     assert share <= 0.42  # by the fastest level; the slowest leaves 0.39
 
-    # One surface, exactly, in the scan's own axes as well.
+    # A single surface, also in the axes of the scan.
     run("deform", "lungs.safetensors", "--posture", "prone", "-o", "prone.vtp")
     _, surface = read("prone.vtp")
     found = vtk_to_numpy(surface.GetPoints().GetData())

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The run-time library for Windows, where Debian's gcc-mingw-w64-x86-64-win32 is: without warnings, showing
-# what the headers declare, needing nothing but the system; under wine (wine64) bit for bit as here.
+# Build the run-time library for Windows by Debian's gcc-mingw-w64-x86-64-win32, without warnings. It exports
+# what the headers declare and needs only system libraries. Under wine (wine64) its results are the same bits.
 #
 #     test_windows.sh CMAKE SOURCE_FOLDER LIBRARY CC
 set -eu
@@ -36,7 +36,7 @@ x86_64-w64-mingw32-gcc -O2 $include "$source/tests/python/reference.c" "$dll.a" 
 cp "$dll" "$source/tests/golden/basis_2.safetensors" "$work"
 cd "$work"
 export WINEPREFIX="$work/wine" WINEDEBUG=-all
-# Its server outlives its programs, and writes when it ends.
+# Wine's server outlives the programs, and writes when it ends.
 trap '{ wineserver -k; wineserver -w; } >/dev/null 2>&1 || true; rm -rf "$work"' EXIT
 run() {
   timeout 400 "$wine" "$@"

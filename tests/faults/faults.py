@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole commands with each allocation, and each call that makes a file, failing in turn.
+"""Run whole commands with each allocation, and each call that makes a file, failing in turn.
 
     faults.py PROGRAM LIBFAULTS [EACH] [WORD]
     faults.py PROGRAM            each command once, without faults: for a program built with a sanitizer
@@ -22,7 +22,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-# Made once, without faults; the commands run in a folder where these are.
+# Commands that make the inputs once, without faults.
 BEFORE = """
 phantom --vertices 100 -o lungs.ply
 phantom --vertices 100 -o lungs.stl
@@ -37,7 +37,7 @@ fit --landmarks pairs.csv --law deep -o patient.json
 pv fit samples.csv -o patient.pv.csv
 """
 
-# What is tried; outputs go into the folder out.
+# Commands to test; outputs go to the folder out.
 COMMANDS = """
 phantom --vertices 100 -o out/a.ply
 phantom --vertices 100 -o out/a.obj
@@ -87,7 +87,7 @@ REASONS = {
     "file": "memory|No space left|Too many open files|Input/output error|Resource temporarily|"
             "Cannot allocate|short|truncated|changed",
 }
-# These use a display driver, fonts, or a web server, whose own allocations are theirs to survive.
+# Libraries whose allocations fail as well. Those of drivers, fonts and the web server are left out.
 ALSO = {"memory": "gsl,jansson", "file": ""}
 LIMIT = 60  # s
 
@@ -102,7 +102,7 @@ class Trial:
                             "LIBGL_ALWAYS_SOFTWARE": "1", "FAULT_REPORT": str(self.report)}
 
     def run(self, arguments, kind=None, nth=None):
-        """The exit code, what was said on both streams, calls seen, failed, blocks not given back."""
+        """Return exit code, output on both streams, calls seen, calls failed, and blocks not freed."""
         shutil.rmtree(self.out, ignore_errors=True)
         self.out.mkdir()
         self.report.unlink(missing_ok=True)
@@ -132,7 +132,7 @@ def same_files(folder, kept):
 
 
 def what_is_wrong(trial, kind, kept, whole, result):
-    """Why this run is not what it has to be, or ''."""
+    """Return why a run is wrong, or ''."""
     code, said, words, seen = result
     if code is None:
         return "ran on"
@@ -157,14 +157,14 @@ def what_is_wrong(trial, kind, kept, whole, result):
 
 
 def faultless(trial, arguments):
-    """What runs without faults are, by kind; what they print is None where it is not always the same."""
+    """Run without faults for each kind; the output is None if it differs from run to run."""
     runs = {kind: trial.run(arguments, kind) for kind in REASONS}
     same = len({run[1] for run in runs.values()}) == 1
     return {kind: (run[0], run[1] if same else None, *run[2:]) for kind, run in runs.items()}
 
 
 def samples(folder):
-    """Inputs that no command makes."""
+    """Write the inputs that no command makes."""
     (folder / "points.csv").write_text("name,x,y,z\ncarina,60,-180,-60\nnodule,-80,-120,-90\n")
     (folder / "samples.csv").write_text("pressure_cmH2O,volume_mL\n" + "".join(
         f"{p},{3000 / (1 + 2.718281828 ** ((8 - p) / 5)):.3f}\n" for p in range(-10, 36, 2)))
@@ -237,7 +237,7 @@ def main():
 
 
 def hash_of(text):
-    """Where a command's sample begins: the same in every run, not the same for every command."""
+    """Return the seed of a command's sample: the same in every run, but different for each command."""
     return sum(text.encode())
 
 

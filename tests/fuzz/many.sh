@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Every reader on many made inputs, without libFuzzer, and how many in all:
+# Fuzz every reader without libFuzzer, and count the inputs:
 #
 #     tests/fuzz/many.sh BUILD [RUNS [SEED]]      110000 inputs for most readers by default
 #
-# Messages, which are quick, get five times as many; what takes a process each, a 200th.
-# Ends with 1 where an input crashed a reader, or took more than 0.5 s or 2 GB.
+# Messages are quick and get five times as many; readers that start a process get a 200th. Exit with 1 if an
+# input crashed a reader, or took more than 0.5 s or 2 GB.
 set -u
 build=$1
 runs=${2:-110000}

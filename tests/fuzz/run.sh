@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Fuzzes every reader with libFuzzer, for as long as it is told to.
+# Fuzz every reader with libFuzzer for a given time.
 #
 #     tests/fuzz/run.sh [SECONDS A READER] [FOLDER]       3600 and build/fuzz by default
 #
-# Wants clang and its runtime (libclang-rt-14-dev in Debian 12). What is found stays in FOLDER as
-# crash-*, slow-unit-* or oom-*; what covers new code is kept in FOLDER/corpus for the next time.
+# Needs clang and its runtime (libclang-rt-14-dev in Debian 12). Failing inputs are left in FOLDER as
+# crash-*, slow-unit-* or oom-*; inputs that reach new code are kept in FOLDER/corpus for the next run.
 set -e
 seconds=${1:-3600}
 source=$(cd "$(dirname "$0")/../.." && pwd)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The samples' Python peer against a real server: stream_link.py SAMPLES PORT BASIS
+"""Test the Python client of the samples with a real server: stream_link.py SAMPLES PORT BASIS
 
-It shares no line with the server: bytes by the protocol's text, positions by the file's."""
+It shares no code with the server: it follows the descriptions of the protocol and of the file."""
 import sys
 
 sys.path.insert(0, sys.argv[1])
@@ -38,11 +38,11 @@ for version in (1, 2):
         assert (kind, device) == ("NDARRAY", "SUPINE")
         frames[stamp] = unpack(kind, content)
         assert len(frames[stamp]) == basis.modes + 6  # gains of two lungs along three axes
-    # The same posture by every route, and another one is another.
+    # All routes give the same posture; different postures differ.
     assert far(frames[101], frames[103]) < 1e-5 and far(frames[101], frames[105]) < 1e-5
     assert far(frames[102], frames[104]) < 1e-5 and far(frames[102], frames[106]) < 1e-5
     assert far(frames[101], frames[102]) > 0.05
-    # Surfaces are what the file's own numbers make of the weights.
+    # Surfaces equal those computed from the file and the weights.
     link.check = False  # 650 kB a frame are too many for plain Python
     link.ask_for("points")
     _, (points, strips) = link.newest(10.0)  # the last frame again, with the triangles

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Observed points in, located lungs with their error out: stream_points.py SUPINE SAMPLES
+"""Send observed points, and receive located lungs with their error: stream_points.py SUPINE SAMPLES
 
-The truth is the law itself, shifted; the points come as one TRANSFORM a sensor, then as POINT."""
+The true motion is the law, shifted. Points are sent as one TRANSFORM for each sensor, then as POINT."""
 import csv
 import os
 import re
@@ -25,7 +25,7 @@ def run(*words):
 
 
 def positions(path):
-    """Vertices of a PLY of positions, displacement and expected error."""
+    """Read the vertices of a PLY with positions, displacement and expected error."""
     with open(path, "rb") as file:
         data = file.read()
     begin = data.index(b"end_header\n") + 11
@@ -35,7 +35,7 @@ def positions(path):
 
 
 def point(name, place):
-    """An element of a POINT message."""
+    """Return an element of a POINT message."""
     return struct.pack(">64s32s4B3ff20s", name.encode(), b"sensors", 255, 0, 0, 255, *place, 1.0, b"")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Slicer sample, all but Slicer itself, against a real server started with its own options:
+"""Test the Slicer sample without Slicer, with a real server started with the sample's options:
 
     stream_slicer.py SAMPLES PORT BASIS"""
 import sys
@@ -16,7 +16,7 @@ surface = Surface("127.0.0.1", port)
 weights = Link("127.0.0.1", port)
 weights.ask_for("weights")
 
-# Turns of the patient about the head axis, as Slicer's matrices (RAS) have them, and what is lowest.
+# Matrices of Slicer (RAS) for turns about the patient's head axis, and the direction of gravity.
 TURNS = {
     "supine": ([1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, 1, 0)),
     "prone": ([-1, 0, 0, 5, 0, -1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, -1, 0)),
@@ -26,7 +26,7 @@ TURNS = {
 
 
 def settle(read):
-    """What is read last, when nothing has come for half a second."""
+    """Return the last message, after half a second without another."""
     last, end = None, time.monotonic() + 10
     quiet = time.monotonic()
     while time.monotonic() < end and time.monotonic() - quiet < 0.5:
@@ -47,7 +47,7 @@ for name, (matrix, gravity) in TURNS.items():
         assert abs(points[i] + wanted[i]) < 5e-3 and abs(points[i + 1] + wanted[i + 1]) < 5e-3
         assert abs(points[i + 2] - wanted[i + 2]) < 5e-3
     seen[name] = frame
-    # The same direction, said as a tilt sensor in the patient's own axes (RAS) says it.
+    # The same direction as given by a tilt sensor in the patient's axes (RAS).
     weights.send("NDARRAY", "Patient", array((-gravity[0], -gravity[1], gravity[2])))
     _, same = settle(lambda: weights.newest(0.05))
     assert max(abs(a - b) for a, b in zip(same, frame)) < 1e-5, name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a program against a real server on a free port of this machine:
+"""Run a program with a real server on a free port of this machine:
 
     with_server.py SUPINE VERTICES "SERVER OPTIONS" PROGRAM [ARGUMENTS]
 
