@@ -52,23 +52,31 @@ static const supine_option table[] = {
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-/* Compute the positions of a pose, and the normals [N, 3] where they are not NULL. */
+/* Make the surface of a pose. */
 static supine_status deformed_mesh(const supine_basis *basis, const supine_pose *pose,
-                                   supine_mesh *mesh, float *normals) {
-  const size_t n = mesh->vertex_count;
-  float *xyz = malloc(3 * n * sizeof *xyz);
-  if (xyz == NULL) {
-    return SUPINE_ERROR_MEMORY;
+                                   supine_mesh *mesh) {
+  const supine_status status = supine_options_basis_rest_mesh(basis, mesh);
+  if (status == SUPINE_OK) {
+    free(mesh->vertices);
+    mesh->vertices = supine_options_basis_positions(basis, pose);
   }
-  supine_deform(basis, pose, xyz);
-  if (normals != NULL) {
+  return status == SUPINE_OK && mesh->vertices == NULL ? SUPINE_ERROR_MEMORY : status;
+}
+
+/* Compute the normals of a surface, [N, 3], which the caller frees; NULL: no memory. */
+static float *find_normals(const supine_basis *basis, const supine_pose *pose) {
+  const size_t bytes = 3 * supine_basis_get_info(basis)->vertex_count * sizeof(float);
+  float *xyz = malloc(bytes);
+  float *normals = malloc(bytes);
+  if (xyz != NULL && normals != NULL) {
+    supine_deform(basis, pose, xyz);
     supine_normals(basis, xyz, normals);
-  }
-  for (size_t i = 0; i < 3 * n; ++i) {
-    mesh->vertices[i] = (double)xyz[i];
+  } else {
+    free(normals);
+    normals = NULL;
   }
   free(xyz);
-  return SUPINE_OK;
+  return normals;
 }
 
 static double largest_displacement(const supine_mesh *rest, const supine_mesh *mesh) {
@@ -83,20 +91,20 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
 
 /* Compute the pose requested: by largest displacement from the reference surface, or by volumes. */
 static supine_status find_pose(const supine_basis *basis, const request *wanted,
-                               const double gravity[3], supine_mesh *mesh, supine_pose *pose,
-                               supine_error *error) {
+                               const double gravity[3], supine_pose *pose, supine_error *error) {
   if (!wanted->has_scale) {
     return supine_options_pose(basis, name, &wanted->volume, gravity, pose, error);
   }
   supine_mesh reference = {0};
+  supine_mesh mesh = {0};
   (void)supine_basis_weights(basis, gravity, pose->weights); /* cannot fail: a unit vector */
   supine_pose_fill(pose, 1.0);
   supine_status status = supine_options_basis_rest_mesh(basis, &reference);
   if (status == SUPINE_OK) {
-    status = deformed_mesh(basis, pose, mesh, NULL);
+    status = deformed_mesh(basis, pose, &mesh);
   }
   if (status == SUPINE_OK) {
-    const double largest = largest_displacement(&reference, mesh);
+    const double largest = largest_displacement(&reference, &mesh);
     supine_pose_fill(pose, wanted->scale / largest);
     status = largest > 0.0 ? SUPINE_OK
                            : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
@@ -105,6 +113,7 @@ static supine_status find_pose(const supine_basis *basis, const request *wanted,
                                               wanted->scale);
   }
   supine_mesh_free(&reference);
+  supine_mesh_free(&mesh);
   return status;
 }
 
@@ -120,11 +129,9 @@ static void report(const char *path, const double gravity[3], const supine_mesh 
   (void)putchar('\n');
 }
 
-/* Write the surface of a pose, with its volumes, normals and expected errors. `from` and `mesh` are
- * copies of the reference surface. */
+/* Write the surface of a pose, with its volumes, normals and expected errors. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
-                                   supine_deformation *moved, supine_mesh *from, supine_mesh *mesh,
-                                   supine_error *error) {
+                                   supine_deformation *moved, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
   const double *gravity = moved->state.gravity;
@@ -132,50 +139,46 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   double volumes[SUPINE_LUNGS_MAX];
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, gravity},
                                       {"volume_mL", info->lung_count, volumes}};
-  float *normals = malloc(3 * mesh->vertex_count * sizeof *normals);
+  supine_mesh from = {0};
+  supine_mesh mesh = {0};
+  float *normals = find_normals(basis, &moved->pose);
   supine_status status =
-      normals != NULL ? deformed_mesh(basis, &moved->from.pose, from, NULL) : SUPINE_ERROR_MEMORY;
+      normals != NULL ? deformed_mesh(basis, &moved->from.pose, &from) : SUPINE_ERROR_MEMORY;
   if (status == SUPINE_OK) {
-    status = deformed_mesh(basis, &moved->pose, mesh, normals);
+    status = deformed_mesh(basis, &moved->pose, &mesh);
   }
   if (info->has_volume) {
     supine_basis_volumes(basis, &moved->pose, volumes);
   }
-  save->rest = from->vertices;
-  save->normals = mesh->triangle_count > 0 ? normals : NULL; /* points have no normals */
+  save->rest = from.vertices;
+  save->normals = mesh.triangle_count > 0 ? normals : NULL; /* points have no normals */
   save->expected_error = moved->expected.sigma;
   save->lung = lung == NULL ? NULL : lung->data;
   save->fields = fields;
   save->field_count = info->has_volume ? 2 : 1;
   if (status == SUPINE_OK) {
-    status = supine_mesh_save(path, mesh, save, error);
+    status = supine_mesh_save(path, &mesh, save, error);
   }
   if (status == SUPINE_OK) {
-    report(path, gravity, mesh, from, moved->from.name,
+    report(path, gravity, &mesh, &from, moved->from.name,
            info->has_volume && supine_basis_metadata(basis, "content") == NULL);
     supine_options_expected_print(&moved->expected, stdout);
   }
   free(normals);
+  supine_mesh_free(&from);
+  supine_mesh_free(&mesh);
   return status;
 }
 
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
   supine_deformation moved = {.state = wanted->volume.state, .from_given = wanted->from.given};
-  supine_mesh from = {0};
-  supine_mesh mesh = {0};
   char comment[128];
   supine_status status = supine_options_gravity(&wanted->orientation, moved.state.gravity, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_basis_rest_mesh(basis, &from);
-  }
-  if (status == SUPINE_OK) {
-    status = supine_options_basis_rest_mesh(basis, &mesh);
-  }
   if (status == SUPINE_OK) {
     status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   }
   if (status == SUPINE_OK) {
-    status = find_pose(basis, wanted, moved.state.gravity, &mesh, &moved.pose, error);
+    status = find_pose(basis, wanted, moved.state.gravity, &moved.pose, error);
   }
   if (status == SUPINE_OK && !wanted->has_scale) {
     status = supine_options_expected_find(basis, &moved.state, &moved.from.state, &moved.expected,
@@ -189,11 +192,9 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   if (status == SUPINE_OK) {
     status = supine_command_deform_content_wanted(&wanted->content)
                  ? supine_command_deform_content(&wanted->content, basis, &moved, error)
-                 : write_surface(wanted->content.path, basis, &moved, &from, &mesh, error);
+                 : write_surface(wanted->content.path, basis, &moved, error);
   }
   supine_options_expected_free(&moved.expected);
-  supine_mesh_free(&from);
-  supine_mesh_free(&mesh);
   return status;
 }
 

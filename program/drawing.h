@@ -6,7 +6,7 @@
 
 #include <supine/compare.h>
 
-#include "program/breath/turn.h"
+#include "program/breath/breath_frames.h"
 #include "program/inside.h"
 #include "program/options/state_options.h"
 #include "program/render/render.h"

@@ -17,7 +17,7 @@
 #include "command_helpers.h"
 #include "lungs_helpers.h"
 #include "program/breath/pv.h"
-#include "program/breath/turn.h"
+#include "program/breath/breath_frames.h"
 
 #include "tests/poses.h"
 

@@ -1,8 +1,46 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the surfaces of a breath, frame after frame. */
+/* Compute the states of a breath, frame after frame, and of a turn of the body. */
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
+
+#include "sh/base/vec3.h"
 
 #include "program/breath/breath_frames.h"
+
+/* Compute the direction 90 degrees from `from`, towards `to`. */
+static void find_quarter(const breath_turn *turn, double quarter[3]) {
+  static const double left[3] = {1.0, 0.0, 0.0};
+  static const double back[3] = {0.0, 1.0, 0.0};
+  const double *from = turn->from;
+  double axis[3];
+  supine_cross(from, turn->to, axis);
+  const double sine = supine_length(axis);
+  if (sine < 1e-9) { /* opposite */
+    const double *over = fabs(from[2]) > 0.5 ? back : left;
+    supine_cross(from, over, axis);
+    if (supine_dot(axis, axis) < 1e-9) { /* from one side to the other: over the back */
+      supine_cross(from, back, axis);
+    }
+  }
+  const double length = supine_length(axis);
+  const double unit[3] = {axis[0] / length, axis[1] / length, axis[2] / length};
+  supine_cross(unit, from, quarter);
+}
+
+void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]) {
+  const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
+  if (time >= turn->seconds || cosine > 1.0 - 1e-15) {
+    memcpy(gravity, turn->to, 3 * sizeof *gravity);
+    return;
+  }
+  double quarter[3];
+  find_quarter(turn, quarter);
+  const double angle = acos(cosine) * fmax(0.0, time / turn->seconds);
+  for (size_t k = 0; k < 3; ++k) {
+    gravity[k] = cos(angle) * turn->from[k] + sin(angle) * quarter[k];
+  }
+}
 
 void supine_breath_frames_free(breath_frames *frames) {
   free(frames->time);

@@ -165,60 +165,55 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
-/* Fail with the message where `strict`, else print it. */
-static supine_status say_or_fail(const supine_error *wrong, const char *command, bool strict,
-                                 supine_error *error) {
-  if (strict) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "%s; --allow-folds computes it nevertheless", wrong->message);
-  }
-  supine_options_say(command, "%s", wrong->message);
-  return SUPINE_OK;
-}
-
-static supine_status check_folds(const supine_basis *basis, const char *command, bool strict,
-                                 const supine_pose *pose, supine_error *error) {
+/* Return the share of the triangles that turn over in a pose, or -1: no memory. */
+static double turned_over(const supine_basis *basis, const supine_pose *pose) {
   supine_mesh mesh = {0};
   double *moved = supine_options_basis_positions(basis, pose);
-  supine_status status =
-      moved != NULL ? supine_options_basis_rest_mesh(basis, &mesh) : SUPINE_ERROR_MEMORY;
-  const double turned = status == SUPINE_OK ? supine_mesh_turned_over(&mesh, moved) : 0.0;
-  if (turned > folded_limit) {
-    supine_error wrong;
-    (void)supine_error_set(&wrong, SUPINE_ERROR_NUMERICAL,
-                           "the surface folds: %.3g %% of its triangles turn over", 100.0 * turned);
-    status = say_or_fail(&wrong, command, strict, error);
-  }
+  const bool made = moved != NULL && supine_options_basis_rest_mesh(basis, &mesh) == SUPINE_OK;
+  const double turned = made ? supine_mesh_turned_over(&mesh, moved) : -1.0;
   supine_mesh_free(&mesh);
   free(moved);
-  return status;
+  return turned;
 }
 
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const bool strict = info->has_rest && !allow_folds;
   double held[SUPINE_LUNGS_MAX];
   double full = 0.0;
   double volume = 0.0;
+  char wrong[192] = "";
   supine_basis_volumes(basis, pose, held);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     full += info->reference_volume[lung];
     volume += held[lung];
   }
   const double share = volume / full;
-  supine_status status = SUPINE_OK;
   if (info->has_rest && !(share >= least_of_full && share <= most_of_full)) {
-    supine_error wrong;
-    (void)supine_error_set(
-        &wrong, SUPINE_ERROR_NUMERICAL,
-        "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% that "
-        "lungs hold",
-        volume, 100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
-    status = say_or_fail(&wrong, command, strict, error);
+    (void)snprintf(wrong, sizeof wrong,
+                   "%.0f mL are %.0f %% of full inflation (%.0f mL), outside the %.0f to %.0f %% "
+                   "that lungs hold",
+                   volume, 100.0 * share, full, 100.0 * least_of_full, 100.0 * most_of_full);
+  } else {
+    const double turned = turned_over(basis, pose);
+    if (turned < 0.0) {
+      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                              info->vertex_count);
+    }
+    if (turned > folded_limit) {
+      (void)snprintf(wrong, sizeof wrong, "the surface folds: %.3g %% of its triangles turn over",
+                     100.0 * turned);
+    }
   }
-  return status != SUPINE_OK ? status : check_folds(basis, command, strict, pose, error);
+  if (wrong[0] != '\0' && info->has_rest && !allow_folds) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "%s; --allow-folds computes it nevertheless", wrong);
+  }
+  if (wrong[0] != '\0') {
+    supine_options_say(command, "%s", wrong);
+  }
+  return SUPINE_OK;
 }
 
 supine_status supine_options_pose(const supine_basis *basis, const char *command,
