@@ -19,6 +19,7 @@ enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 
 /* Volume, mL, at which errors in mm are stated if rest is unknown. */
 static const double breath_volume = 500.0;
+static const double sqrt_4pi = 3.5449077018110321;
 
 /* Modes are dropped while the error stays below this multiple of the error with all modes. */
 static const double same_error = 1.01;
@@ -41,9 +42,9 @@ typedef struct pipeline {
   supine_truth truth;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[2][9];    /* harmonics of each lung's volume at rest, mL beyond the reference */
-  double resting_total[9]; /* of the lungs together */
-  supine_accuracy_state state; /* at which errors in mm are stated */
+  double resting[2][9]; /* harmonics of each lung's volume at rest, mL beyond the reference */
+  double
+      volume[9]; /* harmonics of the volume at which errors in mm are stated: rest, or a breath */
   supine_error_table table;
 } pipeline;
 
@@ -55,7 +56,6 @@ static void pipeline_free(pipeline *p) {
   supine_projection_compression_free(&p->compression);
   supine_physics_volume_forms_free(&p->forms);
   supine_accuracy_truth_free(&p->truth);
-  supine_accuracy_error_table_free(&p->table);
 }
 
 /* Report progress, 0 to 1; fail if the caller asks to stop. */
@@ -198,16 +198,15 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
 /* Find the volumes at rest, if it is known, and the state at which errors in mm are measured. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
-  p->state = (supine_accuracy_state){.volume = breath_volume};
+  p->volume[0] = breath_volume * sqrt_4pi;
   if (!p->reference.known) {
     return SUPINE_OK;
   }
   const supine_status status = rest_harmonics(&p->reference, options->model.share, &p->compression,
                                               &p->forms, p->resting, error);
   for (size_t t = 0; t < 9; ++t) {
-    p->resting_total[t] = p->resting[0][t] + p->resting[1][t]; /* zero for a missing second lung */
+    p->volume[t] = p->resting[0][t] + p->resting[1][t]; /* zero for a missing second lung */
   }
-  p->state.resting = p->resting_total;
   return status;
 }
 
@@ -223,9 +222,11 @@ static supine_status hold_out(pipeline *p, supine_error *error) {
 }
 
 static supine_status measure(pipeline *p, supine_error *error) {
-  return supine_accuracy_measure(&p->truth, &p->compression, p->directions,
-                                 p->forms.linear != NULL ? &p->forms : NULL, &p->state,
-                                 &p->accuracy, error);
+  const supine_status status = supine_accuracy_measure(&p->truth, &p->compression, p->directions,
+                                                       p->forms.linear != NULL ? &p->forms : NULL,
+                                                       p->volume, &p->accuracy, error);
+  p->accuracy.volume *= p->reference.known ? 1.0 : breath_volume;
+  return status;
 }
 
 /* Find the smallest number of modes with nearly the same error, from the singular values. */
@@ -272,7 +273,7 @@ static supine_status find_turned_over(pipeline *p, supine_error *error) {
       p->forms.linear == NULL
           ? SUPINE_OK
           : supine_accuracy_turned_over(p->lungs, p->directions, &p->compression, &p->forms,
-                                        &p->state, &p->turned_over);
+                                        p->volume, &p->turned_over);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "no memory to look for folds");
 }

@@ -3,6 +3,7 @@ supine_test(equilibrium supine_precompute supine_lungs supine_mesh_io supine_gsl
 supine_test(inverse supine_precompute supine_lungs supine_mesh_io)
 supine_test(force supine_precompute supine_lungs supine_mesh_io)
 supine_test(lit_angles supine_precompute supine_lungs supine_mesh_io supine_gsl)
+supine_test(deform_lung supine_precompute supine_lungs supine_mesh_io)
 # What turning and breathing do to real lungs, within the ranges that evidence.py prints.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME evidence COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/evidence.py --check

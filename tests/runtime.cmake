@@ -21,7 +21,6 @@ supine_test(kriging runtime_fixture)
 supine_test(locate runtime_fixture)
 supine_test(runtime_basis runtime_fixture)
 supine_test(deform runtime_fixture)
-supine_test(deform_lung runtime_fixture)
 supine_test(deform_lit runtime_fixture)
 
 # The library as others have it: installed, through CMake and pkg-config.

@@ -562,14 +562,13 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
     const double sign = g < 3 ? 1.0 : -1.0;
     double resting[9] = {0.5 * part / 0.28209479177387814};
     resting[term[g % 3]] = sign * 0.5 * part / 0.48860251190291992;
-    const supine_accuracy_state state_of = {resting, 0.0};
-    const supine_accuracy_state even = {NULL, 0.5 * part};
+    const double even[9] = {resting[0]};
     double share = 0.0;
     double least = 0.0;
     assert_int_equal(
-        supine_accuracy_turned_over(&lungs, directions, &field, &forms, &state_of, &share),
+        supine_accuracy_turned_over(&lungs, directions, &field, &forms, resting, &share),
         SUPINE_OK);
-    assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, &even, &least),
+    assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least),
                      SUPINE_OK);
     assert_true(share > least + 0.02); /* 0.16, 0.14, 0.12 and 0.08 */
   }

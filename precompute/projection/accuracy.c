@@ -109,15 +109,13 @@ static bool find_scales(const supine_truth *truth, const supine_volume_forms *fo
   return true;
 }
 
-double supine_accuracy_state_volume(const supine_accuracy_state *state, const double g[3]) {
+/* Compute a volume from its harmonics with gravity along the unit vector g. */
+static double volume_along(const double harmonics[9], const double g[3]) {
   double y[9];
   double volume = 0.0;
-  if (state->resting == NULL) {
-    return state->volume;
-  }
   (void)supine_sh_evaluate(2, g, y); /* cannot fail: g is a unit vector */
   for (size_t t = 0; t < 9; ++t) {
-    volume += state->resting[t] * y[t];
+    volume += harmonics[t] * y[t];
   }
   return volume;
 }
@@ -158,7 +156,7 @@ static void conclude(const accuracy_work *work, supine_accuracy *made) {
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
-                                      const supine_accuracy_state *state, supine_accuracy *accuracy,
+                                      const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error) {
   const size_t count = truth->direction_count;
   const size_t modes = compression->mode_count;
@@ -177,7 +175,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   accuracy_work work = {truth, compression, directions, weights, NULL, tallies, space};
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
-    volumes[d] = supine_accuracy_state_volume(state, g);
+    volumes[d] = volume_along(volume, g);
     supine_projection_compression_weights(compression, g, weights + d * modes);
   }
   if (forms != NULL && truth->cubic != NULL) {
@@ -190,7 +188,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                 volumes[0]);
       goto cleanup;
     }
-    accuracy->volume = state->resting != NULL ? part : part * state->volume;
+    accuracy->volume = part;
     work.scales = scales;
   }
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);
@@ -204,8 +202,8 @@ cleanup:
 
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
-                                          const supine_volume_forms *forms,
-                                          const supine_accuracy_state *state, double *share) {
+                                          const supine_volume_forms *forms, const double volume[9],
+                                          double *share) {
   enum { SAMPLES_MAX = 50000 };
   const supine_mesh *mesh = &lungs->mesh;
   const size_t n = mesh->vertex_count;
@@ -228,8 +226,7 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
     g[posture / 2] = posture % 2 == 0 ? 1.0 : -1.0;
     supine_projection_compression_weights(compression, g, weights);
     supine_physics_volume_forms_contract(forms, weights, cubic);
-    if (supine_volume_scale(cubic, supine_accuracy_state_volume(state, g), &scale, NULL) !=
-        SUPINE_OK) {
+    if (supine_volume_scale(cubic, volume_along(volume, g), &scale, NULL) != SUPINE_OK) {
       continue;
     }
     supine_projection_compression_field(compression, weights, amounts);

@@ -5,6 +5,8 @@
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
+#include <supine/sh.h>
+
 #include "precompute/physics/model.h"
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/projection.h"
@@ -13,8 +15,8 @@
 typedef struct supine_accuracy {
   size_t direction_count;
   double relative_rms, relative_p95, relative_max; /**< at equal gains, over the RMS displacement */
-  /** The volume at which the errors in mm hold: the part, 0 to 1, of the volume from the reference
-   * to rest if rest is known, else mL. 0: the surface is open, and there are no errors in mm. */
+  /** The part, 0 to 1, of the volume asked for at which the errors in mm hold; supine_precompute
+   * states it in mL if rest is unknown. 0: the surface is open, and there are no errors in mm. */
   double volume;
   double rms_mm, p95_mm, max_mm; /**< at equal volumes */
 } supine_accuracy;
@@ -40,15 +42,6 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            supine_truth *truth, supine_error *error);
 void supine_accuracy_truth_free(supine_truth *truth);
 
-/** The volume at which fields are compared, mL beyond the reference. */
-typedef struct supine_accuracy_state {
-  const double *resting; /**< [9] harmonics of the resting volume; NULL: use `volume` */
-  double volume;         /**< in every posture */
-} supine_accuracy_state;
-
-/** Compute the state's volume with gravity along the unit vector g, mL. */
-double supine_accuracy_state_volume(const supine_accuracy_state *state, const double g[3]);
-
 /** Spread `count` directions [count, 3] evenly on the sphere along a golden-angle spiral; none is a
  * node of a product grid. */
 void supine_accuracy_held_out_directions(size_t count, double *directions);
@@ -56,14 +49,14 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
 /** Measure the error. The 95th percentiles come from a histogram whose bins are at most 0.4 % wide.
  * @param directions  [N, 3] d, mm
  * @param forms       of the compression's coefficients; NULL: open surface
- * @param state       volume for the errors in mm; halved until the field reaches it in every
- *                    direction
+ * @param volume      [9] harmonics of the volume for the errors in mm, mL beyond the reference;
+ * halved until the field reaches it in every direction
  * @retval SUPINE_ERROR_NUMERICAL  not even a thousandth of the volume is reached
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const supine_compression *compression,
                                       const double *directions, const supine_volume_forms *forms,
-                                      const supine_accuracy_state *state, supine_accuracy *accuracy,
+                                      const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error);
 
 /** Find the share, 0 to 1, of the triangles whose normal turns by more than a right angle on the
@@ -74,15 +67,15 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
-                                          const supine_volume_forms *forms,
-                                          const supine_accuracy_state *state, double *share);
+                                          const supine_volume_forms *forms, const double volume[9],
+                                          double *share);
 
 /** Relative RMS errors on the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
-  size_t band_count; /**< L + 1 */
-  double *harmonics; /**< [L + 1] error with the first (l + 1)^2 harmonics */
-  size_t mode_count; /**< K */
-  double *modes;     /**< [K] error with the first k + 1 modes */
+  size_t band_count;                        /**< L + 1 */
+  double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [L + 1] error with the first (l + 1)^2 harmonics */
+  size_t mode_count;                        /**< K */
+  double modes[SUPINE_MODES_MADE_MAX];      /**< [K] error with the first k + 1 modes */
 } supine_error_table;
 
 /** Tabulate the error by the number of functions, from which a user can choose it. Release the
@@ -93,6 +86,5 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                                                  const supine_compression *compression,
                                                  const double *directions,
                                                  supine_error_table *table);
-void supine_accuracy_error_table_free(supine_error_table *table);
 
 #endif

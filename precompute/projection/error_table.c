@@ -13,12 +13,6 @@
 
 enum { VERTICES_MAX = 4096 };
 
-void supine_accuracy_error_table_free(supine_error_table *table) {
-  free(table->harmonics);
-  free(table->modes);
-  *table = (supine_error_table){0};
-}
-
 /* Compute gram [R, R], the sum of |d|^2 times the products of the columns over some of the
  * vertices: w' gram w is the squared size of the columns' sum with coefficients w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
@@ -58,46 +52,37 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   const size_t terms = bands * bands;
   const size_t modes = compression->mode_count;
   double weights[SUPINE_MODES_MADE_MAX];
+  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
   double left[SUPINE_SPAN_MAX];
   double all = 0.0;
   double *gram = malloc(rank * rank * sizeof *gram);
-  double *y = malloc(terms * sizeof *y);
-  supine_error_table made = {bands, calloc(bands, sizeof(double)), modes,
-                             calloc(modes, sizeof(double))};
-  supine_status status = gram == NULL || y == NULL || made.harmonics == NULL || made.modes == NULL
-                             ? SUPINE_ERROR_MEMORY
-                             : SUPINE_OK;
-  if (status == SUPINE_OK) {
-    find_gram(truth, compression->vertex_count, directions, gram);
+  *table = (supine_error_table){.band_count = bands, .mode_count = modes};
+  if (gram == NULL) {
+    return SUPINE_ERROR_MEMORY;
   }
-  for (size_t d = 0; d < truth->direction_count && status == SUPINE_OK; ++d) {
+  find_gram(truth, compression->vertex_count, directions, gram);
+  for (size_t d = 0; d < truth->direction_count; ++d) {
     const double *functions = truth->functions + d * rank;
-    status = supine_sh_evaluate(projection->band, truth->directions + 3 * d, y);
+    (void)supine_sh_evaluate(projection->band, truth->directions + 3 * d, y); /* a unit vector */
     supine_projection_compression_weights(compression, truth->directions + 3 * d, weights);
     all += square_of(gram, rank, functions);
     memcpy(left, functions, rank * sizeof *left);
     for (size_t l = 0; l < bands; ++l) {
       take_off(projection->functions + l * l, terms, 2 * l + 1, y + l * l, rank, left);
-      made.harmonics[l] += square_of(gram, rank, left);
+      table->harmonics[l] += square_of(gram, rank, left);
     }
     memcpy(left, functions, rank * sizeof *left);
     for (size_t k = 0; k < modes; ++k) {
       take_off(compression->mix + k, modes, 1, weights + k, rank, left);
-      made.modes[k] += square_of(gram, rank, left);
+      table->modes[k] += square_of(gram, rank, left);
     }
   }
-  for (size_t l = 0; l < bands && status == SUPINE_OK; ++l) {
-    made.harmonics[l] = sqrt(made.harmonics[l] / all);
+  for (size_t l = 0; l < bands; ++l) {
+    table->harmonics[l] = sqrt(table->harmonics[l] / all);
   }
-  for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
-    made.modes[k] = sqrt(made.modes[k] / all);
+  for (size_t k = 0; k < modes; ++k) {
+    table->modes[k] = sqrt(table->modes[k] / all);
   }
-  if (status == SUPINE_OK) {
-    *table = made;
-    made = (supine_error_table){0};
-  }
-  supine_accuracy_error_table_free(&made);
   free(gram);
-  free(y);
-  return status;
+  return SUPINE_OK;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Parse the header of a safetensors file: strict JSON (RFC 8259). Every number in it is checked. */
+/* Parse the header of a safetensors file: strict JSON (RFC 8259). Every number in it is checked.
+ * Look up element types. */
 #include <inttypes.h>
 #include <limits.h>
 #include <stdarg.h>
@@ -13,6 +14,32 @@
 enum { PREFIX = 8, HEADER_MAX = 1 << 24, TENSORS_MAX = 1024, METADATA_MAX = 4096 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "tensors are little-endian");
+
+static const struct {
+  const char *name;
+  size_t size;
+} dtypes[SUPINE_DTYPE_COUNT] = {
+    [SUPINE_U8] = {"U8", 1},   [SUPINE_U32] = {"U32", 4}, [SUPINE_F32] = {"F32", 4},
+    [SUPINE_F64] = {"F64", 8}, [SUPINE_I16] = {"I16", 2},
+};
+
+const char *supine_safetensors_dtype_name(supine_dtype dtype) {
+  return dtypes[dtype].name;
+}
+
+size_t supine_safetensors_dtype_size(supine_dtype dtype) {
+  return dtypes[dtype].size;
+}
+
+bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
+  *size = supine_safetensors_dtype_size(tensor->dtype);
+  for (size_t i = 0; i < tensor->rank; ++i) {
+    if (__builtin_mul_overflow(*size, tensor->shape[i], size)) {
+      return false;
+    }
+  }
+  return true;
+}
 
 /* The header being parsed, which ends with a NUL. After the first failure, take() accepts no
  * character and the first error is kept. */
