@@ -83,18 +83,25 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
+/* Return a number of `bits` bits and a sign in steps of 1 << shift. */
+static int16_t coarse(int32_t number, int bits, int shift) {
+  const int32_t most = (1 << (bits - shift)) - 1;
+  const int32_t steps = (number + (1 << shift) / 2) >> shift;
+  return (int16_t)(steps < most ? steps : most);
+}
+
 /* Unpack the words of a vertex' normals, each of which holds three numbers (see supine.glsl): fill
- * the row with the first numbers of all words and axes, then the second ones, then the third ones.
- */
+ * the row with the first numbers of all words and axes, then the second ones, then the third ones,
+ * without their lowest 2, 2 and 1 bits (see basis.js). */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
   (void)p;
   (void)supine_gl_pack_normals(s->basis, vertex, vertex + 1, words);
   for (size_t i = 0; i < count; ++i) {
-    row[i] = (int16_t)((int32_t)words[i] >> 19);
-    row[count + i] = (int16_t)((int32_t)(words[i] << 13) >> 22);
-    row[2 * count + i] = (int16_t)((int32_t)(words[i] << 23) >> 23);
+    row[i] = coarse((int32_t)words[i] >> 19, 12, 2);
+    row[count + i] = coarse((int32_t)(words[i] << 13) >> 22, 9, 2);
+    row[2 * count + i] = coarse((int32_t)(words[i] << 23) >> 23, 8, 1);
   }
 }
 

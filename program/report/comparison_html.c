@@ -93,8 +93,10 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
                             supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->farthest_rms, false,
                                               "RMS distance from supine, mm"));
   if (c->postures.count > 1) {
+    json_t *outlines = supine_report_outlines(c);
+    json_t *drawn = json_object_get(json_array_get(outlines, 0), "lines");
     (void)json_object_set_new(data, "outlined",
-                              json_pack("{s:o}", "outlines", supine_report_outlines(c)));
+                              json_pack("{s:o, s:O}", "outlines", outlines, "drawn", drawn));
   }
   (void)json_object_set_new(data, "profiles", supine_report_profiles(c));
   json_t *pictures = supine_report_pictures(c, error);

@@ -74,7 +74,7 @@ class Outlines {
   /** Return the position of a plane as text. */
   placeWords(i) {
     const { state: { slices, body } } = this;
-    return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm below the apices` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from the front`;
+    return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm from the apex` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from front`;
   }
 
   /** Draw the outlines in the moment `now` and, dashed, in `from`. */
