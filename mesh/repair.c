@@ -8,7 +8,6 @@
 #include "sh/base/vec3.h"
 
 #include "mesh/repair.h"
-#include "mesh/sides.h"
 
 /* Largest share of loose triangles that are dropped; with more, the mesh is not a surface. */
 static const double few = 0.01;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Repair small, unambiguous defects of surfaces. */
+/** @file Repair small, unambiguous defects of surfaces; sort the sides of triangles by edge. */
 #ifndef SUPINE_MESH_REPAIR_H
 #define SUPINE_MESH_REPAIR_H
 
@@ -26,5 +26,17 @@ size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *pieces,
                                       size_t *specks);
+
+/** One side of a triangle, between vertices low < high. */
+typedef struct supine_mesh_side {
+  uint32_t low, high;
+  uint32_t at; /**< 3 * triangle + corner that the side starts at */
+} supine_mesh_side;
+
+/** Sort all sides by low, then high, then at; NULL if out of memory. The caller frees them. */
+supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
+
+/** Return the number of sides, from side i on, that belong to its edge. */
+size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t count);
 
 #endif

@@ -2,7 +2,7 @@
 /* Find edges by sorting the sides of the triangles, and components by union-find over the edges. */
 #include <stdlib.h>
 
-#include "mesh/sides.h"
+#include "mesh/repair.h"
 
 enum { FEW = 24 }; /* up to so many sides, insertion sort is faster than qsort */
 

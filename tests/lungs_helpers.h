@@ -13,7 +13,7 @@
 #include "mesh/mesh.h"
 #include "precompute/lungs/lungs.h"
 
-#include "precompute/lungs/geodesic.h"
+#include "precompute/lungs/phantom.h"
 #include "sh_helpers.h"
 
 /* Return a pseudo-random number in [0, 1). */

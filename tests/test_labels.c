@@ -649,7 +649,7 @@ TEST(test_labels_bad_maps_refused) {
     at[i] = at[i] == 0 ? 0 : i < voxels(&image) / 2 ? 1 : 2;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
-  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "do not lie beside each other");
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "does not lie left of the other");
   memset(at, 0, voxels(&image));
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "every voxel is 0");

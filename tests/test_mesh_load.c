@@ -135,20 +135,12 @@ TEST(test_load_degenerate_and_unreferenced_dropped_counted) {
   supine_mesh_free(&mesh);
 }
 
-/* Elements may stand in any order. */
-TEST(test_load_ply_faces_before_vertices_same_surface) {
-  char path[256];
-  const char *text = sample_text(
-      state, "order.ply",
-      "ply\nformat ascii 1.0\nelement face 4\nproperty list int int vertex_indices\n"
-      "element vertex 5\nproperty float x\nproperty float y\nproperty double z\nend_header\n"
-      "3 2 1 0\n3 0 1 3\n3 0 3 2\n3 2 3 1\n0 0 0\n120 0 0\n0 120 0\n0 0 120\n9 9 9\n",
-      path);
-  supine_mesh mesh = load(text, NULL, NULL);
-  static const uint32_t expected[] = {2, 1, 0, 0, 1, 3, 0, 3, 2, 2, 3, 1};
-  expect_tetrahedron(&mesh);
-  assert_memory_equal(mesh.triangles, expected, sizeof expected);
-  supine_mesh_free(&mesh);
+TEST(test_load_ply_faces_before_vertices_refused) {
+  refuse_text(state, "order.ply",
+              "ply\nformat ascii 1.0\nelement face 1\nproperty list int int vertex_indices\n"
+              "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+              "end_header\n3 0 1 2\n0 0 0\n1 0 0\n0 1 0\n",
+              SUPINE_ERROR_FORMAT, "before its vertices");
 }
 
 TEST(test_load_ply_strips_refused) {

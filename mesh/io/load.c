@@ -10,8 +10,6 @@
 
 #include "mesh/io/read.h"
 
-enum { HEAD_SIZE = 4096 };
-
 static supine_status cannot_read(const char *path, supine_error *error) {
   const int code = errno == 0 ? EIO : errno;
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
@@ -93,7 +91,7 @@ static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_err
   size_t size = 0;
   supine_status status = open_regular(file->path, &stream, &size, error);
   if (status == SUPINE_OK) {
-    status = read_bytes(stream, size < HEAD_SIZE ? size : HEAD_SIZE, file, error);
+    status = read_bytes(stream, size < MESH_HEAD_SIZE ? size : MESH_HEAD_SIZE, file, error);
   }
   if (status == SUPINE_OK) {
     supine_mesh_space_note(file, file->size);

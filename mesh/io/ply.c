@@ -204,8 +204,7 @@ static supine_status cut_short(const ply *in, const element *of, uint64_t item) 
       in->file->path, names[of->kind], (unsigned long long)item, (unsigned long long)of->count);
 }
 
-static supine_status take_list(ply *in, const element *of, uint64_t item, const property *list,
-                               bool add) {
+static supine_status take_list(ply *in, const element *of, uint64_t item, const property *list) {
   double corners[MESH_CORNERS_MAX];
   double length = 0.0;
   if (!take(in, list->count, &length)) {
@@ -226,14 +225,13 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
       corners[k] = value;
     }
   }
-  return add && list->role == CORNERS
+  return list->role == CORNERS
              ? supine_mesh_faces_add(&in->faces, corners, (size_t)count, in->error)
              : SUPINE_OK;
 }
 
-/* Read the items of an element.
- * @param add  add its faces; otherwise they are only skipped */
-static supine_status take_items(ply *in, const element *of, bool add) {
+/* Read the items of an element. */
+static supine_status take_items(ply *in, const element *of) {
   double *vertices = in->faces.mesh->vertices;
   supine_status status = SUPINE_OK;
   for (uint64_t i = 0; status == SUPINE_OK && i < of->count; ++i) {
@@ -244,7 +242,7 @@ static supine_status take_items(ply *in, const element *of, bool add) {
       const property *item = &in->properties[of->first_property + p];
       double value = 0.0;
       if (item->count != NULL) {
-        status = take_list(in, of, i, item, add);
+        status = take_list(in, of, i, item);
       } else if (!take(in, item->type, &value)) {
         return cut_short(in, of, i);
       } else if (item->role <= Z) {
@@ -284,22 +282,20 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
             .error = error,
             .text = {file->bytes, file->bytes + file->size},
             .faces = {.path = file->path, .mesh = mesh}};
-  size_t again = 0; /* elements to read again, as faces stand before the vertices */
   supine_status status = read_header(&in);
   status = status == SUPINE_OK ? check_header(&in) : status;
-  const unsigned char *body = in.text.at;
   if (status == SUPINE_OK) {
-    supine_mesh_space_note(file, (size_t)(body - file->bytes));
+    supine_mesh_space_note(file, (size_t)(in.text.at - file->bytes));
   }
   for (size_t e = 0; e < in.element_count && status == SUPINE_OK; ++e) {
     const element *of = &in.elements[e];
-    again = of->kind == FACES && mesh->vertices == NULL ? e + 1 : again;
-    status = of->kind == VERTICES ? make_room(&in, of, mesh) : SUPINE_OK;
-    status = status == SUPINE_OK ? take_items(&in, of, mesh->vertices != NULL) : status;
-  }
-  in.text.at = body;
-  for (size_t e = 0; e < again && status == SUPINE_OK; ++e) {
-    status = take_items(&in, &in.elements[e], true);
+    if (of->kind == FACES && mesh->vertices == NULL) {
+      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: its faces stand before its vertices; save the mesh again",
+                                file->path);
+    }
+    status = status == SUPINE_OK && of->kind == VERTICES ? make_room(&in, of, mesh) : status;
+    status = status == SUPINE_OK ? take_items(&in, of) : status;
   }
   *dropped = in.faces.dropped;
   return status;

@@ -60,7 +60,10 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- space.c ---- */
 
-/** Find SPACE= with three letters, and the word RAS, in the first `size` bytes; set tagged,
+enum { MESH_HEAD_SIZE = 4096 };
+
+/** Find SPACE= with three letters, and the word RAS, in the first `size` bytes, at most
+ * MESH_HEAD_SIZE; set tagged,
  * space and mentions_ras. */
 void supine_mesh_space_note(mesh_file *file, size_t size);
 

@@ -1,53 +1,36 @@
 /* SPDX-License-Identifier: MIT */
 /* Find the axes named by a comment in a file's head, as 3D Slicer writes them: SPACE=LPS. */
 #include <ctype.h>
+#include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
 #include "mesh/io/read.h"
 
 /* Find the next `word` from `at` on that no letter or digit precedes. */
-static const unsigned char *find_word(const unsigned char *at, const unsigned char *end,
-                                      const unsigned char *begin, const char *word) {
-  const size_t length = strlen(word);
-  for (; (size_t)(end - at) >= length; ++at) {
-    if (strncasecmp((const char *)at, word, length) == 0 && (at == begin || !isalnum(at[-1]))) {
-      return at;
-    }
-  }
-  return NULL;
-}
-
-static bool ends_word(const unsigned char *at, const unsigned char *end) {
-  return at == end || !isalnum(*at);
-}
-
-static bool find_space(const unsigned char *begin, const unsigned char *end, supine_axes *axes) {
-  static const char tag[] = "SPACE=";
-  const unsigned char *at = find_word(begin, end, begin, tag);
-  *axes = SUPINE_AXES_AUTO;
-  if (at == NULL) {
-    return false;
-  }
-  at += sizeof tag - 1;
-  if (end - at >= 3 && ends_word(at + 3, end)) {
-    const char letters[4] = {(char)toupper(at[0]), (char)toupper(at[1]), (char)toupper(at[2]),
-                             '\0'};
-    (void)supine_mesh_axes_parse(letters, axes);
-  }
-  return true;
-}
-
-static bool mentions_ras(const unsigned char *begin, const unsigned char *end) {
-  const unsigned char *at = begin;
-  while ((at = find_word(at, end, begin, "RAS")) != NULL && !ends_word(at + 3, end)) {
+static const char *find_word(const char *at, const char *begin, const char *word) {
+  while ((at = strcasestr(at, word)) != NULL && at > begin && isalnum((unsigned char)at[-1])) {
     ++at;
   }
-  return at != NULL;
+  return at;
 }
 
 void supine_mesh_space_note(mesh_file *file, size_t size) {
-  const unsigned char *end = file->bytes + (size < file->size ? size : file->size);
-  file->tagged = find_space(file->bytes, end, &file->space);
-  file->mentions_ras = mentions_ras(file->bytes, end);
+  char head[MESH_HEAD_SIZE + 1];
+  char letters[4] = "";
+  (void)snprintf(head, sizeof head, "%.*s", (int)(size < MESH_HEAD_SIZE ? size : MESH_HEAD_SIZE),
+                 (const char *)file->bytes);
+  const char *tag = find_word(head, head, "SPACE=");
+  const char *word = head;
+  file->tagged = tag != NULL;
+  file->space = SUPINE_AXES_AUTO;
+  if (tag != NULL && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
+    for (size_t k = 0; k < 3; ++k) {
+      letters[k] = (char)toupper((unsigned char)tag[strnlen(tag, 6 + k)]);
+    }
+    (void)supine_mesh_axes_parse(letters, &file->space);
+  }
+  while ((word = find_word(word, head, "RAS")) != NULL && isalnum((unsigned char)word[3])) {
+    ++word;
+  }
+  file->mentions_ras = word != NULL;
 }

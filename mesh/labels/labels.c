@@ -285,19 +285,6 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, value == LABELS_LEFT ? "left" : "right", w->edge);
 }
 
-/* Report whether the two surfaces' boxes lie beside each other, on either side. */
-static bool beside(const supine_mesh *surfaces) {
-  double low[2][3];
-  double high[2][3];
-  double apart[3];
-  supine_mesh_box(&surfaces[0], low[0], high[0]);
-  supine_mesh_box(&surfaces[1], low[1], high[1]);
-  for (int k = 0; k < 3; ++k) {
-    apart[k] = fabs(low[0][k] + high[0][k] - low[1][k] - high[1][k]);
-  }
-  return apart[0] > apart[1] && apart[0] > apart[2];
-}
-
 /* If the left lung does not lie left of the other, tell by the lungs' shape whether the labels
  * or the header are wrong. */
 static supine_status settle_doubt(const work *w, const supine_mesh *surfaces, supine_error *error) {
@@ -305,23 +292,15 @@ static supine_status settle_doubt(const work *w, const supine_mesh *surfaces, su
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);
   char letters[4];
   supine_mesh_axes_letters(supine_mesh_axes_after(report->coordinates, found.axes), letters);
-  if (!beside(surfaces)) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: labels %s do not lie beside each other, as two lungs do: name "
-                            "them with --labels left=...,right=... or --labels one, or add --axes "
-                            "%s if the header's are wrong",
-                            w->path, report->taken, letters);
-  }
-  return found.axes == SUPINE_AXES_LPS
-             ? supine_error_set(error, SUPINE_ERROR_MESH,
-                                "%s: by its header the left lung lies right of the other (labels "
-                                "%s): name them the other way round, --labels left=...,right=..., "
-                                "or the header's axes, --axes ABC",
-                                w->path, report->taken)
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "%s: by its header the left lung lies right of the other (labels "
-                                "%s), and its shape fits other axes: add --axes %s",
-                                w->path, report->taken, letters);
+  return supine_error_set(error, SUPINE_ERROR_MESH,
+                          "%s: by its header the left lung does not lie left of the other (labels "
+                          "%s). %s%s",
+                          w->path, report->taken,
+                          found.axes == SUPINE_AXES_LPS
+                              ? "Name the labels the other way round, --labels "
+                                "left=...,right=..., or give the header's axes, --axes ABC"
+                              : "Their shape fits other axes: if the labels are right, add --axes ",
+                          found.axes == SUPINE_AXES_LPS ? "" : letters);
 }
 
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,

@@ -27,21 +27,20 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s: no memory to check the surface", name);
   }
-  if (report.duplicates > 0) {
-    supine_findings_add(findings, "%s: note: dropped %zu duplicate triangle%s", name,
-                        report.duplicates, plural(report.duplicates));
-  }
-  if (report.loose > 0) {
-    supine_findings_add(findings, "%s: note: dropped %zu loose triangle%s", name, report.loose,
-                        plural(report.loose));
-  }
-  if (report.reversed > 0) {
-    supine_findings_add(findings, "%s: note: reversed %zu triangle%s that faced the other way",
-                        name, report.reversed, plural(report.reversed));
-  }
-  if (report.parted > 0) {
-    supine_findings_add(findings, "%s: note: surfaces touched at %zu point%s: separated there",
-                        name, report.parted, plural(report.parted));
+  const struct {
+    size_t count;
+    const char *done, *noun, *more;
+  } notes[] = {
+      {report.duplicates, "dropped", "duplicate triangle", ""},
+      {report.loose, "dropped", "loose triangle", ""},
+      {report.reversed, "reversed", "triangle", " that faced the other way"},
+      {report.parted, "surfaces touched at", "point", ": separated there"},
+  };
+  for (size_t i = 0; i < sizeof notes / sizeof *notes; ++i) {
+    if (notes[i].count > 0) {
+      supine_findings_add(findings, "%s: note: %s %zu %s%s%s", name, notes[i].done, notes[i].count,
+                          notes[i].noun, plural(notes[i].count), notes[i].more);
+    }
   }
   if (specks > 0) {
     supine_findings_add(findings,
