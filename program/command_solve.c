@@ -200,9 +200,8 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
   if (status == SUPINE_OK) {
     const supine_gravities gravity = {1, g, range, range + 1};
     supine_physics_force(lungs, &model->force, &gravity, n, NULL, force);
-    status =
-        supine_physics_pitcher_catcher(&lungs->mesh, &lungs->topology, model->stiffness, force,
-                                       pitcher_tolerance, caught, NULL, report_held, &n, error);
+    status = supine_physics_pitcher_catcher(&lungs->mesh, &lungs->topology, model->stiffness, force,
+                                            pitcher_tolerance, caught, report_held, &n, error);
   }
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     apart = fmax(apart, fabs(caught[i] - solution->catch_[i]));

@@ -35,7 +35,6 @@ typedef struct request {
   double noise;
 } request;
 
-static const char *const sends[] = {"weights", "points", "surface", "nothing", NULL};
 static const char *const spaces[] = {"lps", "ras", NULL};
 
 static const supine_option table[] = {
@@ -86,7 +85,8 @@ static const supine_option table[] = {
      "three gains of each lung; surface, a POLYDATA of points and triangle strips; points, a "
      "POLYDATA whose triangles are sent once. A peer chooses with a STRING of device SEND that "
      "holds one of these words",
-     SUPINE_FILLS(request, options.what), .choices = sends, .standard = "weights"},
+     SUPINE_FILLS(request, options.what), .choices = supine_stream_what_names,
+     .standard = "weights"},
     {"space", 0, "NAME", "axes of the points: lps (left, back, head), or ras as in 3D Slicer",
      SUPINE_FILLS(request, space), .choices = spaces, .standard = "lps"},
     {"name", 0, "NAME", "device name of the messages sent", SUPINE_FILLS(request, options.name),

@@ -186,8 +186,8 @@ const supine_option supine_command_model_options[] = {
      "uniform (default)\nlinear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a changes from FROM to TO "
      "linearly or exponentially along AXIS: x from the midline outwards, y from back to front, "
      "z from apex to base; linear:z:0.5:1.5 expands most at the base\nFILE: a for every "
-     "vertex: CSV with a header line, then one value per line in the vertex order of 'supine "
-     "solve' (left lung first), or vertex,value with vertices from 0",
+     "vertex: CSV with the column expandability, in the vertex order of 'supine solve' (left lung "
+     "first), or with the columns vertex,expandability, vertices from 0",
      FILLS(choice), .read = read_expandability, .file = SUPINE_FILE_IN,
      .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
               "above 0, or a file",

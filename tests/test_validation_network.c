@@ -129,7 +129,7 @@ TEST(test_pitcher_catcher_converges_before_mass_spring_damper) {
   size_t distributions = 0;
   assert_int_equal(frame_solve(&f, NULL, force, exact), SUPINE_OK);
   assert_int_equal(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, 1e-7, found,
-                                                  NULL, count_steps, &distributions, NULL),
+                                                  count_steps, &distributions, NULL),
                    SUPINE_OK);
   assert_true(relative_rms(n, found, exact) < 1e-6);
   mass_spring_damper system = damper_create(&f, stiffness, force);

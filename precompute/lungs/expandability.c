@@ -53,16 +53,16 @@ static bool parse_vertex(const char *text, size_t *vertex) {
 /* Read one row into `a` [count], where 0 marks the vertices without a value so far. */
 static supine_status take_row(const supine_csv *csv, size_t row, size_t count, double *a,
                               supine_error *error) {
-  const size_t last = csv->column_count - 1;
+  const char *number = supine_csv_text(csv, 1);
   size_t vertex = row;
   double value = 0.0;
-  if (last == 1 && !parse_vertex(csv->field[0], &vertex)) {
+  if (number != NULL && !parse_vertex(number, &vertex)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s:%zu: '%.40s' is not the number of a vertex: write a value, or "
                             "vertex,value",
-                            csv->path, csv->line, csv->field[0]);
+                            csv->path, csv->line, number);
   }
-  const supine_status status = supine_csv_number(csv, last, "expandability", &value, error);
+  const supine_status status = supine_csv_number(csv, 0, "expandability", &value, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -82,14 +82,6 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
 }
 
 static supine_status take_rows(supine_csv *csv, size_t count, double *a, supine_error *error) {
-  char *end = NULL;
-  (void)strtod(csv->field[0], &end);
-  if (end != csv->field[0] || csv->column_count > 2) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: a header line must come first: 'expandability', or "
-                            "'vertex,expandability'",
-                            csv->path, csv->line);
-  }
   bool more = true;
   supine_status status = SUPINE_OK;
   memset(a, 0, count * sizeof *a);
@@ -112,8 +104,9 @@ static supine_status take_rows(supine_csv *csv, size_t count, double *a, supine_
 
 supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
                                                supine_error *error) {
+  static const char *const columns[] = {"expandability", "vertex"};
   supine_csv csv;
-  supine_status status = supine_csv_open(path, NULL, 0, 0, &csv, error);
+  supine_status status = supine_csv_open(path, columns, 2, 1, &csv, error);
   if (status == SUPINE_OK) {
     status = take_rows(&csv, count, a, error);
     supine_csv_close(&csv);

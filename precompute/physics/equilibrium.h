@@ -107,14 +107,14 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
  * @param stiffness  [N] or NULL, as above
  * @param force      [N]
  * @param masses     [N] F of the masses, written
- * @param springs    [edge_count] F of the springs, written; NULL: not wanted
  * @param progress   called at the beginning and after every N distributions, with their number and
  *   the sum of what nodes still hold, |held|, relative to the sum of |f|; NULL: not wanted
- * @retval SUPINE_ERROR_ARGUMENT  no vertices, a tolerance or a stiffness that is not positive
+ * @param tolerance  above 0
+ * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_pitcher_catcher(
     const supine_mesh *mesh, const supine_topology *topology, const double *stiffness,
-    const double *force, double tolerance, double *masses, double *springs,
+    const double *force, double tolerance, double *masses,
     void (*progress)(void *context, size_t steps, double held), void *context, supine_error *error);
 
 /** Scale a stiffness [N] to geometric mean 1; NULL: 1 everywhere.

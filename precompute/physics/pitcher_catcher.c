@@ -139,27 +139,20 @@ static void distribute(iteration *it, size_t j) {
   }
 }
 
-/* Ten parameters and over 60 lines: the paper's algorithm with the paper's quantities, step by
+/* Nine parameters and over 50 lines: the paper's algorithm with the paper's quantities, step by
  * step. */
 supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,
-                               double *masses, double *springs,
+                               double *masses,
                                void (*progress)(void *context, size_t steps, double held),
                                void *context, supine_error *error) {
   const size_t n = mesh->vertex_count;
-  if (n == 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "there are no vertices: give a mesh");
-  }
   iteration it = {0};
   supine_status status = SUPINE_OK;
   double *scaled = malloc(n * sizeof *scaled);
   if (scaled == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu nodes", n);
-  }
-  if (!(tolerance > 0.0)) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the tolerance must be positive");
-    goto cleanup;
   }
   status = supine_physics_stiffness_normalise(n, stiffness, scaled, error);
   if (status != SUPINE_OK) {
@@ -195,9 +188,6 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
   }
   for (size_t i = 0; i < n; ++i) {
     masses[i] = it.caught[i];
-  }
-  for (size_t e = 0; springs != NULL && e < topology->edge_count; ++e) {
-    springs[e] = it.caught[n + e];
   }
 cleanup:
   iteration_free(&it);

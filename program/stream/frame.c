@@ -36,10 +36,7 @@ struct supine_stream_frames {
   supine_stream_frame *unused;         /* list of frames without users */
 };
 
-const char *supine_stream_what_name(supine_stream_what what) {
-  static const char *const names[] = {"weights", "points", "surface", "nothing"};
-  return (size_t)what < SUPINE_STREAM_WHAT_COUNT ? names[what] : NULL;
-}
+const char *const supine_stream_what_names[] = {"weights", "points", "surface", "nothing", NULL};
 
 /* Make strips of the triangles. Corners i, i + 1, i + 2 of a strip are a triangle, of the opposite
  * orientation where i is odd, or two of them are equal. */
@@ -255,7 +252,7 @@ bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame 
                                                             triangles ? frames->strips_count : 0,
                                                             triangles ? frames->strips_size : 0,
                                                             located ? 1 : 0, body);
-  parcel->count = 0;
+  parcel->first = parcel->count = 0;
   parcel->size = 0;
   add_piece(parcel, parcel->front, SUPINE_STREAM_HEADER + size);
   uint64_t crc = supine_stream_crc64(0, body, size);

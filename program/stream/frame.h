@@ -24,8 +24,8 @@ typedef enum supine_stream_what {
   SUPINE_STREAM_WHAT_COUNT
 } supine_stream_what;
 
-/** Return "weights", "points", "surface" or "nothing"; NULL past the last. */
-const char *supine_stream_what_name(supine_stream_what what);
+/** "weights", "points", "surface", "nothing", NULL. */
+extern const char *const supine_stream_what_names[SUPINE_STREAM_WHAT_COUNT + 1];
 
 /** State of the lungs at a time. */
 typedef struct supine_stream_moment {
@@ -83,8 +83,8 @@ enum {
 typedef struct supine_stream_parcel {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];
-  int count;
-  size_t size; /**< total length of the pieces, bytes */
+  int first, count; /**< first piece that is not sent yet; number of pieces */
+  size_t size;      /**< total length of the pieces, bytes */
 } supine_stream_parcel;
 
 /** Make the message of a frame, with a header of version 1, which all peers read. The first message

@@ -141,39 +141,28 @@ bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *fra
   peer->knows_triangles = peer->what == SUPINE_STREAM_POINTS;
   peer->begun = frame->number;
   peer->frame = frame;
-  peer->sent = 0;
   ++frame->users;
   return true;
 }
 
 supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer) {
-  size_t share = 1u << 20;
-  while (peer->sent < peer->parcel.size && share > 0) {
-    struct iovec rest[SUPINE_STREAM_PIECES];
-    int count = 0;
-    size_t passed = peer->sent;
-    size_t allowed = share;
-    for (int i = 0; i < peer->parcel.count && allowed > 0; ++i) {
-      const struct iovec *piece = &peer->parcel.piece[i];
-      if (passed >= piece->iov_len) {
-        passed -= piece->iov_len;
-        continue;
-      }
-      const size_t size = piece->iov_len - passed < allowed ? piece->iov_len - passed : allowed;
-      rest[count++] = (struct iovec){(unsigned char *)piece->iov_base + passed, size};
-      allowed -= size;
-      passed = 0;
-    }
-    const struct msghdr message = {.msg_iov = rest, .msg_iovlen = (size_t)count};
-    const ssize_t sent = sendmsg(peer->socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (sent < 0) {
-      if (errno == EINTR) {
-        continue;
-      }
-      return errno == EAGAIN || errno == EWOULDBLOCK ? SUPINE_STREAM_MORE : SUPINE_STREAM_LOST;
-    }
-    peer->sent += (size_t)sent;
-    share -= (size_t)sent;
+  supine_stream_parcel *parcel = &peer->parcel;
+  const struct msghdr message = {.msg_iov = parcel->piece + parcel->first,
+                                 .msg_iovlen = (size_t)(parcel->count - parcel->first)};
+  ssize_t sent = sendmsg(peer->socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent < 0) {
+    return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? SUPINE_STREAM_MORE
+                                                                     : SUPINE_STREAM_LOST;
   }
-  return peer->sent == peer->parcel.size ? SUPINE_STREAM_DONE : SUPINE_STREAM_MORE;
+  for (; parcel->first < parcel->count; ++parcel->first) {
+    struct iovec *piece = &parcel->piece[parcel->first];
+    const size_t passed = (size_t)sent < piece->iov_len ? (size_t)sent : piece->iov_len;
+    piece->iov_base = (unsigned char *)piece->iov_base + passed;
+    piece->iov_len -= passed;
+    sent -= (ssize_t)passed;
+    if (piece->iov_len > 0) {
+      return SUPINE_STREAM_MORE;
+    }
+  }
+  return SUPINE_STREAM_DONE;
 }

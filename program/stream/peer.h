@@ -22,11 +22,10 @@ typedef struct supine_stream_peer {
   double heard;        /**< when the socket was last found empty, s of the clock */
   /* data to send */
   supine_stream_what what;
-  bool knows_triangles;       /**< the next POINTS frame omits them */
-  uint64_t begun;             /**< number of the last frame given to it */
-  supine_stream_frame *frame; /**< being sent; NULL: none */
-  supine_stream_parcel parcel;
-  size_t sent; /**< bytes sent of the parcel */
+  bool knows_triangles;        /**< the next POINTS frame omits them */
+  uint64_t begun;              /**< number of the last frame given to it */
+  supine_stream_frame *frame;  /**< being sent; NULL: none */
+  supine_stream_parcel parcel; /**< what is left of it */
 } supine_stream_peer;
 
 /** Result of reading or sending. */
@@ -63,8 +62,8 @@ bool supine_stream_peer_ready(const supine_stream_peer *peer);
 bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
                              supine_stream_frame *frame);
 
-/** Send as much as the socket accepts, up to 1 MiB, so that no peer delays the others.
- * `peer->frame` remains when the frame is sent; the caller releases it. */
+/** Send as much as the socket's buffer accepts. `peer->frame` remains when the frame is sent; the
+ * caller releases it. */
 supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer);
 
 #endif

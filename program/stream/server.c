@@ -113,7 +113,7 @@ static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
 
 static void take_request(supine_stream_server *s, supine_stream_peer *peer, const char *text) {
   for (int what = 0; what < SUPINE_STREAM_WHAT_COUNT; ++what) {
-    if (strcmp(text, supine_stream_what_name((supine_stream_what)what)) == 0) {
+    if (strcmp(text, supine_stream_what_names[what]) == 0) {
       peer->what = (supine_stream_what)what;
       peer->knows_triangles = false;
       peer->begun = 0;

@@ -106,9 +106,9 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
 static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
                                 size_t required, supine_error *error) {
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
-    csv->column[c] = names == NULL && c < csv->field_count ? c : SIZE_MAX;
+    csv->column[c] = SIZE_MAX;
   }
-  for (size_t f = 0; f < csv->field_count && names != NULL; ++f) {
+  for (size_t f = 0; f < csv->field_count; ++f) {
     size_t c = 0;
     while (c < count && strcasecmp(csv->field[f], names[c]) != 0) {
       ++c;
@@ -143,9 +143,8 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
   supine_status status = SUPINE_OK;
   char *text = csv_line(csv, &status, error);
   if (status == SUPINE_OK && text == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: empty; expected a header%s%s%s",
-                              path, names != NULL ? " " : "", names != NULL ? names[0] : "",
-                              names != NULL ? ",..." : "");
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: empty; expected a header %s,...",
+                              path, names[0]);
   }
   if (status == SUPINE_OK) {
     csv->separator = strchr(text, ',') != NULL    ? ','

@@ -30,8 +30,7 @@ typedef struct supine_csv {
 } supine_csv;
 
 /* Open the file and read the header, which must have the first `required` of `names`, in any
- * case; other columns are ignored. Without names (NULL) any header is valid; it stays in `field`
- * until the first row, and columns are in its order. */
+ * case; other columns are ignored. */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
                               size_t required, supine_csv *csv, supine_error *error);
 

@@ -95,7 +95,7 @@ static void convergence(void) {
   for (int k = 1; k <= 13; ++k) {
     size_t steps = 0;
     need(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, pow(10.0, -k), found,
-                                        NULL, count_steps, &steps, NULL) == SUPINE_OK,
+                                        count_steps, &steps, NULL) == SUPINE_OK,
          "no solution");
     add_point(&c, (double)steps, found);
   }
