@@ -5,7 +5,7 @@
 
 #include "mesh/mesh.h"
 
-#include "program/breath/breath_frames.h"
+#include "program/options/breath_frames.h"
 
 #define SUPINE_BREATH_ENDINGS ".vtp or .safetensors"
 

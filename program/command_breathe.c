@@ -9,11 +9,11 @@
 #include "sh/base/clock.h"
 #include "sh/base/text.h"
 
-#include "program/breath/breath_frames.h"
-#include "program/breath/pv.h"
 #include "program/breath_output.h"
 #include "program/drawing.h"
 #include "program/options/basis_input.h"
+#include "program/options/breath_frames.h"
+#include "program/options/pv.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "breathe";

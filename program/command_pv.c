@@ -6,7 +6,7 @@
 
 #include <jansson.h>
 
-#include "program/breath/pv.h"
+#include "program/options/pv.h"
 
 #include "program/options/command.h"
 

@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "program/breath/pv.h"
 #include "program/export/export.h"
 #include "program/inside.h"
 #include "program/observed.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
+#include "program/options/pv.h"
 #include "program/options/state_options.h"
 #include "program/stream/address.h"
 #include "program/stream/tracked_patient.h"

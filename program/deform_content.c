@@ -10,7 +10,7 @@
 
 #include "mesh/mesh.h"
 #include "program/deform_content.h"
-#include "program/field/field.h"
+#include "program/field.h"
 #include "program/inside.h"
 
 /* Distance outside the lungs over which a field fades to 0, mm; grids of 'supine embed' have this

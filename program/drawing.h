@@ -6,8 +6,8 @@
 
 #include <supine/compare.h>
 
-#include "program/breath/breath_frames.h"
 #include "program/inside.h"
+#include "program/options/breath_frames.h"
 #include "program/options/state_options.h"
 #include "program/render/render.h"
 

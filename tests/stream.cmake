@@ -15,7 +15,7 @@ supine_stream_test(server supine_base Threads::Threads)
 
 # Programs that are run against a real server.
 find_package(Python3 COMPONENTS Interpreter)
-set(samples ${PROJECT_SOURCE_DIR}/program/stream/samples)
+set(samples ${PROJECT_SOURCE_DIR}/program/stream)
 set(with_server ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/with_server.py
   $<TARGET_FILE:supine>)
 if(Python3_EXECUTABLE)

@@ -16,8 +16,8 @@
 
 #include "command_helpers.h"
 #include "lungs_helpers.h"
-#include "program/breath/pv.h"
-#include "program/breath/breath_frames.h"
+#include "program/options/pv.h"
+#include "program/options/breath_frames.h"
 
 #include "tests/poses.h"
 

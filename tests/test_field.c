@@ -6,7 +6,7 @@
 
 #include "precompute/inside/content.h"
 #include "precompute/inside/embed.h"
-#include "program/field/field.h"
+#include "program/field.h"
 #include "sh/base/vec3.h"
 
 #include "tests/poses.h"

@@ -4,7 +4,7 @@
 
 #include "test.h"
 
-#include "program/breath/pv.h"
+#include "program/options/pv.h"
 
 #define assert_near(value, expected, within) assert_true(fabs((value) - (expected)) <= (within))
 

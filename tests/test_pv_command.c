@@ -2,7 +2,7 @@
 /* supine pv: exit codes and output. */
 #include "test.h"
 
-#include "program/breath/pv.h"
+#include "program/options/pv.h"
 
 #include "command_helpers.h"
 

@@ -2,7 +2,7 @@
 /* Files of pressure-volume samples and of fitted parameters. */
 #include "test.h"
 
-#include "program/breath/pv.h"
+#include "program/options/pv.h"
 
 static char folder[] = "/tmp/supine-pv-XXXXXX";
 static char path[64];

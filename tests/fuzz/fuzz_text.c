@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "precompute/lungs/expandability.h"
-#include "program/breath/pv.h"
+#include "program/options/pv.h"
 
 #include "fuzz.h"
 

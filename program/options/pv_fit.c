@@ -11,7 +11,7 @@
 #include <gsl/gsl_multifit_nlinear.h>
 #include <gsl/gsl_statistics.h>
 
-#include "program/breath/pv.h"
+#include "program/options/pv.h"
 
 enum {
   LOW = SUPINE_PV_CONTROLS, /* indices of V_low and V_high among the unknowns */

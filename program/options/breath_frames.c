@@ -6,7 +6,7 @@
 
 #include "sh/base/vec3.h"
 
-#include "program/breath/breath_frames.h"
+#include "program/options/breath_frames.h"
 
 /* Compute the direction 90 degrees from `from`, towards `to`. */
 static void find_quarter(const breath_turn *turn, double quarter[3]) {

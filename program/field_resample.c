@@ -8,7 +8,7 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-#include "program/field/field.h"
+#include "program/field.h"
 
 /* Number of voxels of a row that are processed together, by vector instructions. */
 enum { RUN = 128 };

@@ -7,7 +7,7 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-#include "program/field/field.h"
+#include "program/field.h"
 
 static const double tolerance = 1e-5;   /* residual at which iteration stops, mm */
 static const double lost_beyond = 0.01; /* residual above which a node counts as lost, mm */

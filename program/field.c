@@ -7,7 +7,7 @@
 
 #include "sh/base/vec3.h"
 
-#include "program/field/field.h"
+#include "program/field.h"
 
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell) {

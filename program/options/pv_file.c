@@ -6,7 +6,7 @@
 #include "sh/base/csv.h"
 #include "sh/base/output.h"
 
-#include "program/breath/pv.h"
+#include "program/options/pv.h"
 
 /* Read the limb that a column names; inhale where the file has no such column. */
 static supine_status read_limb(const supine_csv *csv, size_t column, supine_pv_limb *limb,
