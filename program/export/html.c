@@ -13,7 +13,7 @@
 
 extern const supine_asset supine_export_assets[]; /* files of page/, embedded by the build */
 
-enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3 };
+enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORMAL_BIAS = 128 };
 
 /* A page being printed. Positions and displacements are stored as 16-bit counts. */
 typedef struct page {
@@ -83,11 +83,12 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* Return a number of `bits` bits and a sign in steps of 1 << shift. */
+/* Return a number of `bits` bits and a sign in steps of 1 << shift, plus NORMAL_BIAS: numbers near
+ * 0 then have the same high byte, which compresses well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
   const int32_t steps = (number + (1 << shift) / 2) >> shift;
-  return (int16_t)(steps < most ? steps : most);
+  return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
 /* Unpack the words of a vertex' normals, each of which holds three numbers (see supine.glsl): fill

@@ -50,7 +50,7 @@ function takeTriangles(name, count) {
 }
 
 /** Take the normals and pack them as supine.glsl reads them: numbers of 13, 10 and 9 bits in each word, of which
- * the page holds all but the lowest 2, 2 and 1. */
+ * the page holds all but the lowest 2, 2 and 1, plus 128. */
 function takeNormals(vertices, words) {
   const columns = 3 * words;
   const counts = takeCounts('normals', vertices, 3 * columns);
@@ -58,7 +58,7 @@ function takeNormals(vertices, words) {
   const stride = counts.length / vertices;
   for (let i = 0; i < packed.length; ++i) {
     const at = Math.floor(i / columns) * stride + (i % columns);
-    packed[i] = (counts[at] << 21) | ((counts[at + columns] & 255) << 11) | ((counts[at + 2 * columns] & 255) << 1);
+    packed[i] = ((counts[at] - 128) << 21) | (((counts[at + columns] - 128) & 255) << 11) | (((counts[at + 2 * columns] - 128) & 255) << 1);
   }
   return packed;
 }
