@@ -4,7 +4,7 @@ supine_test(inverse supine_precompute supine_lungs supine_mesh_io)
 supine_test(force supine_precompute supine_lungs supine_mesh_io)
 supine_test(lit_angles supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(deform_lung supine_precompute supine_lungs supine_mesh_io)
-# What turning and breathing do to real lungs, within the ranges that evidence.py prints.
+# Effects of posture and breath on real lungs, within the ranges that evidence.py prints.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME evidence COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/evidence.py --check
     ${PROJECT_BINARY_DIR} ${SUPINE_LUNGS}/lungs ${SUPINE_LUNGS}/covid:RAS)
@@ -15,14 +15,14 @@ supine_test(lungs supine_precompute supine_lungs supine_mesh_io)
 supine_test(precompute supine_precompute supine_lungs supine_mesh_io umfpack)
 supine_test(program supine_sh_basis)
 target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:supine>")
-# Whole outputs of every command, as text files.
+# Whole output of the commands, against golden files.
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
 set_tests_properties(command_output PROPERTIES TIMEOUT 900)
-# Manual pages and completions, which are made from the same tables.
+# Manual pages and completions, made from the tables of options.
 add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_manual.sh $<TARGET_FILE:supine>
   ${PROJECT_BINARY_DIR}/packaging/manual)
-# Forty subjects through the cohort's workflow, where snakemake is installed.
+# Forty subjects in the cohort workflow, if snakemake is installed.
 add_test(NAME cohort COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_cohort.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
 set_tests_properties(cohort PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)

@@ -23,7 +23,7 @@ supine_test(runtime_basis runtime_fixture)
 supine_test(deform runtime_fixture)
 supine_test(deform_lit runtime_fixture)
 
-# The library as others have it: installed, through CMake and pkg-config.
+# The installed library, used by CMake and pkg-config.
 add_executable(make_basis example/make_basis.c)
 target_include_directories(make_basis PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
 target_link_libraries(make_basis PRIVATE supine_build runtime_fixture PkgConfig::CMOCKA)
@@ -36,14 +36,14 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
   set_tests_properties(install PROPERTIES TIMEOUT 900)
 endif()
 
-# The package for Python, by Debian's.
+# The Python package, by Debian's python.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
   set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 endif()
 
-# For Windows, where there is a compiler.
+# The library for Windows, if a compiler for it is installed.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME windows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_windows.sh ${CMAKE_COMMAND}
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER})
@@ -56,17 +56,17 @@ foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open cl
 endforeach()
 supine_test(runtime_threads runtime_fixture Threads::Threads)
 
-# The GPU form, where EGL is there to run it off screen; not under the thread sanitizer, which
-# cannot see into the driver's own threads.
+# The GPU shader, if EGL can run it without a window; not under the thread sanitizer, which does not know the
+# driver's threads.
 pkg_check_modules(EGL IMPORTED_TARGET egl glesv2)
 if(EGL_FOUND AND NOT SUPINE_SANITIZE MATCHES "thread")
   supine_test(glsl runtime_fixture PkgConfig::EGL)
   target_compile_definitions(test_glsl PRIVATE SUPINE_GLSL="${PROJECT_SOURCE_DIR}/runtime/supine.glsl")
-  # The driver's own leaks are none of ours.
+  # Ignore leaks of the driver.
   set_tests_properties(glsl PROPERTIES ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;LIBGL_ALWAYS_SOFTWARE=1")
 endif()
 
-# Rooms use the rooms that README says, and name what they show after themselves.
+# Includes follow the table of folders in ARCHITECTURE.md, and external names begin with the folder's name.
 if(Python3_FOUND)
   add_test(NAME house COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/house.py
     ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})

@@ -13,7 +13,7 @@ supine_stream_test(gravity)
 supine_stream_test(poses)
 supine_stream_test(server supine_base Threads::Threads)
 
-# Programs that are run against a real server.
+# Programs tested with a real server.
 find_package(Python3 COMPONENTS Interpreter)
 set(samples ${PROJECT_SOURCE_DIR}/program/stream)
 set(with_server ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/with_server.py
@@ -28,7 +28,7 @@ if(Python3_EXECUTABLE)
   add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
     ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples})
   set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
-  # The Unity sample, by Mono; its part in the engine against stand-ins for the engine's types.
+  # The Unity sample, compiled by Mono; UnityStub.cs replaces the types of the engine.
   find_program(MCS_PROGRAM mcs)
   find_program(MONO_PROGRAM mono)
   if(MCS_PROGRAM AND MONO_PROGRAM AND NOT SUPINE_SANITIZE)
@@ -54,7 +54,7 @@ if(Python3_EXECUTABLE)
   endif()
 endif()
 
-# The protocol's public library is what bytes and behaviour are held against.
+# Comparison with the public library of the protocol.
 find_library(IGTL_LIBRARY OpenIGTLink)
 find_path(IGTL_INCLUDE igtlMessageBase.h PATH_SUFFIXES openigtlink)
 if(IGTL_LIBRARY AND IGTL_INCLUDE)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// axe-core finds nothing on page and report, in both themes; every control of the page has a name;
-// what bounds a control stands out by 3 to 1.
+// axe-core reports nothing for the page and the report, in both themes; every control of the page has a
+// name, and its border a contrast of at least 3 to 1.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { browser, open, openLungs } from './browser.mjs';
@@ -17,7 +17,7 @@ async function check(page, what) {
   assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), [], what);
 }
 
-/** Contrast of two CSS colours as WCAG has it. */
+/** Return the contrast of two CSS colours as defined by WCAG. */
 function contrast(a, b) {
   const luminance = (hex) => {
     const [r, g, bl] = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));

@@ -13,7 +13,7 @@ export const browser = await chromium.launch({
     '--disable-sync', '--no-first-run'],
 });
 
-/** Opens a page and collects everything that it should not do. */
+/** Open a page and collect its errors and requests. */
 export async function open(path, options = {}, hash = '') {
   const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
   page.setDefaultTimeout(60000);
@@ -27,8 +27,8 @@ export async function open(path, options = {}, hash = '') {
   return { page, complaints };
 }
 
-/** The same for the page of a basis, drawn once, with all controls in reach; unless told, supine in a breath
- * with the patient still, as the tests' places on the picture want it. */
+/** Open the page of a basis, wait for the first drawing and show all controls. By default the patient is
+ * supine and still, as the positions in the picture used by tests require. */
 export async function openLungs(path, options, hash = '#posture=supine&depth=500&show=contours&room=0') {
   const opened = await open(path, options, hash);
   await opened.page.waitForFunction(() => window.supine?.panes().length > 0);
@@ -36,29 +36,29 @@ export async function openLungs(path, options, hash = '#posture=supine&depth=500
   return opened;
 }
 
-/** What the C evaluator makes of [gravity, mL] pairs, as evaluate() of support.mjs, in the page's order of vertices. */
+/** Evaluate [gravity, mL] pairs in C, as evaluate() of support.mjs, in the page's order of vertices. */
 export async function evaluateFor(page, basis, pairs) {
   const order = await orderOf(page, basis);
   return evaluate(basis, pairs).map(({ scale, xyz }) => ({ scale, xyz: inOrder(xyz, order) }));
 }
 
-/** The index in the basis of each vertex of the page, which orders them so that they compress well. */
+/** Return the index in the basis of each vertex of the page, which orders vertices for compression. */
 export async function orderOf(page, basis) {
   const rest = await page.evaluate(() => Array.from(window.supine.positions([0, 1, 0], 0)));
   return matchPoints(rest, evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, 0.1);
 }
 
-/** Presses a key on the picture, which alone listens to letters and digits. */
+/** Press a key on the picture, the only element that handles letters and digits. */
 export async function press(page, key) {
   await page.locator('#picture').focus();
   await page.keyboard.press(key);
 }
 
-/** The picture after it has been drawn. */
+/** Return the picture after it has been drawn. */
 export async function picture(page) {
   await settled(page);
   return page.locator('#picture').screenshot();
 }
 
-/** Wait until what was changed is drawn. */
+/** Wait until a change is drawn. */
 export const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The colours of pages, pictures and reports: equal steps of perception, lightness always rising, nothing cut off.
+// Colours of pages, pictures and reports: even perceptual steps, increasing lightness, and no clipping.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -15,7 +15,7 @@ const code = readFileSync(new URL('../../program/export/page/colour.js', import.
 const { tickStep, rangeEnd } = new Function(`${code}
   return { tickStep, rangeEnd };`)();
 
-/** OKLab of sRGB bytes. */
+/** Return the OKLab colour of sRGB bytes. */
 function oklab(bytes) {
   const [r, g, b] = Array.from(bytes, (x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4));
   const l = Math.cbrt(0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b);
@@ -41,7 +41,7 @@ for (const name of ['displacement', 'difference']) {
   assert.ok(ratio < 1.1, `${name}: steps differ by a factor of ${ratio}`);
 }
 
-// The report's bars are of one of the two, and its map's cells of the one of differences.
+// The report uses one of the two maps for its bars, and that of differences for the cells of its table.
 supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
 const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
@@ -57,7 +57,7 @@ const fills = [...new Set([...report.matchAll(/<path fill="(#[0-9a-f]{6})"/g)].m
 assert.ok(fills.length > 50, `the map has ${fills.length} colours`);
 for (const hex of fills) assert.ok(Array.from({ length: 256 }, (_, i) => i).some((i) => apart(hex, 'difference', i) <= 2), `${hex} is not of the map`);
 
-// The cases of tests/test_render.c: page, pictures and reports have one rule.
+// The cases of tests/test_render.c: page, pictures and reports follow the same rule.
 for (const [value, step, end] of [[31.6, 5, 35], [18.7, 2, 20], [20, 5, 20], [0.043, 0.01, 0.05], [7.99, 1, 8], [8, 2, 8], [0, 0.2, 1]]) {
   assert.ok(Math.abs(tickStep(value) - step) < 1e-12 && Math.abs(rangeEnd(value) - end) < 1e-12, `${value}: ${tickStep(value)}, ${rangeEnd(value)}`);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// .glb files: Khronos' validator has nothing to say, and three.js, given weights from Y_lm(g) as
-// the file's own extras describe them, makes the positions that the C evaluator makes.
+// GLB files: Khronos' validator reports nothing, and three.js computes the positions of the C evaluator from
+// weights made of Y_lm(g) as the extras of the file describe.
 import assert from 'node:assert/strict';
 import { readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
@@ -18,7 +18,7 @@ const PLAIN_MM = 0.001;
 const COUNTS_MM = 0.1; // base and targets are in counts of 0.045 mm
 const BREATH = 1000; // mL
 
-/** Asserts that the validator finds neither error nor warning. */
+/** Assert that the validator finds neither errors nor warnings. */
 async function validate(path) {
   const report = await validator.validateBytes(new Uint8Array(readFileSync(path)));
   assert.deepEqual(report.issues.messages.filter((message) => message.severity <= 1), [], path);
@@ -36,7 +36,7 @@ async function open(path) {
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
 const sum = (list) => list.reduce((total, x) => total + x, 0);
 
-/** What a lung gains at v, f . (x, y, z, yz, xz, xy, xyz) of the gains, from the forms in its extras. */
+/** Return the volume gained by a lung: f . (x, y, z, yz, xz, xy, xyz) of the gains, with f from its extras. */
 function volumeForm({ linear, quadratic, cubic }, v) {
   const k = v.length;
   const form = new Float64Array(7);
@@ -52,14 +52,14 @@ function volumeForm({ linear, quadratic, cubic }, v) {
 
 const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
 
-/** The root of an ascending or descending function near `from`, by secants. */
+/** Find the root of a monotonic function near `from`, by secants. */
 function root(f, from) {
   let [a, b] = [0.9 * from, from];
   for (let i = 0; i < 50 && f(b) !== f(a); ++i) [a, b] = [b, b - (f(b) * (b - a)) / (f(b) - f(a))];
   return b;
 }
 
-/** Gains [s, t] at which a form gains mL beyond the reference, of a lung that gains `rest` at rest. */
+/** Find the gains [s, t] at which a lung gains mL beyond the reference; it gains `rest` at rest. */
 function gainsFor(form, bend, rest, mL) {
   const even = (volume) => root((s) => formAt(form, [s, s, s]) - volume, volume / (form[0] + form[1] + form[2]));
   if (bend.every((c) => c === 0)) return [even(mL), 0];
@@ -69,7 +69,7 @@ function gainsFor(form, bend, rest, mL) {
   return [r * q, bent(q)];
 }
 
-/** Each lung's weights and s for a gravity and mL above rest, as the extras say. */
+/** Return each lung's weights and s for a gravity and mL above rest, as the extras describe. */
 function weightsFor(extras, lungs, gravity, mL) {
   const [y, y2] = [harmonics(extras.band, gravity), harmonics(2, gravity)];
   const v = extras.modes.map((row) => extras.modeUnit * dot(row, y));
@@ -93,7 +93,7 @@ function weightsFor(extras, lungs, gravity, mL) {
 
 const setWeights = (meshes, weights) => meshes.forEach((mesh, i) => mesh.morphTargetInfluences.splice(0, weights[i].length, ...weights[i]));
 
-/** Positions of a mesh as three.js morphs them, in the patient's axes and millimetres. */
+/** Return the positions of a mesh morphed by three.js, in the patient's axes and mm. */
 function morphed(mesh, { middle, millimetresPerUnit }) {
   const count = mesh.geometry.attributes.position.count;
   const xyz = new Float64Array(3 * count);
@@ -107,7 +107,7 @@ function morphed(mesh, { middle, millimetresPerUnit }) {
 
 const together = (meshes, extras) => Float64Array.from(meshes.flatMap((mesh) => [...morphed(mesh, extras)]));
 
-/** Unit normals [N] of triangles, by area. */
+/** Return unit normals [N], weighted by the area of triangles. */
 function exactNormals(xyz, corners) {
   const sums = Array.from({ length: xyz.length / 3 }, () => new three.Vector3());
   const at = (v) => new three.Vector3().fromArray(xyz, 3 * v);
@@ -119,7 +119,7 @@ function exactNormals(xyz, corners) {
   return sums.map((n) => n.normalize());
 }
 
-/** Angles, degrees, between a lung's own normals and those that engines morph. */
+/** Return the angles between the normals of a lung's surface and the morphed ones, degrees. */
 function normalErrors(mesh, extras) {
   const { attributes, morphAttributes, index } = mesh.geometry;
   const [made, part] = [new three.Vector3(), new three.Vector3()];
@@ -133,7 +133,7 @@ function normalErrors(mesh, extras) {
 const mean = (list) => sum(list) / list.length;
 const at95 = (list) => list.sort((a, b) => a - b)[Math.floor(0.95 * list.length)];
 
-/** Positions, each lung's volume by its own weights, and normals, of random states. */
+/** Check positions, volumes by each lung's weights, and normals in random states. */
 async function check(basis, words, tolerance) {
   const path = join(folder, 'lungs.glb');
   supine('export', basis, '-o', path, '--breath', String(BREATH), ...words);
@@ -165,7 +165,7 @@ async function check(basis, words, tolerance) {
   assert.ok(mean(angles) < least && at95(angles) < 3, 'normals are off');
 }
 
-/** The clips play: each posture has one, with gravity down and the lungs where the library puts them. */
+/** Check the clips: one for each posture, with gravity downwards and the lungs where the library puts them. */
 async function checkAnimations(basis) {
   const path = join(folder, 'animated.glb');
   supine('export', basis, '-o', path, '--animate');
@@ -173,7 +173,7 @@ async function checkAnimations(basis) {
   const { gltf, lungs, extras } = await open(path);
   const order = matchPoints(together(lungs, extras), evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, COUNTS_MM);
   assert.deepEqual(gltf.animations.map((clip) => clip.name), ['turning', 'supine', 'left side', 'prone', 'right side']);
-  // All are at the top of a 500 mL breath at 1.5 s; the first lies on the back then, on the belly at 13.5 s.
+  // At 1.5 s all clips are at the peak of a breath of 500 mL. The first is supine then, and prone at 13.5 s.
   for (const [clip, seconds, gravity] of [[0, 1.5, [0, 1, 0]], [0, 13.5, [0, -1, 0]], [1, 1.5, [0, 1, 0]], [2, 1.5, [1, 0, 0]], [3, 1.5, [0, -1, 0]], [4, 1.5, [-1, 0, 0]]]) {
     const mixer = new three.AnimationMixer(gltf.scene);
     mixer.clipAction(gltf.animations[clip]).play();
@@ -190,7 +190,7 @@ async function checkAnimations(basis) {
   }
 }
 
-/** Colours are of moves: their red, linear, goes with the largest move in a lying posture. */
+/** Check colours: linear red follows the largest displacement in a lying posture. */
 async function checkColours(basis) {
   const path = join(folder, 'coloured.glb');
   supine('export', basis, '-o', path, '--plain');

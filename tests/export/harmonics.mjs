@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Real spherical harmonics from the closed form of the associated Legendre functions, on purpose
-// not by the recurrence that the program and the page use.
+// Real spherical harmonics from the closed form of the associated Legendre functions, independent of the
+// recurrence used by the program and the page.
 
 /** d^m/dz^m P_l(z), as a sum of powers: coefficients exact up to l = 15 in doubles. */
 function legendreDerivative(l, m, z) {
@@ -19,7 +19,7 @@ function legendreDerivative(l, m, z) {
   return sum;
 }
 
-/** Every Y_lm with l <= band at a unit vector, at l * l + l + m. */
+/** Return all Y_lm with l <= band at a unit vector, at index l * l + l + m. */
 export function harmonics(band, [x, y, z]) {
   const values = new Float64Array((band + 1) ** 2);
   const phi = Math.atan2(y, x);

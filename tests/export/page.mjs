@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page in headless Chromium: it loads from disk without a request or a complaint, computes the
-// C evaluator's positions on the graphics side, and answers to its controls.
+// The page in headless Chromium: it loads from disk without requests or errors, computes the positions of
+// the C evaluator on the GPU, and its controls work.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { browser, evaluateFor, openLungs as open, picture, press } from './browser.mjs';
@@ -8,7 +8,7 @@ import { folder, largestDistance, randomDirections, randomSource, supine } from 
 
 const TOLERANCE_MM = 0.02; // of counts of 16 bits
 
-/** Positions read back from the graphics card, against the C evaluator. */
+/** Compare positions read back from the GPU with the C evaluator. */
 async function checkPositions(page, basis, volume) {
   const random = randomSource(5);
   const pairs = randomDirections(10, 999).map((g) => [g, volume * (0.1 + 0.9 * random())]);

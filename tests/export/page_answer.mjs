@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page's first view answers: lying on the left side at rest, the cards and bars say what the
-// command says, outlines enclose the lungs' volumes, colours can be found on the bar again, and all
-// of it is there in a small window, in forced colours and without WebGL.
+// The first view of the page: in left lateral decubitus at rest, cards and bars show the numbers of the
+// command, outlines enclose the lungs' volumes, and colours are on the bar; also in a small window, with
+// forced colours and without WebGL.
 import assert from 'node:assert/strict';
 import { openLungs, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';

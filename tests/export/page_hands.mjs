@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page by pointer, touch and keyboard: every key and button does what it says, numbers can be
-// typed, probes measure what the program computes, gravity's arrow is seen from every side, motion is
-// as long as it should be, and a lost context comes back with camera, posture and pins.
+// The page by pointer, touch and keyboard: every key and button works, numbers can be typed, probes measure
+// what the program computes, the arrow of gravity is visible from all sides, motion has the right duration,
+// and a lost context is restored with camera, posture and pins.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,7 +12,7 @@ import { folder, inOrder, supine } from './support.mjs';
 const PROBE_MM = 0.06; // of a distance written with one digit
 const state = (page, name) => page.evaluate((key) => window.supine.state[key], name);
 
-/** Keys change what they say, and a second press or its opposite undoes it. */
+/** Keys have their documented effect, and a second press or the opposite key undoes it. */
 async function checkKeys(page) {
   await page.locator('#picture').focus();
   const press = async (...keys) => { for (const key of keys) await page.keyboard.press(key); await settled(page); };
@@ -45,7 +45,7 @@ async function checkKeys(page) {
   assert.equal(await state(page, 'playing'), false);
 }
 
-/** The views' buttons, double click, full screen and the picture to keep. */
+/** Buttons of views, double click, full screen and saving the picture. */
 async function checkButtons(page) {
   for (const [letter, azimuth, elevation] of [['A', 0, 0], ['P', Math.PI, 0], ['L', -Math.PI / 2, 0], ['R', Math.PI / 2, 0], ['H', 0, Math.PI / 2], ['F', 0, -Math.PI / 2]]) {
     await page.locator('#views button').filter({ hasText: letter }).click();
@@ -76,7 +76,7 @@ async function checkButtons(page) {
   await page.waitForFunction(() => document.fullscreenElement === null);
 }
 
-/** Typed numbers are taken, and held within their ends; what is no number is not. */
+/** Typed numbers are accepted and limited to their range; other text is not accepted. */
 async function checkTyped(page) {
   const type = async (id, text) => { await page.locator(id).fill(text); await page.keyboard.press('Enter'); await settled(page); };
   await type('#depth-number', '123');
@@ -101,7 +101,7 @@ async function checkTyped(page) {
   await page.evaluate(() => document.activeElement.blur());
 }
 
-/** What probes say is what the library computes, between two of them as well. */
+/** Probes, and distances between them, show what the library computes. */
 async function checkProbes(page) {
   await press(page, '2');
   await settled(page);
@@ -131,7 +131,7 @@ async function checkProbes(page) {
   assert.ok(Math.abs(Number(before) - apart(at(rest, probes[0]), at(rest, probes[1]))) < PROBE_MM);
 }
 
-/** With probes, a camera of its own and a reference, a context lost comes back pixel for pixel. */
+/** With probes, a moved camera and a reference, a lost context is restored pixel by pixel. */
 async function checkLoss(page) {
   await press(page, '3');
   await page.evaluate(() => { document.getElementById('pin').click(); document.getElementById('beside').click(); });
@@ -149,7 +149,7 @@ async function checkLoss(page) {
   await page.locator('#probes-clear').click();
 }
 
-/** Pixels of the arrow's hue, lit or seen through something. */
+/** Count pixels with the hue of the arrow, lit or behind something transparent. */
 const warmPixels = (page) => page.evaluate(() => {
   const { picture: p, panes } = window.supine;
   const pane = panes()[0];
@@ -165,7 +165,7 @@ const warmPixels = (page) => page.evaluate(() => {
   return count;
 });
 
-/** Gravity's arrow is seen from every side, whatever hides it. */
+/** The arrow of gravity is visible from all sides. */
 async function checkArrow(page) {
   await page.evaluate(() => { window.supine.picture.drawGravity = () => {}; });
   assert.equal(await warmPixels(page), 0, 'something else has the arrow\'s colour');
@@ -181,7 +181,7 @@ async function checkArrow(page) {
   }
 }
 
-/** What the page writes, the program reads: the same direction. */
+/** A direction written by the page is read by the program unchanged. */
 async function checkNotation(page) {
   const order = await orderOf(page, basis);
   for (const gravity of [[0.6, 0, -0.8], [0, 0.9659258, 0.2588190], [0, -0.9396926, 0.3420201], [0, 0, -1]]) {
@@ -195,7 +195,7 @@ async function checkNotation(page) {
   }
 }
 
-/** A finger's drag turns, two fingers zoom and move, a tap keeps a probe: as touch events. */
+/** Touch: dragging with a finger rotates, two fingers zoom and pan, a tap keeps a probe. */
 async function checkTouch() {
   const { page, complaints } = await openLungs(html, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const cdp = await page.context().newCDPSession(page);
@@ -230,8 +230,8 @@ async function checkTouch() {
   await page.close();
 }
 
-/** Where motion is wanted a posture takes its time, and ends where it should; where it is not, none.
- * Slow frames do not slow the breath: what the state is told adds up to the frames' own clock. */
+/** A change of posture is animated, except with reduced motion, and ends in the right posture. Slow frames do
+ * not slow the breath: the steps of its state sum to the time of the frames. */
 async function checkMotion() {
   const { page, complaints } = await openLungs(html, { viewport: { width: 1000, height: 700 }, reducedMotion: 'no-preference' });
   const frames = await page.evaluate(() => new Promise((done) => {
@@ -270,7 +270,7 @@ async function checkMotion() {
   await page.close();
 }
 
-/** What is said at the pointer lies within what the library computes around there, for each colour. */
+/** The value at the pointer is within the range that the library computes around it, for each quantity. */
 async function checkKinds(page) {
   await press(page, '1');
   await press(page, 'n');
@@ -318,7 +318,7 @@ async function checkKinds(page) {
   await page.mouse.move(5, 5);
 }
 
-/** Whatever is written over the lungs has a ground of its own, against which it can be read. */
+/** Text over the lungs has its own background with enough contrast. */
 async function checkLegible(page) {
   for (const theme of ['light', 'dark']) {
     await page.evaluate((name) => { if (document.documentElement.dataset.theme !== name) document.getElementById('theme').click(); }, theme);
@@ -346,7 +346,7 @@ async function checkLegible(page) {
   await page.evaluate(() => { if (document.documentElement.dataset.theme !== 'light') document.getElementById('theme').click(); });
 }
 
-/** Plain words first, the rest behind a button. */
+/** Plain text first, details behind a button. */
 async function checkWords(page) {
   assert.match(await page.locator('#title > :last-child p').textContent(), /not for diagnosis/);
   const behind = await page.evaluate(() => [...document.querySelectorAll('dl#facts dd')].map((e) => [e.textContent, e.closest('details').open]));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is inside the lungs, in the page: it is where `supine deform` puts it, says its name and its
-// move at the pointer and in a table that keyboards reach, and can be hidden. Pictures are kept in
-// page_inside/ beside the test.
+// Content inside the lungs, in the page: it is where `supine deform` puts it, shows name and displacement at
+// the pointer and in a table usable by keyboard, and can be hidden. Pictures are kept in page_inside/ beside
+// the test.
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,13 +11,13 @@ import { folder, largestDistance, loadCommon, supine } from './support.mjs';
 
 const axe = loadCommon('axe-core').source;
 const TOLERANCE_MM = 0.02; // of counts of 16 bits
-const PRINTED_MM = 0.001;   // of a text file's numbers
-const WRITTEN_MM = 0.051;   // of a move as the table has it
+const PRINTED_MM = 0.001;   // resolution of numbers in text files
+const WRITTEN_MM = 0.051;   // resolution of displacements in the table
 const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
 const PARTS = [...NAMES, 'tumour', 'metastasis'];
 const files = Object.fromEntries(['tumour.obj', 'metastasis.obj', 'points.csv', 'inside.safetensors', 'inside.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
 
-/** Four named points, and an octahedron that is a mesh. */
+/** Embed four named points and a mesh, an octahedron. */
 const at = [[-80, -120, -90], [60, -150, -110], [70, -160, -60], [-70, -90, -150]];
 writeFileSync(files['points.csv'], `name,x,y,z\n${at.map((p, i) => `${NAMES[i]},${p.join(',')}\n`).join('')}`);
 const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]].map((c) => c.map((x, i) => 14 * x + [80, -110, -130][i]));
@@ -27,7 +27,7 @@ writeFileSync(files['metastasis.obj'], `${corners.map((c) => `v ${c.map((x, i) =
 supine('embed', basis, files['points.csv'], files['tumour.obj'], files['metastasis.obj'], '--rigid', 'metastasis', '-o', files['inside.safetensors']);
 supine('export', basis, '--inside', files['inside.safetensors'], '-o', files['inside.html']);
 
-/** What the program makes of it: {name: [places]}. */
+/** Return the positions that the program computes: {name: [positions]}. */
 function deformed(posture, volume) {
   supine('deform', files['inside.safetensors'], '--posture', posture, '--volume', volume, '-o', files['moved.csv']);
   const places = {};
@@ -38,7 +38,7 @@ function deformed(posture, volume) {
   return places;
 }
 
-/** Positions on the graphics card, in postures and at volumes, against the program's. */
+/** Compare positions on the GPU with the program's, in several postures and volumes. */
 async function checkPositions(page) {
   let worst = 0;
   for (const [posture, gravity, volume] of [['supine', [0, 1, 0], 0], ['prone', [0, -1, 0], 320], ['left', [1, 0, 0], 700], ['0.6:0:-0.8', [0.6, 0, -0.8], 150]]) {
@@ -61,7 +61,7 @@ async function checkPositions(page) {
 const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
 const mean = (values) => values.reduce((sum, x) => sum + x, 0) / values.length;
 
-/** The moves that the table has are those between the program's places. */
+/** Displacements in the table are the differences of the program's positions. */
 async function checkTable(page) {
   const rest = deformed('supine', 'rest');
   await press(page, '2');
@@ -87,7 +87,7 @@ async function checkTable(page) {
   return rest;
 }
 
-/** Where a part is on the page. */
+/** Return the position of a part in the picture. */
 const onPage = (page, name) => page.evaluate((wanted) => {
   const { basis: { inside }, insidePositions, state, panes } = window.supine;
   const xyz = insidePositions(state.gravity, state.depth);
@@ -109,7 +109,7 @@ async function pointed(page, [x, y]) {
   return page.locator('#pointed').isVisible().then((shown) => (shown ? page.locator('#pointed').textContent() : ''));
 }
 
-/** The name and the move are at the pointer, through the lungs; not through whole ones, and not when
+/** Name and displacement are shown at the pointer through transparent lungs, but not through opaque ones or if
  * hidden. */
 async function checkPointer(page, rest) {
   const depth = await page.evaluate(() => window.supine.state.depth);
@@ -130,7 +130,7 @@ async function checkPointer(page, rest) {
   await page.locator('#inside').check();
 }
 
-/** Showing and hiding, keeping names by keyboard and by pointer, a link that brings them back. */
+/** Showing, hiding and pinning names by keyboard and pointer; a link restores them. */
 async function checkControls(page) {
   await page.mouse.move(5, 5);
   const before = await picture(page);
@@ -171,7 +171,7 @@ async function checkControls(page) {
   await again.close();
 }
 
-/** A lost context comes back with what is inside. */
+/** A lost context is restored with the content. */
 async function checkLoss(page) {
   await page.mouse.move(5, 5);
   const before = await picture(page);
@@ -203,7 +203,7 @@ async function checkSizes() {
   }
 }
 
-/** Many names are searched; more than can be read are not all listed, and that is said. */
+/** Many names can be searched; a list too long to show is shortened with a note. */
 async function checkMany() {
   const count = 230;
   writeFileSync(files['points.csv'], `name,x,y,z\n${Array.from({ length: count }, (_, i) => `node ${i},${60 + (i % 10)},${-150 + (i % 7)},${-110 + (i % 13)}\n`).join('')}`);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page of lungs at full inflation: volumes count from each posture's rest, normals are the
-// surface's, a right lung alone is named and lettered as one, and a headset is offered where there is
-// one.
+// The page of lungs at full inflation: volumes count from rest in each posture, normals are those of the
+// surface, a single right lung is labelled as such, and a headset is offered if there is one.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -14,7 +13,7 @@ const PRINTED_MM = 0.001; // of a text file's numbers
 
 const both = (page, gravity, depth) => page.evaluate(([g, mL]) => [Array.from(window.supine.positions(g, mL)), Array.from(window.supine.normals(g, mL))], [gravity, depth]);
 
-/** The page's depth is above the posture's rest, for the library and for the program. */
+/** The volume of the breath counts from the posture's rest in page, library and program. */
 async function checkRest(page) {
   for (const gravity of [...randomDirections(4, 31), [1, 0, 0]]) {
     const [found] = await both(page, gravity, 320);
@@ -30,7 +29,7 @@ async function checkRest(page) {
   assert.ok(largestDistance(found, inOrder(said, await orderOf(page, basis))) < TOLERANCE_MM + PRINTED_MM);
 }
 
-/** The graphics card's normals beside those of the triangles, by area. */
+/** Compare the normals on the GPU with area-weighted normals of the triangles. */
 async function checkNormals(page) {
   const corners = await page.evaluate(() => Array.from(window.supine.basis.corners));
   const angles = [];
@@ -56,7 +55,7 @@ async function checkNormals(page) {
   assert.ok(mean < 0.1 && p999 < 1, `mean ${mean}, 99.9th percentile ${p999}`);
 }
 
-/** A lung alone is the one that its place says, and its letters are around it. */
+/** A single lung is named by its position, with letters around it. */
 async function checkRight(page) {
   const { xyz, corners } = await page.evaluate(() => {
     const { basis: b } = window.supine;
@@ -98,7 +97,7 @@ async function checkRight(page) {
   await alone.close();
 }
 
-/** A headset that is not there: two eyes on the halves of the canvas. */
+/** A simulated headset: two eyes on the halves of the canvas. */
 function pretendHeadset() {
   const eye = (shift) => ({
     projectionMatrix: new Float32Array([1.2, 0, 0, 0, 0, 1.2, 0, 0, 0, 0, -1.01, -1, 0, 0, -0.1, 0]),

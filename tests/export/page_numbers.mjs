@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One question, one number: how far a nodule and the surface move is the same in `compare`, `deform`
-// and the page, from supine at rest and from what --from names; the page's sentence is true in every
-// posture. Lungs fill one gain for all (version 2) and, where the file has it, one each.
+// The displacements of a nodule and of the surface are the same in `compare`, `deform` and the page, from
+// supine at rest and from a state given by --from; the page's sentence is right in every posture. Checked
+// with one gain for all lungs (version 2) and with one for each.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -14,8 +14,8 @@ const [points, inside, html, moved, vtp] = ['nodule.csv', 'nodule.safetensors', 
 writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\n');
 supine('embed', basis, points, '-o', inside);
 
-/** What the program says of a posture at rest: the nodule by `compare` and `deform`, the surface by
- * `compare` (mean, largest), `deform` (largest). */
+/** Return the program's numbers for a posture at rest: the nodule by `compare` and `deform`, the surface by
+ * `compare` (mean, largest) and `deform` (largest). */
 function told(posture, from) {
   const pair = JSON.parse(supine('compare', inside, '--postures', `supine,${posture}`, '--json'))[0];
   const report = JSON.parse(supine('compare', basis, '--postures', posture, '--json', '--from', from).replace(/^[^{]*/, ''));
@@ -25,7 +25,7 @@ function told(posture, from) {
   return { pair: pair.mm, nodule: Number(row[columns.indexOf('moved_mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml, error: report.postures[0].expected_error_mm };
 }
 
-/** What the page shows of it. */
+/** Return the numbers of the page. */
 async function shown(page, posture) {
   await page.evaluate((text) => { location.hash = `posture=${text}&depth=0`; }, posture);
   await page.waitForFunction((text) => document.getElementById('posture-name').value === text, posture);
@@ -70,7 +70,7 @@ const { page, complaints } = await openLungs(html);
 const directions = [[0, -1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, -1], [0, 0, 1], ...randomDirections(20, 41)].map((g) => g.map((x) => Number(x.toFixed(2))));
 const places = (await evaluateFor(page, basis, [[[0, 1, 0], 0], ...directions.map((g) => [g, 0])])).map(({ xyz }) => xyz);
 const { lungBegin, corners, lungs } = await page.evaluate(() => { const { basis: b } = window.supine; return { lungBegin: b.lungBegin, corners: Array.from(b.corners), lungs: b.lungNames }; });
-/** mL that a lung's triangles enclose. */
+/** Return the volume enclosed by a lung's triangles, mL. */
 const enclosed = (xyz, lung) => {
   let sum = 0;
   for (let t = 0; t < corners.length; t += 3) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page at four sizes in two themes: nothing is cut, a tap keeps a probe; pictures of each are kept
-// in page_sizes/ beside the test.
+// The page at four sizes in two themes: nothing is cut off, and a tap keeps a probe. Pictures are kept in
+// page_sizes/ beside the test.
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,7 +9,7 @@ import { html } from './lungs.mjs';
 
 mkdirSync('page_sizes', { recursive: true });
 
-/** Letters stay off what lies over the picture, gravity's arrow and each other. */
+/** Letters do not overlap panels, the arrow of gravity or each other. */
 async function checkLetters(page, what) {
   const { letters, plates, arrow } = await page.evaluate(() => {
     const middle = (box) => [box.x + box.width / 2, box.y + box.height / 2];

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What people reach for in the page: views, pan, zoom, postures, probes, cut, links, a lost context.
+// Functions of the page: views, pan, zoom, postures, probes, cut, links, a lost context.
 import assert from 'node:assert/strict';
 import { browser, openLungs, picture, settled, press } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 
-/** The letters that are shown, and where. */
+/** Return the visible letters and their positions. */
 const letters = (page) => page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => {
   const box = e.getBoundingClientRect();
   return [e.textContent, [box.x + box.width / 2, box.y + box.height / 2]];
 })));
 
-/** From each side the letters are where the body's axes are. */
+/** In each view the letters are at the body's axes. */
 async function checkViews(page) {
   const expected = { a: ['R', 'L', 'H', 'F'], p: ['L', 'R', 'H', 'F'], l: ['A', 'P', 'H', 'F'], r: ['P', 'A', 'H', 'F'], f: ['R', 'L', 'A', 'P'], h: ['R', 'L', 'P', 'A'] };
   for (const [key, [left, right, top, bottom]] of Object.entries(expected)) {
@@ -32,7 +32,7 @@ async function checkViews(page) {
   assert.ok(left > middle);
 }
 
-/** Zoom keeps what is under the pointer; panning moves it along. */
+/** Zooming keeps the point under the pointer; panning moves it with the pointer. */
 async function checkCamera(page) {
   const box = await page.locator('#picture').boundingBox();
   const [x, y] = [box.x + box.width * 0.6, box.y + box.height * 0.4];
@@ -57,7 +57,7 @@ async function checkCamera(page) {
   await press(page, '0');
 }
 
-/** Postures are written as the program reads them. */
+/** Postures are written in the syntax of the program. */
 async function checkPostures(page) {
   const texts = await page.evaluate(() => {
     const { postureText, postureFrom, gravityOf } = window.supine;
@@ -79,7 +79,7 @@ async function checkPostures(page) {
   await page.locator('#posture-name').blur();
 }
 
-/** Each thing that can be shown changes the picture, and is undone. */
+/** Each display option changes the picture, and can be undone. */
 async function checkShown(page) {
   await page.mouse.move(750, 6); // off the picture, so that nothing is pointed at
   for (const [name, act, undo] of [
@@ -100,7 +100,7 @@ async function checkShown(page) {
   }
 }
 
-/** Probes stay on the tissue, and measure between each other; a link brings all of it back. */
+/** Probes move with the tissue and measure distances; a link restores them. */
 async function checkProbes(page) {
   const box = await page.locator('#picture').boundingBox();
   for (const [x, y] of [[0.38, 0.5], [0.62, 0.55]]) {
@@ -124,7 +124,7 @@ async function checkProbes(page) {
   await page.locator('#probes-clear').click();
 }
 
-/** A context that is lost comes back with the same picture. */
+/** A lost context is restored with the same picture. */
 async function checkLoss(page) {
   await press(page, '3');
   await page.mouse.move(5, 5);
@@ -136,7 +136,7 @@ async function checkLoss(page) {
   assert.ok((await picture(page)).equals(before), 'the picture is another after the loss of the context');
 }
 
-/** Idle pages draw nothing; a frame that moves costs little script. */
+/** An idle page draws nothing; a moving frame needs little script time. */
 async function checkFrames(page) {
   const [drawn, median] = await page.evaluate(async () => {
     const { picture: p, touch } = window.supine;

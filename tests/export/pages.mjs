@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every test of what a browser shows, in one process with one Chromium: node pages.mjs [NAME...]
+// All browser tests in one process with one Chromium: node pages.mjs [NAME...]
 import { browser } from './browser.mjs';
 
 const all = ['page', 'page_answer', 'page_hands', 'page_inside', 'page_lungs', 'page_numbers', 'page_views', 'page_sizes', 'accessibility', 'report'];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report as it prints: on A4 and on Letter every heading and every number is there, inside the
-// sheet, with page numbers and provenance; and what its letters say is where the lungs are.
+// The printed report: on A4 and Letter every heading and number is inside the sheet, with page numbers and
+// provenance, and its letters are on the right sides of the lungs.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tests of exported files share. SUPINE and POSITIONS name the two programs, MODULES the
-// folder of npm's packages. A test that cannot run ends with 77, which CTest reports as skipped.
+// Helpers for tests of exported files. SUPINE and POSITIONS name the two programs, MODULES the folder of npm's
+// packages. A test that cannot run ends with 77, which CTest reports as skipped.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
@@ -14,14 +14,14 @@ export function skip(reason) {
   process.exit(77);
 }
 
-/** Imports a file of an npm package, or skips. */
+/** Import a file of an npm package, or skip the test. */
 export async function load(path) {
   const file = join(process.env.MODULES, 'node_modules', path);
   if (!existsSync(file)) skip(`${path} is not installed: npm install in tests/export`);
   return import(pathToFileURL(file));
 }
 
-/** The same for packages that are CommonJS. */
+/** Import a CommonJS package, or skip the test. */
 export function loadCommon(name) {
   const require = createRequire(pathToFileURL(join(process.env.MODULES, 'package.json')));
   try {
@@ -35,11 +35,11 @@ export function supine(...words) {
   return execFileSync(process.env.SUPINE, words, { encoding: 'utf8' });
 }
 
-/** A folder that goes when the test ends. */
+/** A folder that is removed when the test ends. */
 export const folder = mkdtempSync(join(tmpdir(), 'supine-export-'));
 process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
 
-/** Numbers from 0 to 1 (mulberry32). */
+/** Return a generator of numbers from 0 to 1 (mulberry32). */
 export function randomSource(seed) {
   let state = seed >>> 0;
   return () => {
@@ -50,7 +50,7 @@ export function randomSource(seed) {
   };
 }
 
-/** Directions all over the sphere. */
+/** Return directions over the whole sphere. */
 export function randomDirections(count, seed) {
   const random = randomSource(seed);
   return Array.from({ length: count }, () => {
@@ -61,7 +61,7 @@ export function randomDirections(count, seed) {
   });
 }
 
-/** What the C evaluator makes of [gravity, mL] pairs: {scale, xyz} each. */
+/** Evaluate [gravity, mL] pairs in C: {scale, xyz} for each. */
 export function evaluate(basis, pairs) {
   const bytes = execFileSync(
     process.env.POSITIONS, [basis, ...pairs.map(([g, volume]) => [...g, volume].join(','))],
@@ -88,10 +88,10 @@ export function matchPoints(points, others, tolerance) {
   return found;
 }
 
-/** Points [N, 3] in another order. */
+/** Permute points [N, 3]. */
 export const inOrder = (points, order) => Float64Array.from(order.flatMap((i) => [...points.subarray(3 * i, 3 * i + 3)]));
 
-/** Largest distance between two arrays of points. */
+/** Return the largest distance between two arrays of points. */
 export function largestDistance(a, b) {
   assert.equal(a.length, b.length);
   let largest = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pose every basis in states and hold what the package gives, here or in a browser, against plain C.
+// Evaluate each basis in several states by the package, in node or a browser, and compare with plain C.
 import assert from 'node:assert/strict';
 import { bases, native } from './made.mjs';
 import { largestDistance } from '../export/support.mjs';
@@ -17,7 +17,7 @@ async function check(basis, states, ask) {
   }
 }
 
-/** What both node and a browser run: results of an open basis as arrays. */
+/** Run in node and in a browser: return the results of an open basis as arrays. */
 export function pose(lungs, states) {
   return states.map((state) => {
     lungs.pose(state).deformLit();
@@ -25,7 +25,7 @@ export function pose(lungs, states) {
   });
 }
 
-/** Compare every basis in its last states: `ask(basis, states)` gives what `pose` does. */
+/** Compare each basis in its last states; `ask(basis, states)` returns the results of `pose`. */
 export async function checkAll(ask, most = Infinity) {
   for (const [basis, states] of bases) await check(basis, states.slice(-most), ask);
   console.log(`${bases.length} bases as in C`);

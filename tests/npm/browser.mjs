@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The package for JavaScript in Chromium: as plain C; the examples draw lungs that move as C's do.
+// The JavaScript package in Chromium: same results as plain C, and the examples draw moving lungs.
 import assert from 'node:assert/strict';
 import { copyFileSync, existsSync, readFileSync, symlinkSync, writeFileSync } from 'node:fs';
 import { basename, extname, join } from 'node:path';
@@ -7,7 +7,7 @@ import { checkAll, pose } from './agree.mjs';
 import { browser, settled } from '../export/browser.mjs';
 import { folder } from '../export/support.mjs';
 
-/** A page of a folder as a server would give it: nothing leaves this process. */
+/** Serve a page of a folder within this process, without a network. */
 const origin = 'http://lungs.test/';
 const kinds = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
 async function visit(path) {
@@ -34,7 +34,7 @@ await checkAll((basis, states) => page.evaluate(async ([file, states, code]) => 
 }, [`/${basename(basis)}`, states, pose.toString()]), 2);
 await page.close();
 
-/** Take a picture: its pixels as grey values. */
+/** Take a picture; return its pixels as grey values. */
 async function look(page) {
   await settled(page);
   const shot = (await page.screenshot()).toString('base64');
@@ -47,7 +47,7 @@ async function look(page) {
   }, shot);
 }
 
-/** Two pictures of an example differ, and each shows something that fills a good part of it. */
+/** Check that two pictures of an example differ, and each is filled to a good part. */
 async function check(name, change) {
   if (!existsSync(join(process.env.MODULES, 'node_modules', name))) {
     console.log(`${name} is not installed: its example is not tried`);

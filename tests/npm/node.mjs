@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The package for JavaScript in node: as plain C, as small and as fast as promised; what it refuses; README's lines; types.
+// The JavaScript package in node: same results as plain C, size, speed, refused input, README's example and types.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The Unity sample's link against a real server: TestLink.exe PORT BASIS
+// Test the link of the Unity sample with a real server: TestLink.exe PORT BASIS
 using System;
 using System.Diagnostics;
 using System.Threading;
@@ -24,8 +24,7 @@ static class TestLink
         return most;
     }
 
-    // Six times the enclosed volume, positive where triangles are in the order that the axes take for
-    // outward faces.
+    // Return six times the enclosed volume, positive if triangles face outwards in these axes.
     static double Volume(float[] p, int[] t)
     {
         double sum = 0;
@@ -56,14 +55,13 @@ static class TestLink
 
     static int Main(string[] words)
     {
-        // Rows; columns: where left, back and head point in a room whose z is up.
+        // Rows of matrices whose columns are the directions of left, back and head in a room whose z is up.
         float[][] rotations = {
             new float[] { 1, 0, 0, 0, 0, 1, 0, -1, 0 },
             new float[] { -1, 0, 0, 0, 0, 1, 0, 1, 0 },
             new float[] { 0, -1, 0, 0, 0, 1, -1, 0, 0 },
             new float[] { 0, 1, 0, 0, 0, 1, 1, 0, 0 } };
-        // The same as turns of an object in Unity, from standing: face up and face down about x, then on
-        // a side about z.
+        // The same as rotations of a standing object in Unity: supine and prone about x, then lateral about z.
         const float h = 0.70710678f;
         Quaternion[] turns = { new Quaternion(-h, 0, 0, h), new Quaternion(h, 0, 0, h),
                                new Quaternion(0, 0, h, h), new Quaternion(0, 0, -h, h) };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The live page in headless Chromium, two viewers of it: they show the posture of the last pose that
-// a tracker sent, then of the tilt that one of them has. stream_page.mjs PAGE PORT
+// The live page with two viewers in headless Chromium: they show the posture of the tracker's last pose, then
+// of the tilt of one viewer. stream_page.mjs PAGE PORT
 import assert from 'node:assert/strict';
 import { createConnection } from 'node:net';
 import { load, skip } from '../export/support.mjs';
@@ -10,7 +10,7 @@ if (!site) skip('no page is served: the program was built without libwebsockets'
 const { chromium } = await load('playwright-core/index.mjs');
 if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
 
-/** CRC-64 of ECMA-182, by the bit. */
+/** Compute the CRC-64 of ECMA-182 bit by bit. */
 function crc64(bytes) {
   let crc = 0n;
   for (const byte of bytes) {
@@ -20,7 +20,7 @@ function crc64(bytes) {
   return crc;
 }
 
-/** A TRANSFORM: where left, back and head point in a room whose z is up. */
+/** Make a TRANSFORM: directions of left, back and head in a room whose z is up. */
 function transform(left, back, head) {
   const body = Buffer.alloc(48);
   [...left, ...back, ...head].forEach((x, i) => body.writeFloatBE(x, 4 * i));
@@ -58,7 +58,7 @@ const viewers = [await view(), await view()];
 const ages = () => Promise.all(viewers.map((page) => page.evaluate(() => window.supineLive.age())));
 assert.deepEqual(await ages(), ['no tracker yet', 'no tracker yet']);
 
-/** Every viewer comes to show that gravity, and the volume that the server was told. */
+/** Wait until every viewer shows this gravity and the volume of the server. */
 async function expectGravity(wanted, what) {
   for (const page of viewers) {
     await page.waitForFunction((g) => {
@@ -90,14 +90,14 @@ await viewers[1].waitForFunction(() => /^pose (1[.]5|[2-9]).* s old$/.test(windo
 viewers.push(await view()); // who comes late is told the same
 assert.match(await viewers[2].evaluate(() => window.supineLive.age()), /^pose (1\.[5-9]|[2-9]\.\d|\d\d+) s old$/);
 await viewers.pop().close();
-// A fast tracker: the last of many poses is what is seen.
+// A fast tracker: the last of many poses is shown.
 for (let i = 0; i <= 400; ++i) {
   const a = (i / 400) * 2.1;
   tracker.write(transform([Math.cos(a), 0, Math.sin(a)], [Math.sin(a), 0, -Math.cos(a)], [0, 1, 0]));
 }
 await expectGravity([-Math.sin(2.1), Math.cos(2.1), 0], 'the last of many');
 
-// A phone on the breastbone, as its sensor says: screen up, on its left edge, upright.
+// A phone on the breastbone, by its sensor: screen up, on its left edge, upright.
 const phone = await context.newCDPSession(viewers[0]);
 assert.ok(await viewers[0].getByRole('button', { name: /tilt/ }).isVisible());
 await viewers[0].getByRole('button', { name: /tilt/ }).click();
@@ -107,7 +107,7 @@ for (const [name, beta, gamma, gravity] of [
   await phone.send('DeviceOrientation.setDeviceOrientationOverride', { alpha: 30, beta, gamma });
   await expectGravity(gravity, name);
 }
-// The page, too, is this machine's own: another address of the loopback is refused.
+// The page is served on 127.0.0.1 only: another address of the loopback is refused.
 const elsewhere = await new Promise((done) => {
   const socket = createConnection(Number(new URL(site).port), '127.0.0.2');
   socket.on('connect', () => done('let in')).on('error', (error) => done(error.code));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A peer by the protocol's public library, its own classes: stream_peer PORT BASIS
-// Sends each posture as the library packs it, and holds the frames that come back, as the library
-// unpacks and checks them, against the run-time library.
+// A peer that uses the public library of the protocol: stream_peer PORT BASIS
+// Send each posture packed by that library, and compare the frames, unpacked and checked by it, with the run-time
+// library.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -39,7 +39,7 @@ template <class Message> static void send(Message &message, const char *device) 
   expect(peer->Send(message->GetPackPointer(), message->GetPackSize()) != 0, "a message is sent");
 }
 
-// The next message of a type that answers the last pose.
+// Receive the next message of a type that answers the last pose.
 template <class Pointer> static void receive(Pointer message, const char *type) {
   for (int i = 0; i < 10000; ++i) {
     igtl::MessageHeader::Pointer header = igtl::MessageHeader::New();
@@ -96,7 +96,7 @@ static void expect_weights(const supine_basis *basis, const supine_pose &pose) {
 
 typedef std::array<uint32_t, 3> Triangle;
 
-// A triangle as it faces, from its lowest corner.
+// Rotate the corners of a triangle so that the lowest comes first; orientation is kept.
 static Triangle face(uint32_t a, uint32_t b, uint32_t c) {
   Triangle t = {a, b, c};
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
@@ -141,7 +141,7 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   expect(received == wanted, "every triangle once, as it faces");
 }
 
-// Where left, back and head point in a room whose z is up.
+// Directions of left, back and head in a room whose z is up.
 struct Lie {
   const char *posture;
   float left[3], back[3], head[3];
@@ -184,7 +184,7 @@ int main(int count, char **word) {
     expect(supine_posture_gravity(lie.posture, gravity) == SUPINE_OK, lie.posture);
     expect_weights(basis, pose_of(basis, gravity, 400.0));
   }
-  // Quaternions: a body that stands, laid back by 90 degrees about its left-right axis: supine.
+  // Quaternions: a standing body rotated backwards by 90 degrees about its left-right axis is supine.
   const double supine[3] = {0, 1, 0};
   const float half = 0.70710678f;
   igtl::PositionMessage::Pointer position = igtl::PositionMessage::New();
@@ -206,7 +206,7 @@ int main(int count, char **word) {
   send(tracked, "Tracker");
   const double prone[3] = {0, -1, 0};
   expect_weights(basis, pose_of(basis, prone, 400.0));
-  // Other volumes; what a number alone counts from is not said, and it changes nothing.
+  // Other volumes; a bare number is refused and changes nothing.
   for (const char *text : {"rest+500", "500"}) {
     say("VOLUME", text);
     send_transform(lies[1]);
