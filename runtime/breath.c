@@ -1,9 +1,176 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute a breath: the course of pressure, and the volume that the limbs give it. */
+/* Compute volume, compliance and pressure along a limb, and a breath: the course of pressure, and
+ * the volume that the limbs give it. */
 #include <math.h>
 #include <stdbool.h>
 
-#include "runtime/limb.h"
+#include <supine/breath.h>
+
+/* Number of equal parts into which a limb's range is divided for integration. Within their bounds,
+ * the control parameters change the compliance by at most e^500 over the range, and so by at most
+ * e^16 over a part, which a rule of 16 points integrates to 1e-15. */
+enum { LIMB_PARTS = 32 };
+
+/* One limb, integrated once and then evaluated at pressures and volumes. */
+typedef struct integrated {
+  supine_pv_curve curve;
+  double sum[LIMB_PARTS + 1]; /* I(x) at the ends of the parts (supine_breath_curve_evaluate) */
+} integrated;
+
+const char *supine_breath_limb_name(supine_pv_limb limb) {
+  return limb == SUPINE_PV_INHALE ? "inhale" : limb == SUPINE_PV_EXHALE ? "exhale" : "unknown limb";
+}
+
+supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_error *error) {
+  const double pressures = curve->pressure[1] - curve->pressure[0];
+  const double volumes = curve->volume[1] - curve->volume[0];
+  if (!(pressures > 0.0) || !isfinite(pressures)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the limb's pressures must rise from %g to %g cmH2O",
+                            curve->pressure[0], curve->pressure[1]);
+  }
+  if (!(volumes > 0.0) || !isfinite(volumes)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the limb's volumes must rise from %g to %g mL", curve->volume[0],
+                            curve->volume[1]);
+  }
+  for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
+    if (!(fabs(curve->control[i]) <= SUPINE_PV_CONTROL_MAX)) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "control parameter c%d is %g; it must be within +-%d", i + 1,
+                              curve->control[i], (int)SUPINE_PV_CONTROL_MAX);
+    }
+  }
+  return SUPINE_OK;
+}
+
+/* Compute exp(U(x)), the slope of I. U's terms are integrals of Legendre polynomials,
+ * (P_n+1 - P_n-1) / (2 n + 1) from -1 to x. */
+static double slope(const supine_pv_curve *curve, double x) {
+  double before = 1.0;
+  double here = x;
+  double sum = curve->control[0] * (x + 1.0);
+  for (int n = 1; n < SUPINE_PV_CONTROLS; ++n) {
+    const double next = ((2 * n + 1) * x * here - n * before) / (n + 1); /* P_n+1 */
+    sum += curve->control[n] * (next - before) / (2 * n + 1);
+    before = here;
+    here = next;
+  }
+  return exp(sum);
+}
+
+/* Integrate the slope between two x by the Gauss-Legendre rule of 16 points [Abramowitz and Stegun,
+ * table 25.4]. */
+static double integrate(const supine_pv_curve *curve, double from, double to) {
+  static const double point[8] = {
+      0.0950125098376374402, 0.2816035507792589132, 0.4580167776572273863, 0.6178762444026437484,
+      0.7554044083550030339, 0.8656312023878317439, 0.9445750230732325761, 0.9894009349916499326};
+  static const double weight[8] = {
+      0.1894506104550684963, 0.1826034150449235888, 0.1691565193950025382, 0.1495959888165767321,
+      0.1246289712555338720, 0.0951585116824927848, 0.0622535239386478929, 0.0271524594117540949};
+  const double middle = 0.5 * (from + to);
+  const double half = 0.5 * (to - from);
+  double sum = 0.0;
+  for (int i = 0; i < 8; ++i) {
+    sum += weight[i] *
+           (slope(curve, middle - half * point[i]) + slope(curve, middle + half * point[i]));
+  }
+  return half * sum;
+}
+
+static double part_begin(int part) {
+  return -1.0 + 2.0 * part / LIMB_PARTS;
+}
+
+/* Integrate a curve that supine_breath_curve_check accepts. */
+static void limb_begin(const supine_pv_curve *curve, integrated *of) {
+  of->curve = *curve;
+  of->sum[0] = 0.0;
+  for (int part = 0; part < LIMB_PARTS; ++part) {
+    of->sum[part + 1] = of->sum[part] + integrate(curve, part_begin(part), part_begin(part + 1));
+  }
+}
+
+/* Compute V(P) and dV/dP (NULL: not wanted); a pressure outside the range counts as its end. */
+static double limb_volume(const integrated *of, double pressure, double *compliance) {
+  const supine_pv_curve *curve = &of->curve;
+  const double low = curve->pressure[0];
+  const double high = curve->pressure[1];
+  const double gain = (curve->volume[1] - curve->volume[0]) / of->sum[LIMB_PARTS];
+  const double raw = ((pressure - low) - (high - pressure)) / (high - low);
+  const double x = raw < -1.0 ? -1.0 : raw > 1.0 ? 1.0 : raw;
+  if (compliance != NULL) {
+    *compliance = 2.0 * gain / (high - low) * slope(curve, x);
+  }
+  const int part = (int)(0.5 * (x + 1.0) * LIMB_PARTS);
+  if (part == LIMB_PARTS) {
+    return curve->volume[1];
+  }
+  const double within = x > part_begin(part) ? integrate(curve, part_begin(part), x) : 0.0;
+  return curve->volume[0] + gain * (of->sum[part] + within);
+}
+
+/* Compute P(V) for a volume within the range, to within 1e-11 of the range of volumes.
+ * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
+static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
+  enum { STEPS_MAX = 200 };
+  const supine_pv_curve *curve = &of->curve;
+  const double span = curve->volume[1] - curve->volume[0];
+  const double within = 1e-11 * span;
+  const double share = (volume - curve->volume[0]) / span;
+  double low = curve->pressure[0];
+  double high = curve->pressure[1];
+  double before = HUGE_VAL; /* |V - volume| at the pressure before, mL */
+  double at = (1.0 - share) * low + share * high;
+  for (int step = 0; step < STEPS_MAX; ++step) {
+    double compliance = 0.0;
+    const double held = limb_volume(of, at, &compliance);
+    const double miss = fabs(held - volume);
+    if (held < volume) {
+      low = at;
+    } else {
+      high = at;
+    }
+    double next = at + (volume - held) / compliance;
+    const bool inside = next >= low && next <= high;
+    if (miss <= within || high - low <= 1e-15 * fabs(at)) {
+      *pressure = inside ? next : at; /* Newton's last step costs nothing */
+      return SUPINE_OK;
+    }
+    /* Take the Newton step, or the middle of the bracket if the step leaves it or if the last step
+     * did not halve the error. */
+    if (!inside || miss > 0.5 * before) {
+      next = low + 0.5 * (high - low);
+    }
+    before = miss;
+    at = next;
+  }
+  return SUPINE_ERROR_NUMERICAL;
+}
+
+supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t count,
+                                           const double *pressures, double *volumes,
+                                           double *compliances, supine_error *error) {
+  const supine_status status = supine_breath_curve_check(curve, error);
+  if (status != SUPINE_OK || count == 0) {
+    return status;
+  }
+  integrated of;
+  limb_begin(curve, &of);
+  for (size_t j = 0; j < count; ++j) {
+    if (!(pressures[j] >= curve->pressure[0] && pressures[j] <= curve->pressure[1])) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "pressure %g cmH2O is outside the limb's range, %g to %g cmH2O",
+                              pressures[j], curve->pressure[0], curve->pressure[1]);
+    }
+    const double volume =
+        limb_volume(&of, pressures[j], compliances == NULL ? NULL : &compliances[j]);
+    if (volumes != NULL) {
+      volumes[j] = volume;
+    }
+  }
+  return SUPINE_OK;
+}
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
@@ -59,7 +226,7 @@ static double breath_share(const supine_pv_breath *breath, double time, supine_p
 /* The P-V loop of one breath. */
 typedef struct loop {
   double rest, peak; /* pressures, cmH2O */
-  supine_limb limb[SUPINE_PV_LIMB_COUNT];
+  integrated limbs[SUPINE_PV_LIMB_COUNT];
   double volume[SUPINE_PV_LIMB_COUNT]; /* volume at rest, mL */
   double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained from rest to peak, mL */
 } loop;
@@ -92,8 +259,8 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
     return status;
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    supine_limb_begin(&pv->limb[limb], &cycle->limb[limb]);
-    cycle->volume[limb] = supine_limb_volume(&cycle->limb[limb], cycle->rest, NULL);
+    limb_begin(&pv->limb[limb], &cycle->limbs[limb]);
+    cycle->volume[limb] = limb_volume(&cycle->limbs[limb], cycle->rest, NULL);
   }
   const double rest = cycle->volume[SUPINE_PV_INHALE];
   const double full = rest + breath->tidal;
@@ -103,14 +270,13 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
                             "gains above %g cmH2O",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
-  status = supine_limb_pressure(&cycle->limb[SUPINE_PV_INHALE], full, &cycle->peak);
+  status = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak);
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "no pressure found for %g mL on the inhale limb", full);
   }
   status = limb_holds(pv, "peak", cycle->peak, error);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
-    cycle->gain[limb] =
-        supine_limb_volume(&cycle->limb[limb], cycle->peak, NULL) - cycle->volume[limb];
+    cycle->gain[limb] = limb_volume(&cycle->limbs[limb], cycle->peak, NULL) - cycle->volume[limb];
     if (!(cycle->gain[limb] > 0.0)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL, "the %s limb is too flat between %g and %g cmH2O",
@@ -131,13 +297,13 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
   static const double pi = 3.14159265358979323846;
   supine_pv_limb of = SUPINE_PV_INHALE;
   double share = breath_share(breath, time, &of);
-  const supine_limb *limb = &cycle->limb[of];
+  const integrated *here = &cycle->limbs[of];
   if (breath->course == SUPINE_PV_CONSTANT_FLOW) {
     const double low = cycle->volume[of];
     const double high = low + cycle->gain[of];
     *volume = breath->tidal * share;
     const supine_status status =
-        supine_limb_pressure(limb, between(low + share * cycle->gain[of], low, high), pressure);
+        limb_pressure(here, between(low + share * cycle->gain[of], low, high), pressure);
     return status == SUPINE_OK ? status
                                : supine_error_set(error, status, "no pressure found at %g s", time);
   }
@@ -145,7 +311,7 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
     share = 0.5 - 0.5 * cos(pi * share);
   }
   *pressure = between(cycle->rest + share * (cycle->peak - cycle->rest), cycle->rest, cycle->peak);
-  const double gained = supine_limb_volume(limb, *pressure, NULL) - cycle->volume[of];
+  const double gained = limb_volume(here, *pressure, NULL) - cycle->volume[of];
   *volume = breath->tidal * between(gained / cycle->gain[of], 0.0, 1.0);
   return SUPINE_OK;
 }

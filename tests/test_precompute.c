@@ -347,19 +347,6 @@ TEST(test_precompute_other_directions_stated_error) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_real_lung_stated_error_right_and_small) {
-  static const char *const names[] = {"lungs/chaste_left_5k.obj"};
-  supine_lungs lungs = {0};
-  if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &lungs)) {
-    skip();
-    return;
-  }
-  check_stated_error(&lungs, 3, 0, 0.0);
-  check_error_elsewhere(&lungs, 3, 0, 0.0, "chaste_left_5k, 16 harmonics");
-  check_error_elsewhere(&lungs, 15, 16, 0.0, "chaste_left_5k, best modes of band 15");
-  supine_lungs_free(&lungs);
-}
-
 /* Compare the default basis with the paper's form: least ratio of their errors, and largest error.
  */
 static void check_default_basis(const char *name, supine_axes axes, double soften, double most,

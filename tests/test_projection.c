@@ -266,30 +266,6 @@ TEST(test_modes_equal_dense_decomposition) {
   free(weight);
 }
 
-TEST(test_modes_same_number_better_than_harmonics) {
-  const supine_lungs *lungs = *state;
-  static const double softens[] = {0.0, 1.0};
-  char path[] = "/tmp/supine-projection-XXXXXX";
-  (void)close(mkstemp(path));
-  for (size_t s = 0; s < 2; ++s) {
-    double error[2];
-    for (int k = 0; k < 2; ++k) {
-      supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
-                                           .band = k == 0 ? 3 : 15,
-                                           .modes = k == 0 ? 0 : 16};
-      supine_precompute_report report;
-      options.model.force.soften = softens[s];
-      options.model.reach = 10.0;
-      assert_int_equal(supine_precompute(lungs, &options, path, &report, NULL), SUPINE_OK);
-      error[k] = report.accuracy.relative_rms;
-    }
-    printf("soften %g: 16 harmonics %.2f %%, 16 modes of band 15 %.2f %%\n", softens[s],
-           100.0 * error[0], 100.0 * error[1]);
-    assert_true(error[1] < 0.25 * error[0]);
-  }
-  (void)unlink(path);
-}
-
 /* Singular values of 3e-7 and 3e-8 of the first are just above and below the rounding of the Gram
  * matrix. */
 TEST(test_modes_below_rounding_dropped) {

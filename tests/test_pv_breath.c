@@ -110,6 +110,28 @@ TEST(test_breath_volume_follows_scaled_limbs) {
 }
 
 /* [Santhanam2008] V: 500 mL over 5 s of inhalation, in steps of 15 ms (66.66 a second): 1.5 mL. */
+/* At constant flow, pressures are found from volumes, also on a limb of two steep parts. */
+TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
+  enum { COUNT = 61 };
+  const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};
+  const supine_pv pv = {{stiff, stiff}};
+  supine_pv_breath breath = breath_of(SUPINE_PV_CONSTANT_FLOW);
+  double times[COUNT];
+  double v[COUNT];
+  double p[COUNT];
+  double limb[COUNT];
+  breath.rest_pressure = 0.0;
+  breath.tidal = 799.0;
+  for (size_t j = 0; j < COUNT; ++j) {
+    times[j] = 60.0 / breath.rate * (double)j / (COUNT - 1);
+  }
+  assert_int_equal(supine_breath_evaluate(&pv, &breath, COUNT, times, v, p, NULL), SUPINE_OK);
+  assert_int_equal(supine_breath_curve_evaluate(&stiff, COUNT, p, limb, NULL, NULL), SUPINE_OK);
+  for (size_t j = 0; j < COUNT; ++j) {
+    assert_near(limb[j], v[j], 1e-7);
+  }
+}
+
 TEST(test_breath_constant_flow_has_step_of_paper) {
   const supine_pv_breath breath = {
       .tidal = 500.0, .rate = 6.0, .inhale_fraction = 0.5, .course = SUPINE_PV_CONSTANT_FLOW};

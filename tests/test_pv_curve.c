@@ -5,7 +5,6 @@
 #include "test.h"
 
 #include "program/options/pv.h"
-#include "runtime/limb.h"
 
 #define assert_near(value, expected, within) assert_true(fabs((value) - (expected)) <= (within))
 
@@ -111,49 +110,6 @@ TEST(test_evaluate_extreme_controls_still_rise) {
   for (size_t j = 0; j < COUNT; ++j) {
     assert_true(compliances[j] > 0.0);
     assert_true(j == 0 || volumes[j] > volumes[j - 1]);
-  }
-}
-
-static void invert(const supine_pv_curve *curve, size_t count, const double *volumes,
-                   double *pressures) {
-  supine_limb limb;
-  supine_limb_begin(curve, &limb);
-  for (size_t j = 0; j < count; ++j) {
-    assert_int_equal(supine_limb_pressure(&limb, volumes[j], &pressures[j]), SUPINE_OK);
-  }
-}
-
-TEST(test_invert_every_volume_returns_its_pressure) {
-  const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};
-  enum { CURVES = 4 };
-  const supine_pv_curve *curves[CURVES] = {&sigmoid, &stiff,
-                                           &supine_breath_normal()->limb[SUPINE_PV_INHALE],
-                                           &supine_breath_normal()->limb[SUPINE_PV_EXHALE]};
-  for (size_t i = 0; i < CURVES; ++i) {
-    const double span = curves[i]->volume[1] - curves[i]->volume[0];
-    double wanted[COUNT];
-    double pressures[COUNT];
-    double volumes[COUNT];
-    spread(curves[i]->volume[0], curves[i]->volume[1], wanted);
-    invert(curves[i], COUNT, wanted, pressures);
-    assert_int_equal(supine_breath_curve_evaluate(curves[i], COUNT, pressures, volumes, NULL, NULL),
-                     SUPINE_OK);
-    for (size_t j = 0; j < COUNT; ++j) {
-      assert_near(volumes[j], wanted[j], integration * span);
-      assert_true(j == 0 || pressures[j] > pressures[j - 1]);
-    }
-  }
-}
-
-TEST(test_invert_salazar_knowles_matches_logarithm) {
-  const supine_pv_curve *curve = &supine_breath_normal()->limb[SUPINE_PV_EXHALE];
-  const double k = log(2.0) / 7.58;
-  const double most = 6000.0 / -expm1(-30.0 * k);
-  const double volumes[3] = {2353.0, 3001.0, 5113.0};
-  double pressures[3];
-  invert(curve, 3, volumes, pressures);
-  for (size_t j = 0; j < 3; ++j) {
-    assert_near(pressures[j], -log1p(-volumes[j] / most) / k, 1e-7);
   }
 }
 
