@@ -83,7 +83,7 @@ static bool draws(const char *path) {
   return supine_text_ends_in(path, ".png");
 }
 
-static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]) {
+static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]) {
   json_t *all = json_object();
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
@@ -91,7 +91,7 @@ static json_t *encode(const supine_patient_distance of[SUPINE_PATIENT_MAP_COUNT]
     (void)json_object_set_new(row, "explained_percent", /* unknown where nothing moved */
                               isnan(of[k].explained) ? json_null()
                                                      : json_real(100.0 * of[k].explained));
-    (void)json_object_set_new(all, supine_patient_map_names[k], row);
+    (void)json_object_set_new(all, supine_command_map_names[k], row);
   }
   return all;
 }
@@ -232,12 +232,12 @@ const supine_command supine_command_validate = {
              "BASIS --landmarks PAIRS.csv --to POSTURE:VOLUME [OPTIONS]",
     .about = "Compares a basis with other states of the same person: "
              "distances between the surfaces and of landmarks, and how much of the motion is "
-             "explained, beside what no motion, a translation, a similarity and an affine map "
+             "explained, beside what no motion, a translation and an affine map "
              "leave; and, of several states, how linear displacement is with volume.",
     .options = table,
     .notes =
         "Distances are between the surfaces, both ways (largest: Hausdorff), and between the "
-        "landmarks. none is the distance without motion; translation, rigid+scale and affine "
+        "landmarks. none is the distance without motion; translation and affine "
         "are fitted to the other state itself. explained is the part of the squared distance "
         "without motion that is gone. A small distance between surfaces does not prove the "
         "motion inside: landmarks measure it. Santhanam 2008 found surfaces within 2 mm, and "

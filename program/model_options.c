@@ -273,10 +273,12 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
     }
   }
   choice->stiffness = *stiffness;
-  status = supine_patient_field_find(record, &choice->resting, lungs, state, *stiffness,
-                                     &options->field, error);
-  supine_patient_model(&options->field, &choice->model);
-  return status;
+  options->directions = malloc(3 * lungs->mesh.vertex_count * sizeof *options->directions);
+  return options->directions == NULL
+             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                                lungs->mesh.vertex_count)
+             : supine_patient_model(record, &choice->resting, lungs, state, *stiffness,
+                                    options->directions, &choice->model, error);
 }
 
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
@@ -339,7 +341,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
 }
 
 void supine_command_model_options_free(supine_model_options *options) {
-  supine_patient_field_free(&options->field);
+  free(options->directions);
   supine_precompute_source_free(&options->made_from);
   supine_precompute_prepared_free(&options->prepared);
 }

@@ -295,8 +295,8 @@ static supine_status validate_points(supine_command_subject *s, size_t which, co
                                : predict_points(s, which, &pairs, predicted, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_patient_validate_points(&pairs, predicted, s->moved, s->outcome[which].points,
-                                            error);
+    status =
+        supine_command_compare_points(&pairs, predicted, s->moved, s->outcome[which].points, error);
     s->outcome[which].has_points = true;
   }
   free(predicted);
@@ -323,7 +323,7 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   }
   if (status == SUPINE_OK &&
       state->path != NULL) { /* this also moves the prediction by the fitted motion */
-    status = supine_patient_validate_surface(&s->rest, s->moved, outcome->predicted, &lungs.mesh,
+    status = supine_command_compare_surfaces(&s->rest, s->moved, outcome->predicted, &lungs.mesh,
                                              outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;
   }

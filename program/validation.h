@@ -4,7 +4,6 @@
 #define SUPINE_COMMAND_VALIDATION_H
 
 #include "precompute/patient/krige.h"
-#include "precompute/patient/validate.h"
 #include "precompute/source.h"
 #include "program/options/state_options.h"
 
@@ -17,6 +16,17 @@ typedef struct supine_command_state {
   supine_state state;                    /* default volume: not given */
 } supine_command_state;
 
+/* "predicted", "none", "translation", "affine". */
+extern const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT];
+
+/* Distances, mm. */
+typedef struct supine_command_distance {
+  double mean, rms, p95;
+  double largest;   /* of surfaces: Hausdorff distance */
+  double explained; /* explained share of the squared distance without a map, or of that after a
+                         translation if motion between the scans is removed; NAN if nothing moved */
+} supine_command_distance;
+
 /* Result for one state. */
 typedef struct supine_command_outcome {
   supine_pose pose;
@@ -25,8 +35,8 @@ typedef struct supine_command_outcome {
   double *predicted;  /* [N, 3] */
   double *nearest;    /* [N, 3] nearest points of the state's surface */
   bool has_surface, has_points, has_best;
-  supine_patient_distance surface[SUPINE_PATIENT_MAP_COUNT];
-  supine_patient_distance points[SUPINE_PATIENT_MAP_COUNT];
+  supine_command_distance surface[SUPINE_PATIENT_MAP_COUNT];
+  supine_command_distance points[SUPINE_PATIENT_MAP_COUNT];
   double best_scale; /* scale with the least distance to the surface */
   double best_rms;   /* that distance, RMS over vertices, mm */
 } supine_command_outcome;
@@ -68,5 +78,27 @@ void supine_command_find_line(supine_command_subject *subject);
  * @retval SUPINE_ERROR_UNSUPPORTED, SUPINE_ERROR_WRITE, ... of rendering */
 supine_status supine_command_draw_errors(const supine_command_subject *subject, const char *path,
                                          supine_error *error);
+
+/* Compute distances of points that are known in both states.
+ * @param moved      motion between the scans that is taken out of the prediction, by least squares
+ * @param predicted  [count, 3] where the pairs' first points were predicted to go
+ * @retval SUPINE_ERROR_NUMERICAL (all in one plane), SUPINE_ERROR_MEMORY */
+supine_status supine_command_compare_points(
+    const supine_patient_pairs *pairs, const double *predicted, supine_patient_moved moved,
+    supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
+
+/* Compute distances between surfaces of any meshing, of the vertices of each to the other surface.
+ * The maps are fitted by iterated nearest points.
+ * @param rest       the surface that motion starts from
+ * @param moved      motion between the scans that is taken out of the prediction
+ * @param predicted  [rest vertices, 3]; the motion is added to it
+ * @param nearest    optional [rest vertices, 3]: the state's point nearest to each predicted one
+ * @retval SUPINE_ERROR_MESH  as supine_patient_check_boxes
+ * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
+supine_status
+supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_moved moved,
+                                double *predicted, const supine_mesh *state, double *nearest,
+                                supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                                supine_error *error);
 
 #endif

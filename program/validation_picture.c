@@ -47,7 +47,7 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
       continue;
     }
     find_values(s, outcome, values + count * n, &largest, &end);
-    const supine_patient_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
+    const supine_command_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
     (void)snprintf(subtitle[count], sizeof subtitle[count], "%+.0f mL, RMS %.1f, Hausdorff %.1f mm",
                    outcome->millilitres, off->rms, off->largest);
     panel[count] = (supine_panel){.title = s->state[i].posture[0] != '\0' ? s->state[i].posture

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-supine_test(patient supine_patient supine_base supine_gsl)
+supine_test(patient supine_commands supine_patient supine_base supine_gsl)
 supine_test(patient_surface supine_patient supine_lungs supine_mesh_io supine_base supine_gsl)
 supine_test(patient_expand supine_patient supine_lungs supine_mesh_io supine_base supine_gsl)
 add_test(NAME patient_command COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_patient_command.sh

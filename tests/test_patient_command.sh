@@ -58,8 +58,7 @@ turns() { # NAME ARGUMENTS of fit
   name=$1
   shift
   "$supine" fit "$@" --name somebody -o "$name.json" >fit.txt || fail "fit $name"
-  near "$(sed -n 's/^gain \([0-9.]*\) +- .*/\1/p' fit.txt)" 0.70 0.05 ||
-    fail "$name: $(grep gain fit.txt)"
+  near "$(number gain "$name.json")" 0.70 0.05 || fail "$name: $(grep gain fit.txt)"
   "$supine" precompute p_supine_rest.ply --patient "$name.json" -o "$name.safetensors" \
     >out 2>note || fail "precompute $name: $(cat note)"
   grep -q 'assumed to be the emptier of the two' note || fail "the scan's state is not told"
@@ -75,7 +74,7 @@ turns backwards p_supine_full.ply p_supine_rest.ply --rest supine:full --other s
 turns points --landmarks full.csv --other supine:full --state prone:rest:prone.csv
 turns reversed --landmarks empty.csv --rest supine:full --other supine:rest \
   --state prone:rest:down.csv
-grep -q 'full inflation' fit.txt || fail "states are not told: $(head -3 fit.txt)"
+grep -q 'state *supine:full' fit.txt || fail "states are not told: $(cat fit.txt)"
 "$supine" info points.safetensors | grep -q 'patient *somebody: deep law.* held-out residual' ||
   fail "info does not say whose: $("$supine" info points.safetensors)"
 "$supine" info points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
@@ -138,7 +137,7 @@ near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json)
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
 "$supine" fit p_supine_rest.ply p_supine_full.ply --other supine:full \
   --state prone:rest:p_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
-grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
+grep -q 'gain from.*other postures do not' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
 
 # A stiff region is recovered and used in the basis, which reaches the other state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
@@ -147,10 +146,10 @@ grep -q 'gain not determined' fit.txt || fail "a gain at its bound: $(grep gain 
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
   >fit.txt || fail "fit a lesion"
-grep -q 'expandability: .*: kept' fit.txt || fail "no expandability kept"
-grep -q 'not determined: [1-9][0-9]* of [0-9]* regions' fit.txt || fail "all is seen: $(cat fit.txt)"
-grep -q 'correlation with height along gravity \(0.99\|1.00\);.* does not explain [0-3] %' fit.txt || # what was made
-  fail "the force: $(grep correlation fit.txt)"
+grep -q 'kept *yes' fit.txt || fail "no expandability kept"
+near "$(number unseen_regions stiff.json)" 20 19.9 || fail "regions seen: $(cat fit.txt)"
+near "$(number correlation_with_height stiff.json)" 1 0.015 || fail "the force: $(cat fit.txt)"
+near "$(number left_rms stiff.json)" 0 0.035 || fail "the force: $(cat fit.txt)"
 "$supine" precompute rest.ply --patient stiff.json -o stiff.safetensors >/dev/null 2>&1 ||
   fail "precompute with stiffness"
 "$supine" validate stiff.safetensors --state stiff.ply --json >valid.json || fail "validate stiff"
@@ -184,7 +183,7 @@ fi
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
   --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest --json >valid.json ||
   fail "validate several"
-for state in 1 6 11 16; do # predicted; "none" comes next
+for state in 1 5 9 13; do # predicted; "none" comes next
   near "$(number rms_mm valid.json $state)" 0 0.01 || fail "state $state is not predicted"
   near "$(number rms_mm valid.json $((state + 1)))" 0 0.5 && fail "state $state did not move"
 done
@@ -226,7 +225,7 @@ near "$(surfaces valid.json)" 0 3 && fail "a shift was taken out unasked"
   fail deform
 "$supine" fit p_supine_rest.ply p_supine_full.ply --state supine:half.ply --other supine:full \
   --law paper >fit.txt || fail "fit half a breath"
-grep -q 'supine.*: breath scale 0.[45]' fit.txt || fail "half a breath: $(grep scale fit.txt)"
+grep -q 'supine  *0.[45]' fit.txt || fail "half a breath: $(grep -A2 further fit.txt)"
 
 # Refused input and its exit codes.
 refused() { # CODE WORDS COMMAND...

@@ -201,7 +201,7 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
       close += fabs(miss) < log(1.15);
     }
   }
-  printf("%zu of %zu regions unseen; E within 15 %% at %.0f %% of what is seen (%.0f %%), %.0f %% "
+  printf("%.0f of %zu regions unseen; E within 15 %% at %.0f %% of what is seen (%.0f %%), %.0f %% "
          "RMS\n",
          found.expand.unseen, found.stiffness.count, 100.0 * (double)close / (double)seen,
          100.0 * (double)seen / (double)n, 100.0 * sqrt(squares / (double)seen));

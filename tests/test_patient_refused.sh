@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Check the messages and exit codes of 'supine fit' for refused input: test_patient_refused.sh PROGRAM
 #
-# Landmarks and surfaces in different frames, units or sides, without overlap, mirrored, shuffled, repeated,
+# Landmarks and surfaces in different frames, units or sides, without overlap, mirrored, shuffled,
 # too few, or NaN.
 set -u
 supine=$1
@@ -67,8 +67,6 @@ sed '20s/,[^,]*$/,nan/' good.csv >nan.csv
 refused 2 'nan.csv:20: to_z "nan" is not a finite number' --landmarks nan.csv
 sed '30s/.*/1,2,3,4,5/' good.csv >short.csv
 refused 2 'short.csv:30' --landmarks short.csv
-{ cat good.csv; sed -n 9p good.csv; } >twice.csv
-refused 2 'lines 9 and 62 both give the point' --landmarks twice.csv
 head -12 good.csv >eleven.csv
 refused 2 '11 pairs of points determine no law: give at least 12' --landmarks eleven.csv
 refused 2 '11 pairs of points determine no law' --landmarks good.csv --state prone:rest:eleven.csv

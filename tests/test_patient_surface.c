@@ -62,11 +62,11 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
   supine_model found = truth();
-  supine_patient_field field = {0};
   const supine_resting resting = supine_reference_resting_default();
-  assert_int_equal(supine_patient_field_find(&record, &resting, &rest, 0, NULL, &field, &error),
-                   SUPINE_OK);
-  supine_patient_model(&field, &found);
+  double *directions = malloc(3 * rest.mesh.vertex_count * sizeof *directions);
+  assert_int_equal(
+      supine_patient_model(&record, &resting, &rest, 0, NULL, directions, &found, &error),
+      SUPINE_OK);
   supine_solution solution = {0};
   assert_int_equal(supine_physics_solve(&rest, &found, supine_gravity, &solution, &error),
                    SUPINE_OK);
@@ -99,7 +99,7 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   assert_true(applied->left < 0.3 * applied->spread);
   assert_true(applied->matched > 0.95 && applied->blocks > 20);
   supine_physics_solution_free(&solution);
-  supine_patient_field_free(&field);
+  free(directions);
   free(positions);
   free(expected);
   free(target);

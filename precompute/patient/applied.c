@@ -5,14 +5,13 @@
 #include <string.h>
 
 #include <cblas.h>
-#include <gsl/gsl_statistics.h>
 #include <lapacke.h>
 
 #include "precompute/patient/matching.h"
 
 #include "sh/base/vec3.h"
 
-enum { COLUMNS = SUPINE_PATIENT_COLUMNS };
+enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
 /* Length of a direction, relative to their RMS, below which its share of the force is damped: short
  * ones say little about the force. */
@@ -43,71 +42,56 @@ static void find_catch(supine_patient_matching *m, const supine_patient *patient
   }
 }
 
-/* Average the columns of (18), the height along gravity and the force over each block, weighted by
- * area.
- * @param means  [COLUMNS + 2, blocks] written
- * @param area   [blocks] written, mm^2 */
-static void average(const supine_patient_matching *m, const double *force, const double gravity[3],
-                    double *vertex_area, size_t blocks, double *means, double *area) {
-  supine_mesh_vertex_area(&m->rest->mesh, vertex_area);
-  memset(means, 0, (COLUMNS + 2) * blocks * sizeof *means);
-  memset(area, 0, blocks * sizeof *area);
+/* Sum over blocks, weighted by area, the products of the blocks' means of: the columns of (18), the
+ * height along gravity, and the force. */
+static void add_blocks(const supine_patient_matching *m, const double *force,
+                       const double gravity[3], const double *vertex_area, size_t blocks,
+                       double *means, double products[ALL * ALL]) {
+  memset(means, 0, (ALL + 1) * blocks * sizeof *means);
   for (size_t v = 0; v < m->count; ++v) {
-    const size_t b = m->rows[v].block;
-    for (size_t k = 0; k < COLUMNS; ++k) {
-      means[k * blocks + b] += vertex_area[v] * m->columns[COLUMNS * v + k];
-    }
-    means[COLUMNS * blocks + b] +=
-        vertex_area[v] * supine_dot(gravity, m->rest->mesh.vertices + 3 * v);
-    means[(COLUMNS + 1) * blocks + b] += vertex_area[v] * force[v];
-    area[b] += vertex_area[v];
+    double *mean = means + (ALL + 1) * m->rows[v].block; /* and the block's area */
+    cblas_daxpy(COLUMNS, vertex_area[v], m->columns + COLUMNS * v, 1, mean, 1);
+    mean[HEIGHT] += vertex_area[v] * supine_dot(gravity, m->rest->mesh.vertices + 3 * v);
+    mean[FORCE] += vertex_area[v] * force[v];
+    mean[ALL] += vertex_area[v];
   }
-  for (size_t i = 0; i < (COLUMNS + 2) * blocks; ++i) {
-    means[i] /= area[i % blocks];
+  memset(products, 0, ALL * ALL * sizeof *products);
+  for (size_t b = 0; b < blocks; ++b) {
+    const double *mean = means + (ALL + 1) * b;
+    cblas_dsyr(CblasColMajor, CblasLower, ALL, 1.0 / mean[ALL], mean, 1, products, ALL);
   }
 }
 
-/* Fit (18) to the blocks' force by weighted least squares, and find the residual. */
-static bool fit_force(const double *means, const double *area, size_t blocks,
-                      supine_patient_applied *applied) {
-  const double *force = means + (COLUMNS + 1) * blocks;
-  double matrix[COLUMNS * COLUMNS] = {0.0};
-  double k[COLUMNS] = {0.0};
-  double squares = 0.0;
-  double weight = 0.0;
-  for (size_t b = 0; b < blocks; ++b) {
-    cblas_dsyr(CblasColMajor, CblasLower, COLUMNS, area[b], means + b, (int)blocks, matrix,
-               COLUMNS);
-    cblas_daxpy(COLUMNS, area[b] * force[b], means + b, (int)blocks, k, 1);
+/* Return the covariance of two quantities from the products with 1, the first column. */
+static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
+  return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
+}
+
+/* Fit (18) to the blocks' force by least squares weighted by area, and find the residual. */
+static bool conclude(const double products[ALL * ALL], supine_patient_applied *applied) {
+  double matrix[ALL * ALL];
+  double k[COLUMNS];
+  memcpy(matrix, products, sizeof matrix);
+  for (size_t i = 0; i < COLUMNS; ++i) {
+    k[i] = products[i * ALL + FORCE];
   }
-  if (blocks <= COLUMNS ||
-      LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', COLUMNS, 1, matrix, COLUMNS, k, COLUMNS) != 0 ||
+  if (applied->blocks <= COLUMNS ||
+      LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', COLUMNS, 1, matrix, ALL, k, COLUMNS) != 0 ||
       k[0] == 0.0) {
     return false;
   }
-  for (size_t b = 0; b < blocks; ++b) {
-    const double left = cblas_ddot(COLUMNS, k, 1, means + b, (int)blocks) - force[b];
-    squares += area[b] * left * left;
-    weight += area[b];
+  const double variance = covariance(products, FORCE, FORCE);
+  double left = products[FORCE * ALL + FORCE];
+  for (size_t i = 0; i < COLUMNS; ++i) {
+    left -= k[i] * products[i * ALL + FORCE];
   }
-  for (size_t i = 0; i < 3; ++i) {
-    applied->slopes[i] = k[1 + i] / k[0];
-  }
-  applied->left = sqrt(squares / weight) / fabs(k[0]);
-  applied->spread = sqrt(gsl_stats_wtss(area, 1, force, 1, blocks) / weight) / fabs(k[0]);
+  memcpy(applied->slopes, k + 1, sizeof applied->slopes);
+  cblas_dscal(3, 1.0 / k[0], applied->slopes, 1);
+  applied->left = sqrt(fmax(0.0, left) / products[0]) / fabs(k[0]);
+  applied->spread = sqrt(variance) / fabs(k[0]);
+  applied->correlation =
+      covariance(products, HEIGHT, FORCE) / sqrt(covariance(products, HEIGHT, HEIGHT) * variance);
   return true;
-}
-
-/* Compute the weighted correlation of two columns. */
-static double correlate(const double *area, const double *a, const double *b, size_t count) {
-  const double mean[2] = {gsl_stats_wmean(area, 1, a, 1, count),
-                          gsl_stats_wmean(area, 1, b, 1, count)};
-  double product = 0.0;
-  for (size_t i = 0; i < count; ++i) {
-    product += area[i] * (a[i] - mean[0]) * (b[i] - mean[1]);
-  }
-  return product /
-         sqrt(gsl_stats_wtss(area, 1, a, 1, count) * gsl_stats_wtss(area, 1, b, 1, count));
 }
 
 supine_status supine_patient_applied_find(supine_patient_matching *matching,
@@ -115,8 +99,9 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           supine_patient_applied *applied, supine_error *error) {
   supine_patient_matching *m = matching;
   const size_t n = m->rest->mesh.vertex_count;
+  double products[ALL * ALL];
   double *caught = malloc(2 * n * sizeof *caught);
-  double *means = malloc((COLUMNS + 3) * n * sizeof *means);
+  double *means = malloc((ALL + 1) * n * sizeof *means);
   supine_status status =
       caught == NULL || means == NULL
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
@@ -127,12 +112,10 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   }
   if (status == SUPINE_OK) {
     const size_t blocks = supine_patient_rows_block(&m->frame, m->rows, n, 1);
-    double *area = means + (COLUMNS + 2) * blocks;
-    average(m, caught + n, gravity, caught, blocks, means, area);
     applied->blocks = (double)blocks;
-    applied->correlation =
-        correlate(area, means + COLUMNS * blocks, means + (COLUMNS + 1) * blocks, blocks);
-    if (!fit_force(means, area, blocks, applied)) {
+    supine_mesh_vertex_area(&m->rest->mesh, caught);
+    add_blocks(m, caught + n, gravity, caught, blocks, means, products);
+    if (!conclude(products, applied)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
           "the displacement along the law's directions does not determine the force: check "

@@ -168,7 +168,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
     report->kept = report->held_out[1] < worth * report->held_out[0];
     stiffness->count = report->kept ? n : 0;
     for (size_t k = 0; k < stiffness->count; ++k) {
-      report->unseen += stiffness->mode[k].seen < SUPINE_PATIENT_SEEN;
+      report->unseen += stiffness->mode[k].seen < SUPINE_PATIENT_SEEN ? 1.0 : 0.0;
     }
     supine_patient_stiffness_of(stiffness, m->rest, tissue);
     status = supine_patient_matching_solve(m, tissue, error);

@@ -296,8 +296,8 @@ static bool fit_alone(supine_patient_krige *k, bool size_only) {
 }
 
 static supine_status open(supine_patient_krige *k, const supine_patient_fit_options *options,
-                          const supine_patient_row *rows, size_t count, bool corrected,
-                          supine_error *error) {
+                          const supine_patient_row *rows, size_t count, supine_error *error) {
+  const bool corrected = !options->uncorrected && !options->size_only;
   const size_t terms = TERMS + options->region_count;
   *k = (supine_patient_krige){.rows = rows,
                               .count = count,
@@ -341,12 +341,15 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        supine_patient_krige *krige, supine_error *error) {
   supine_patient_krige *k = krige;
   const int n = (int)count;
-  const supine_status status = open(k, options, rows, count, !options->uncorrected, error);
+  const supine_status status = open(k, options, rows, count, error);
   if (status != SUPINE_OK) {
     return status;
   }
   bool right = fit_alone(k, true);
   k->mean = k->law;
+  if (options->size_only) {
+    return right ? SUPINE_OK : undetermined(error);
+  }
   right = right && (k->kind == SUPINE_PATIENT_DEEP || fit_alone(k, false));
   if (!right) {
     return undetermined(error);
@@ -364,21 +367,6 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasTrans, CblasNonUnit, n, k->factor, n, k->weight, 1);
   }
   return SUPINE_OK;
-}
-
-supine_status supine_patient_law_fit(const supine_patient_fit_options *options,
-                                     const supine_patient_power *mean,
-                                     const supine_patient_row *rows, size_t count,
-                                     supine_patient_power *law, supine_error *error) {
-  supine_patient_krige k;
-  supine_status status = open(&k, options, rows, count, false, error);
-  if (status == SUPINE_OK) {
-    k.mean = mean != NULL ? *mean : k.mean;
-    status = fit_alone(&k, mean == NULL) ? SUPINE_OK : undetermined(error);
-    *law = k.law;
-  }
-  supine_patient_krige_free(&k);
-  return status;
 }
 
 /* Compute the variance of the combination x of the terms; x is overwritten. */

@@ -80,6 +80,7 @@ typedef struct supine_patient_fit_options {
   supine_patient_law law;
   supine_patient_moved moved;
   bool uncorrected;  /* leave g out */
+  bool size_only;    /* fit only the size of the deep law, and the motion */
   double gravity[3]; /* of the emptier state; all 0: supine */
   double way[3];     /* by axis, as for supine_patient_deep */
   double sill;       /* factor on the covariance of g; 0: the most likely one */
@@ -144,12 +145,5 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
 
 /* Copy the law, its correction and the motion into a patient whose frame is set. */
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient);
-
-/* Fit a law without g.
- * @param mean  prior mean of the constants; NULL: fit only the size of the deep law */
-supine_status supine_patient_law_fit(const supine_patient_fit_options *options,
-                                     const supine_patient_power *mean,
-                                     const supine_patient_row *rows, size_t count,
-                                     supine_patient_power *law, supine_error *error);
 
 #endif

@@ -69,12 +69,17 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   }
 }
 
-void supine_patient_path(const supine_patient_record *record, double gains[2][3]) {
+/* Compute the gains of two parts of the way, by axis. */
+static void find_gains(const double part[2], double gains[2][3]) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
-  double part[2];
-  find_parts(record, part);
   supine_volume_bend(deep.bend, part[0], gains[0]);
   supine_volume_bend(deep.bend, part[1], gains[1]);
+}
+
+void supine_patient_path(const supine_patient_record *record, double gains[2][3]) {
+  double part[2];
+  find_parts(record, part);
+  find_gains(part, gains);
 }
 
 /* --- the model ------------------------------------------------------------------------------- */
@@ -138,93 +143,75 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
 /* Find the volume gained, mL, by moving from the fuller state along `moved` to full inflation
  * (which 0) or rest (1). */
 static double gain_towards(const supine_volume_form *form, const double part[2], size_t which) {
-  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   double gains[2][3];
   double towards[3];
-  supine_volume_bend(deep.bend, part[0], gains[0]);
-  supine_volume_bend(deep.bend, part[1], gains[1]);
+  find_gains(part, gains);
   for (size_t k = 0; k < 3; ++k) {
     towards[k] = ((double)which - gains[0][k]) / (gains[1][k] - gains[0][k]);
   }
   return supine_volume_form_at(form, towards);
 }
 
-/* Find the part of the way from full inflation to rest between the states, by axis, that gives the
- * lungs their volumes at full inflation and at rest. */
-static supine_status find_way(const work *w, const supine_resting *resting, double way[3],
-                              supine_error *error) {
+/* Find the part of the way from full inflation to rest between the states, by axis, that gives
+ * closed lungs their volumes at full inflation and at rest. `ones` [N] are 1. */
+static void find_way(const work *w, const supine_resting *resting, const double *ones,
+                     double way[3]) {
   enum { ROUNDS = 30 };
   static const double step = 1e-4;
   const supine_patient_record *record = w->record;
-  const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
-  const size_t n = w->lungs.mesh.vertex_count;
   const double held = 1e-3 * supine_mesh_volume(&w->lungs.mesh);
   const double full = full_of_either(record, resting);
   const double volume[2] = {
       full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
+  const bool closed = w->lungs.topology.closed && full > 0.0;
+  supine_volume_form form[2] = {{{0.0}}};
   double part[2];
   double gains[2][3];
-  double *ones = malloc(n * sizeof *ones);
-
-  const bool closed = w->lungs.topology.closed && volume[0] > 0.0;
-  supine_volume_form form = {{0.0}};
-  supine_status status = SUPINE_OK;
   find_parts(record, part);
-
-  for (size_t i = 0; i < n && ones != NULL; ++i) {
-    ones[i] = 1.0;
-  }
-  if (ones == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
-  } else if (closed) {
-    supine_volume_form forms[2] = {{{0.0}}};
-    supine_physics_volume_of_fields(&w->lungs, NULL, w->moved, ones, 1, forms);
-    for (size_t i = 0; i < sizeof form.of / sizeof *form.of; ++i) {
-      form.of[i] = forms[0].of[i] + forms[1].of[i];
+  if (closed) {
+    supine_physics_volume_of_fields(&w->lungs, NULL, w->moved, ones, 1, form);
+    for (size_t i = 0; i < sizeof form[0].of / sizeof *form[0].of; ++i) {
+      form[0].of[i] += form[1].of[i];
     }
   }
-  for (int round = 0; round < ROUNDS && status == SUPINE_OK && closed; ++round) {
+  for (int round = 0; round < ROUNDS && closed; ++round) {
     const size_t k = (size_t)round % 2;
     const supine_volume *of = &record->state[k].volume;
-
     if (of->ml == 0.0 && of->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
       continue; /* volume known */
     }
-    const double off = gain_towards(&form, part, k) - (volume[k] - held);
+    const double off = gain_towards(form, part, k) - (volume[k] - held);
     part[k] += step;
-    const double slope = (gain_towards(&form, part, k) - (volume[k] - held) - off) / step;
+    const double slope = (gain_towards(form, part, k) - (volume[k] - held) - off) / step;
     part[k] -= step + (isfinite(off / slope) ? fmin(0.05, fmax(-0.05, off / slope)) : 0.0);
   }
-  supine_volume_bend(deep.bend, part[0], gains[0]);
-  supine_volume_bend(deep.bend, part[1], gains[1]);
+  find_gains(part, gains);
   for (size_t k = 0; k < 3; ++k) {
     way[k] = gains[1][k] - gains[0][k];
   }
-  free(ones);
-  return status;
 }
 
-supine_status supine_patient_field_find(const supine_patient_record *record,
-                                        const supine_resting *resting, const supine_lungs *lungs,
-                                        size_t state, double *stiffness,
-                                        supine_patient_field *field, supine_error *error) {
+supine_status supine_patient_model(const supine_patient_record *record,
+                                   const supine_resting *resting, const supine_lungs *lungs,
+                                   size_t state, double *stiffness, double *directions,
+                                   supine_model *model, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   work w = {.record = record,
             .lungs = *lungs,
             .scan = lungs->mesh.vertices,
-            .moved = malloc(3 * n * sizeof(double)),
+            .moved = directions,
             .settle = state == 1};
-  double *ratio = malloc(n * sizeof *ratio);
+  double *ratio = malloc(2 * n * sizeof *ratio);
+  double way[3];
   supine_status status = SUPINE_OK;
-  *field = (supine_patient_field){.record = record, .moved = w.moved};
   w.ratio = ratio;
   w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
-  if (w.moved == NULL || ratio == NULL || w.lungs.mesh.vertices == NULL) {
+  if (ratio == NULL || w.lungs.mesh.vertices == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
     goto cleanup;
   }
   memcpy(w.lungs.mesh.vertices, w.scan, 3 * n * sizeof(double));
-  for (size_t i = 0; i < n; ++i) {
+  for (size_t i = 0; i < 2 * n; ++i) {
     ratio[i] = 1.0;
   }
   if (w.settle) {
@@ -234,46 +221,23 @@ supine_status supine_patient_field_find(const supine_patient_record *record,
     status = find_ratio(&w, stiffness, ratio, error);
     move(&w);
   }
-  status = status == SUPINE_OK ? find_way(&w, resting, field->way, error) : status;
-  for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
-    w.moved[i] /= fmax(force_least, ratio[i / 3]) * field->way[i % 3];
+  find_way(&w, resting, ratio + n, way);
+  for (size_t i = 0; i < n; ++i) {
+    const supine_patient_place place = supine_patient_find_vertex(&w.lungs, i);
+    const double force =
+        fmax(force_least, supine_patient_force_at(&record->patient.power, &place)) *
+        fmax(force_least, ratio[i]);
+    for (size_t k = 0; k < 3; ++k) {
+      directions[3 * i + k] /= -force * way[k];
+    }
   }
+  model->force = record->force;
+  model->reach = record->reach;
+  model->direction.vectors = directions;
 cleanup:
   free(ratio);
   free(w.lungs.mesh.vertices);
-  if (status != SUPINE_OK) {
-    supine_patient_field_free(field);
-  }
   return status;
-}
-
-void supine_patient_field_free(supine_patient_field *field) {
-  free(field->moved);
-  *field = (supine_patient_field){0};
-}
-
-/* Compute the directions d = -u / f, with f by the lungs' own box. */
-static void direct(const void *context, const supine_lungs *lungs, double *directions) {
-  const supine_patient_field *field = context;
-  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
-    const supine_patient_place place = supine_patient_find_vertex(lungs, i);
-    const double force =
-        fmax(force_least, supine_patient_force_at(&field->record->patient.power, &place));
-    for (size_t k = 0; k < 3; ++k) {
-      directions[3 * i + k] = -field->moved[3 * i + k] / force;
-    }
-  }
-}
-
-void supine_patient_model(const supine_patient_field *field, supine_model *model) {
-  const supine_patient_record *record = field->record;
-  model->force = record->force;
-  model->reach = record->reach;
-  model->direction = (supine_direction_law){.correct = direct, .context = field};
-  for (size_t k = 0; k < 3; ++k) {
-    model->direction.c[2 * k] = -record->patient.power.c[2 * k] / field->way[k];
-    model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
-  }
 }
 
 /* --- the scan -------------------------------------------------------------------------------- */

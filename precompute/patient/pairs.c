@@ -25,7 +25,9 @@ static const double stillest = 0.05;  /* least RMS motion, mm: below the precisi
 static const double size_most = 2.0;  /* largest ratio of sizes: a full breath gives 1.4 */
 static const double turn_most = 25.0; /* largest rotation between two scans, degrees */
 static const double apart_most = 0.5; /* largest distance of the states over the points' spread */
-static const double unmatched = 0.7;  /* largest residual of the affine map over the spread */
+static const double box_overlap_least = 0.5; /* least overlap of surfaces' boxes over the smaller */
+static const double box_size_most = 1.6;     /* largest ratio of their sizes */
+static const double unmatched = 0.7; /* largest residual of the affine map over the spread */
 
 /* --- reading --------------------------------------------------------------------------------- */
 
@@ -49,29 +51,8 @@ static supine_status find_columns(const supine_csv *csv, bool reverse, size_t co
   return SUPINE_OK;
 }
 
-/* Append the present row, unless an earlier one gives the same point. */
-static supine_status take_row(const supine_csv *csv, const size_t column[COORDINATES],
-                              supine_patient_pairs *pairs, size_t *lines, supine_error *error) {
-  double *p = pairs->from + 3 * pairs->count;
-  supine_status status = SUPINE_OK;
-  for (size_t k = 0; k < COORDINATES && status == SUPINE_OK; ++k) {
-    double *point = k < 3 ? p : pairs->to + 3 * pairs->count;
-    status = supine_csv_number(csv, column[k], columns[column[k]], &point[k % 3], error);
-  }
-  for (size_t i = 0; i < pairs->count && status == SUPINE_OK; ++i) {
-    if (memcmp(pairs->from + 3 * i, p, 3 * sizeof *p) == 0) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_FORMAT,
-                           "%s: lines %zu and %zu both give the point %g,%g,%g: keep one of them",
-                           csv->path, lines[i], csv->line, p[0], p[1], p[2]);
-    }
-  }
-  lines[pairs->count++] = csv->line;
-  return status;
-}
-
 static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pairs *pairs,
-                               size_t **lines, supine_error *error) {
+                               supine_error *error) {
   size_t capacity = 0;
   size_t column[COORDINATES];
   supine_status status = find_columns(csv, reverse, column, error);
@@ -84,13 +65,15 @@ static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pai
       pairs->from = from != NULL ? from : pairs->from;
       double *to = realloc(pairs->to, 3 * capacity * sizeof *to);
       pairs->to = to != NULL ? to : pairs->to;
-      size_t *line = realloc(*lines, capacity * sizeof *line);
-      *lines = line != NULL ? line : *lines;
-      if (from == NULL || to == NULL || line == NULL) {
+      if (from == NULL || to == NULL) {
         return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", capacity);
       }
     }
-    status = take_row(csv, column, pairs, *lines, error);
+    for (size_t k = 0; k < COORDINATES && status == SUPINE_OK; ++k) {
+      double *point = (k < 3 ? pairs->from : pairs->to) + 3 * pairs->count;
+      status = supine_csv_number(csv, column[k], columns[column[k]], &point[k % 3], error);
+    }
+    ++pairs->count;
   }
   return status == SUPINE_OK && pairs->count == 0
              ? supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -101,20 +84,14 @@ static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pai
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
                                         supine_error *error) {
   supine_csv csv;
-  supine_patient_pairs made = {0};
-  size_t *lines = NULL;
   supine_status status = supine_csv_open(path, columns, COLUMNS, 0, &csv, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  status = read_rows(&csv, reverse, &made, &lines, error);
   if (status == SUPINE_OK) {
-    *pairs = made;
-  } else {
-    supine_patient_pairs_free(&made);
+    status = read_rows(&csv, reverse, pairs, error);
+    supine_csv_close(&csv);
   }
-  free(lines);
-  supine_csv_close(&csv);
+  if (status != SUPINE_OK) {
+    supine_patient_pairs_free(pairs);
+  }
   return status;
 }
 
@@ -156,16 +133,8 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
     cross[a][b] += at * (to[i / 9 * 3 + b] - mean[1][b]);
     scatter[a][b] += at * (from[i / 9 * 3 + b] - mean[0][b]);
   }
-  if (kind == SUPINE_PATIENT_MAP_SIMILARITY || kind == SUPINE_PATIENT_MAP_RIGID) {
-    const double spread = scatter[0][0] + scatter[1][1] + scatter[2][2];
-    double scale = 0.0;
+  if (kind == SUPINE_PATIENT_MAP_RIGID) {
     supine_rigid_rotation((const double(*)[3])cross, map->m);
-    for (size_t k = 0; k < 9; ++k) {
-      scale += map->m[k] * cross[k % 3][k / 3] / spread;
-    }
-    for (size_t k = 0; k < 9 && kind == SUPINE_PATIENT_MAP_SIMILARITY; ++k) {
-      map->m[k] *= scale;
-    }
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
     for (size_t k = 0; k < 9; ++k) { /* by columns, as LAPACKE copies rows to memory of its own */
       map->m[k] = cross[k % 3][k / 3];
@@ -305,6 +274,32 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                             "the other state is the same as rest (%.2g mm RMS%s): give a state "
                             "in which the lungs have moved",
                             s.moved, moved ? " beside a translation" : "");
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
+                                         supine_error *error) {
+  double low[2][3];
+  double high[2][3];
+  supine_mesh_box(rest, low[0], high[0]);
+  supine_mesh_box(state, low[1], high[1]);
+  for (int k = 0; k < 3; ++k) {
+    const double size[2] = {high[0][k] - low[0][k], high[1][k] - low[1][k]};
+    const double overlap = fmin(high[0][k], high[1][k]) - fmax(low[0][k], low[1][k]);
+    if (!(size[1] > 0.0) || size[1] > box_size_most * size[0] ||
+        size[0] > box_size_most * size[1]) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "along %c the lungs are %.3g mm in the first state and %.3g mm in "
+                              "the other: check that units and lungs are the same",
+                              "xyz"[k], size[0], size[1]);
+    }
+    if (overlap < box_overlap_least * fmin(size[0], size[1])) {
+      return supine_error_set(error, SUPINE_ERROR_MESH,
+                              "the two surfaces do not overlap along %c (%.0f to %.0f and %.0f to "
+                              "%.0f mm): check that frames, units and sides are the same",
+                              "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
+    }
   }
   return SUPINE_OK;
 }

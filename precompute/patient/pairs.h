@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include <supine/status.h>
+#include "mesh/mesh.h"
 
 /** Points and their places in the other state, mm, LPS. Zero-initialise. */
 typedef struct supine_patient_pairs {
@@ -22,10 +22,10 @@ typedef struct supine_patient_pairs {
  * to image 1).
  *
  * @param reverse  read them as from the other state to rest
- * @param pairs    zero-initialised; written only on success
+ * @param pairs    zero-initialised; empty after a failure
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  no such columns, a number that is not finite (line named), no
- *                              pairs, a duplicate point (both lines named)
+ *                              pairs
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
                                         supine_error *error);
@@ -49,7 +49,6 @@ typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_PREDICTED = 0,
   SUPINE_PATIENT_MAP_NONE,
   SUPINE_PATIENT_MAP_TRANSLATION,
-  SUPINE_PATIENT_MAP_SIMILARITY, /**< rotation, translation and scale */
   SUPINE_PATIENT_MAP_AFFINE,
   SUPINE_PATIENT_MAP_COUNT,
   SUPINE_PATIENT_MAP_RIGID = SUPINE_PATIENT_MAP_COUNT /**< not among the baselines */
@@ -66,5 +65,11 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
                             const double *to, supine_patient_affinity *map);
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
                               double to[3]);
+
+/** Check by their boxes that two surfaces can be two states of the same lungs.
+ * @retval SUPINE_ERROR_MESH  sizes that differ by more than 1.6 times, or boxes that hardly overlap
+ */
+supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
+                                         supine_error *error);
 
 #endif

@@ -63,6 +63,11 @@ static const numbers table[] = {
     {"motion", "rotation_rad", 3, AT(patient.power.motion[3]), false},
     {NULL, "c1_to_c9", SUPINE_PATIENT_CONSTANTS, AT(patient.power.c), false},
     {NULL, "standard_errors", SUPINE_PATIENT_CONSTANTS, AT(report.error), true},
+    {"surface", "vertices", 1, AT(surface.vertices), true},
+    {"surface", "matched_share", 1, AT(surface.matched), true},
+    {"surface", "rms_before_mm", 1, AT(surface.before), true},
+    {"surface", "rms_after_mm", 1, AT(surface.after), true},
+    {"expandability", "unseen_regions", 1, AT(expand.unseen), true},
     {"expandability", "fitted_without_and_with_mm", 2, AT(expand.fitted), true},
     {"expandability", "held_out_without_and_with_mm", 2, AT(expand.held_out), true},
     {"applied_force", "blocks", 1, AT(applied.blocks), true},
@@ -107,17 +112,16 @@ static json_t *list_of(const void *values, size_t width, size_t count) {
   return all;
 }
 
-static json_t *encode(const supine_patient_record *record, const char *made_by) {
+json_t *supine_patient_encode(const supine_patient_record *record, const char *made_by) {
   const supine_patient *patient = &record->patient;
   json_t *further = json_array();
   json_t *root = json_pack(
-      "{s:s, s:i, s:s, s:s, s:{s:s, s:s}, s:{s:o}, s:{s:o}, s:{s:o}, s:{s:o}, s:o, s:s*}", "format",
-      format, "version", VERSION, "name", record->name, "law",
-      supine_patient_law_names[patient->law], "frame", "lungs", sides[1 + patient->frame.only_side],
-      "of", record->from_surface ? "surface" : "landmarks", "fuller", "state",
+      "{s:s, s:i, s:s, s:s, s:{s:s, s:s}, s:{s:o}, s:{s:o}, s:{s:o}, s:o, s:s*}", "format", format,
+      "version", VERSION, "name", record->name, "law", supine_patient_law_names[patient->law],
+      "frame", "lungs", sides[1 + patient->frame.only_side], "of",
+      record->from_surface ? "surface" : "landmarks", "fuller", "state",
       state_text(&record->state[0]), "emptier", "state", state_text(&record->state[1]),
       "correction", "centres", list_of(patient->centre, CENTRE, patient->centre_count),
-      "expandability", "regions", list_of(record->stiffness.mode, REGION, record->stiffness.count),
       "further_states", further, "made_by", made_by);
   for (size_t i = 0; i < sizeof table / sizeof *table && root != NULL; ++i) {
     const double *values = (const double *)((const char *)record + table[i].offset);
@@ -138,11 +142,27 @@ static json_t *encode(const supine_patient_record *record, const char *made_by) 
                                           "scale", told->scale, "left_rms_mm", told->left,
                                           "left_without_gain_mm", told->left_without));
   }
+  if (record->stiffness.count > 0) {
+    (void)json_object_set_new(group_of(root, "expandability"), "regions",
+                              list_of(record->stiffness.mode, REGION, record->stiffness.count));
+  }
+  if (record->expand.tried) {
+    (void)json_object_set_new(group_of(root, "expandability"), "kept",
+                              json_boolean(record->expand.kept));
+  }
+  (void)json_object_set_new(group_of(root, "force"), "gain_from",
+                            json_string(record->gain_open
+                                            ? "the law deep: the states in other postures do not "
+                                              "determine it"
+                                        : record->gain_error > 0.0
+                                            ? "the states in other postures"
+                                            : "the law deep: scans in one posture do not determine "
+                                              "it; give --state in another posture"));
   return root;
 }
 
 char *supine_patient_text(const supine_patient_record *record, const char *made_by) {
-  json_t *root = encode(record, made_by);
+  json_t *root = supine_patient_encode(record, made_by);
   char *text = root == NULL ? NULL : json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
   json_decref(root);
   return text;
@@ -232,8 +252,9 @@ static bool take_correction(const json_t *root, supine_patient *patient) {
 }
 
 static bool take_regions(const json_t *root, supine_patient_stiffness *stiffness) {
-  bool right = take_list(json_object_get(json_object_get(root, "expandability"), "regions"), REGION,
-                         SUPINE_PATIENT_MODES, stiffness->mode, &stiffness->count);
+  const json_t *regions = json_object_get(json_object_get(root, "expandability"), "regions");
+  bool right = regions == NULL ||
+               take_list(regions, REGION, SUPINE_PATIENT_MODES, stiffness->mode, &stiffness->count);
   for (size_t k = 0; k < stiffness->count; ++k) {
     const supine_patient_mode *mode = &stiffness->mode[k];
     right = right && fabs(mode->side) == 1.0 && mode->value > 0.0 && mode->radius > 0.0;

@@ -59,7 +59,7 @@ typedef struct supine_patient_expand_report {
   bool tried, kept;
   double fitted[2];   /**< RMS distance between the surfaces along normals, mm, without and with */
   double held_out[2]; /**< the same on held-out blocks */
-  size_t unseen;      /**< number of regions that do not count as seen */
+  double unseen;      /**< number of regions that do not count as seen */
 } supine_patient_expand_report;
 
 /** The force that a measured displacement shows ([Santhanam2008] IV-B.3), with no assumption about
@@ -81,7 +81,7 @@ typedef struct supine_patient_applied {
 
 /** Result of the matching of surfaces. */
 typedef struct supine_patient_surface_report {
-  size_t vertices;      /**< vertices that took part */
+  double vertices;      /**< number of vertices that took part; 0: no surfaces */
   double matched;       /**< share of them with a compatible point */
   double before, after; /**< RMS distance, point to plane, before and after the fit, mm */
 } supine_patient_surface_report;
@@ -98,6 +98,7 @@ typedef struct supine_patient_record {
   bool from_surface;      /**< the boxes are of surfaces, else of landmarks */
   supine_patient_fit_report report;
   supine_patient_stiffness stiffness; /**< no regions: even tissue */
+  supine_patient_surface_report surface;
   supine_patient_expand_report expand;
   supine_patient_applied applied;
   double gain_error; /**< standard error of the gain; 0: not fitted */
@@ -105,7 +106,6 @@ typedef struct supine_patient_record {
   size_t told_count; /**< further states */
   supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_open; /**< the gain that fits is not between 0 and 2: it is undetermined and kept */
-  supine_patient_surface_report surface;
 } supine_patient_record;
 
 /** Write the record whole or not at all.
@@ -114,7 +114,10 @@ typedef struct supine_patient_record {
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
                                    const char *made_by, supine_error *error);
 
-/** Print the text of the file, for standard output; the caller frees it. NULL: no memory. */
+/** Make the JSON value of the file; the caller releases it. NULL: no memory. */
+struct json_t *supine_patient_encode(const supine_patient_record *record, const char *made_by);
+
+/** Print the text of the file; the caller frees it. NULL: no memory. */
 char *supine_patient_text(const supine_patient_record *record, const char *made_by);
 
 /** Read a record.
@@ -123,32 +126,21 @@ char *supine_patient_text(const supine_patient_record *record, const char *made_
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
-/** Displacement of a surface's vertices by a patient's law, (15)-(17) and the correction. */
-typedef struct supine_patient_field {
-  const supine_patient_record *record; /**< owned by the caller; must outlive the field */
-  double way[3];                       /**< part of the way from full inflation to rest between
-                                            the states, by axis */
-  double *moved;                       /**< [N, 3] mm from full inflation to rest, where the spread
-                                            force equals (18) */
-} supine_patient_field;
-
-/** Find the displacement of every vertex between the two fitted states; free it afterwards.
- * @param resting    volumes at rest
- * @param state      of the surface: 0 the fuller, 1 the emptier
- * @param stiffness  [N], written: relative E by the record's regions; NULL: even tissue
- * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
-supine_status supine_patient_field_find(const supine_patient_record *record,
-                                        const supine_resting *resting, const supine_lungs *lungs,
-                                        size_t state, double *stiffness,
-                                        supine_patient_field *field, supine_error *error);
-void supine_patient_field_free(supine_patient_field *field);
-
-/** Set force, directions and reach of a model to the patient's. The field must outlive the
- * model. With u the displacement and f the force in the fitted posture, at least 0.2 of its
- * mean, the directions are
+/** Set force, directions and reach of a model to a patient's. With u the displacement between the
+ * two states, scaled to the whole way from full inflation to rest, and F the spread force in the
+ * fitted posture, at least 0.2 of its mean, the directions are
  *
- *     d = -u / f               so that f d is the person's displacement */
-void supine_patient_model(const supine_patient_field *field, supine_model *model);
+ *     d = -u / F               so that F d is the person's displacement
+ *
+ * @param resting     volumes at rest
+ * @param state       of the surface: 0 the fuller, 1 the emptier
+ * @param stiffness   [N], written: relative E by the record's regions; NULL: even tissue
+ * @param directions  [N, 3] mm, written; must outlive the model
+ * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
+supine_status supine_patient_model(const supine_patient_record *record,
+                                   const supine_resting *resting, const supine_lungs *lungs,
+                                   size_t state, double *stiffness, double *directions,
+                                   supine_model *model, supine_error *error);
 
 /** Find the state of a surface from its box.
  * @param state  0 the fuller, 1 the emptier

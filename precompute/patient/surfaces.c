@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "precompute/patient/matching.h"
-#include "precompute/patient/validate.h"
 
 enum {
   VERTICES_MAX = 600,  /* most vertices of a fit: kriging has a length of 90 mm */
@@ -43,14 +42,14 @@ static void start_rows(matching *m) {
  * whose sill is chosen the first time. */
 static supine_status refit(const matching *m, bool shaped, supine_patient_fit_options *options,
                            supine_patient *patient, supine_error *error) {
-  const size_t count = m->count + m->landmark_rows_count;
   supine_patient_krige krige = {0};
-  if (!shaped) {
-    return supine_patient_law_fit(options, NULL, m->rows, count, &patient->power, error);
-  }
-  const supine_status status = supine_patient_krige_fit(options, m->rows, count, &krige, error);
+  options->size_only = !shaped;
+  const supine_status status =
+      supine_patient_krige_fit(options, m->rows, m->count + m->landmark_rows_count, &krige, error);
   if (status == SUPINE_OK) {
     supine_patient_krige_take(&krige, patient);
+  }
+  if (status == SUPINE_OK && shaped) {
     options->sill = krige.sill;
     options->uncorrected = krige.sill == 0.0;
     options->noise = krige.noise;
@@ -97,7 +96,7 @@ static supine_status settle(matching *m, const supine_patient_fit_options *wante
 /* Find the distance of the surfaces before the fit; fail if they are equal. */
 static supine_status look_at_rest(matching *m, supine_patient_surface_report *report,
                                   supine_error *error) {
-  report->vertices = m->count;
+  report->vertices = (double)m->count;
   supine_patient_matching_find(m);
   for (size_t i = 0; i < m->count; ++i) {
     report->before += m->distance[i] * m->distance[i] / (double)m->count;

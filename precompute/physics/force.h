@@ -46,12 +46,11 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
                           const supine_gravities *gravities, size_t vertex_count,
                           const size_t *vertices, double *force);
 
-/** The direction of displacement: (15)-(17), d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm. */
+/** The direction of displacement: (15)-(17), d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm, or a
+ * patient's own. */
 typedef struct supine_direction_law {
-  double c[6]; /**< c1 to c6 (model.h) */
-  /** Correct the directions [N, 3] of one person's lungs in place; NULL: no correction. */
-  void (*correct)(const void *context, const supine_lungs *lungs, double *directions);
-  const void *context; /**< argument of `correct`; owned by the caller */
+  double c[6];           /**< c1 to c6 (model.h) */
+  const double *vectors; /**< [N, 3] mm, used instead of c; NULL: c; owned by the caller */
 } supine_direction_law;
 
 /** Compute d [N, 3], mm, not normalised.

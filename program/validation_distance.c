@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare a prediction with another state of the same lungs. */
+/* Compute the distances of a prediction, and of fitted maps, to another state of the same lungs. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,23 +7,20 @@
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics.h>
 
-#include "precompute/patient/validate.h"
+#include "program/validation.h"
 
 #include "precompute/inside/surface.h"
 #include "sh/base/vec3.h"
 
-const char *const supine_patient_map_names[SUPINE_PATIENT_MAP_COUNT] = {
-    "predicted", "none", "translation", "rigid+scale", "affine"};
+const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predicted", "none",
+                                                                        "translation", "affine"};
 
 enum { ROUNDS = 20, FITTED_MAX = 2000 };
 
 /* RMS motion, mm, below which nothing moved: landmarks and surfaces are less precise. */
 static const double still = 0.05;
 
-static const double overlap_least = 0.5; /* least overlap over the smaller box, along each axis */
-static const double size_most = 1.6;     /* largest ratio of the boxes' sizes */
-
-static void summarise(double *distances, size_t count, supine_patient_distance *of) {
+static void summarise(double *distances, size_t count, supine_command_distance *of) {
   gsl_sort(distances, 1, count);
   of->mean = gsl_stats_mean(distances, 1, count);
   of->rms = sqrt(gsl_stats_tss_m(distances, 1, count, 0.0) / (double)count);
@@ -32,7 +29,7 @@ static void summarise(double *distances, size_t count, supine_patient_distance *
 }
 
 static void explain(supine_patient_moved moved,
-                    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
+                    supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
   const double none = distance[moved == SUPINE_PATIENT_STILL ? SUPINE_PATIENT_MAP_NONE
                                                              : SUPINE_PATIENT_MAP_TRANSLATION]
                           .rms;
@@ -54,9 +51,9 @@ static supine_status undetermined(supine_error *error) {
                           "the points lie in one plane: give points spread over the lungs");
 }
 
-supine_status supine_patient_validate_points(
+supine_status supine_command_compare_points(
     const supine_patient_pairs *pairs, const double *predicted, supine_patient_moved moved,
-    supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error) {
+    supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error) {
   double *space = malloc(pairs->count * sizeof *space);
   if (space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", pairs->count);
@@ -86,7 +83,7 @@ supine_status supine_patient_validate_points(
 static supine_status surface_distance(const supine_mesh *rest, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
-                                      supine_patient_distance *of, supine_error *error) {
+                                      supine_command_distance *of, supine_error *error) {
   const size_t n = rest->vertex_count;
   supine_inside_surface *tree = NULL;
   double *space = malloc((n + state->vertex_count) * sizeof *space);
@@ -132,35 +129,10 @@ static bool settle(supine_patient_map kind, size_t n, const double *vertices,
   return true;
 }
 
-supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
-                                         supine_error *error) {
-  double low[2][3];
-  double high[2][3];
-  supine_mesh_box(rest, low[0], high[0]);
-  supine_mesh_box(state, low[1], high[1]);
-  for (int k = 0; k < 3; ++k) {
-    const double size[2] = {high[0][k] - low[0][k], high[1][k] - low[1][k]};
-    const double overlap = fmin(high[0][k], high[1][k]) - fmax(low[0][k], low[1][k]);
-    if (!(size[1] > 0.0) || size[1] > size_most * size[0] || size[0] > size_most * size[1]) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "along %c the lungs are %.3g mm in the first state and %.3g mm in "
-                              "the other: check that units and lungs are the same",
-                              "xyz"[k], size[0], size[1]);
-    }
-    if (overlap < overlap_least * fmin(size[0], size[1])) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the two surfaces do not overlap along %c (%.0f to %.0f and %.0f to "
-                              "%.0f mm): check that frames, units and sides are the same",
-                              "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
-    }
-  }
-  return SUPINE_OK;
-}
-
 supine_status
-supine_patient_validate_surface(const supine_mesh *rest, supine_patient_moved moved,
+supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_moved moved,
                                 double *predicted, const supine_mesh *state, double *nearest,
-                                supine_patient_distance distance[SUPINE_PATIENT_MAP_COUNT],
+                                supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
                                 supine_error *error) {
   supine_inside_surface *tree = NULL;
   double *space = malloc(10 * (size_t)FITTED_MAX * sizeof *space);
