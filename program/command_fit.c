@@ -228,19 +228,6 @@ static supine_status order_states(const request *wanted, evidence *of, supine_er
   return SUPINE_OK;
 }
 
-static supine_status fit_surfaces(const request *wanted, const evidence *of,
-                                  const supine_patient_fit_options *options,
-                                  supine_patient_record *record, supine_error *error) {
-  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
-  const supine_patient_surface_task task = {.rest = &of->lungs[0],
-                                            .state = &of->lungs[1].mesh,
-                                            .model = &model,
-                                            .landmarks = of->pairs.count > 0 ? &of->pairs : NULL,
-                                            .options = *options,
-                                            .expandability = wanted->expandability};
-  return supine_patient_fit_surface(&task, record, error);
-}
-
 static supine_status fit_landmarks(const request *wanted, const supine_patient_pairs *pairs,
                                    const supine_patient_fit_options *options,
                                    supine_patient_record *record, supine_error *error) {
@@ -373,7 +360,6 @@ static void keep(const request *wanted, supine_patient_record *record) {
                  wanted->name != NULL ? wanted->name
                  : slash != NULL      ? slash + 1
                                       : source);
-  record->reach = deep.reach;
   record->force =
       supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }
@@ -399,8 +385,10 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
     for (size_t k = 0; k < 3; ++k) {
       options.way[k] = gains[1][k] - gains[0][k];
     }
-    status = wanted->state_path != NULL ? fit_surfaces(wanted, &of, &options, record, error)
-                                        : fit_landmarks(wanted, &of.pairs, &options, record, error);
+    status = wanted->state_path != NULL
+                 ? supine_patient_fit_surface(&of.lungs[0], &of.lungs[1].mesh, &of.pairs, &options,
+                                              wanted->expandability, record, error)
+                 : fit_landmarks(wanted, &of.pairs, &options, record, error);
   }
   if (status == SUPINE_OK) {
     keep(wanted, record);

@@ -84,16 +84,13 @@ static double contrast(const supine_lungs *lungs, const supine_patient_stiffness
  * e. */
 static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, double *e,
                        supine_patient_record *found) {
-  const supine_model model = truth(); /* its reach and force are given; the rest is fitted */
   supine_mesh state = other->mesh;
-  const supine_patient_surface_task task = {.rest = rest,
-                                            .state = &state,
-                                            .model = &model,
-                                            .options.gravity = {0.0, 1.0, 0.0},
-                                            .expandability = true};
+  const supine_patient_pairs no_landmarks = {0};
+  const supine_patient_fit_options options = {.gravity = {0.0, 1.0, 0.0}};
   supine_error error = {0};
   state.vertices = moved_by_truth(other, e, 0.5);
-  if (supine_patient_fit_surface(&task, found, &error) != SUPINE_OK) {
+  if (supine_patient_fit_surface(rest, &state, &no_landmarks, &options, true, found, &error) !=
+      SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   printf("fitted %.3f and %.3f mm without and with, held out %.3f and %.3f\n",

@@ -12,6 +12,8 @@
 
 #include "patient_helpers.h"
 
+static const supine_patient_pairs no_landmarks;
+
 /* Return the vertices moved by the true law, [N, 3]. */
 static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   const supine_model model = truth();
@@ -44,21 +46,18 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   gsl_rng_free(random);
   moved.vertices = target;
 
-  const supine_model model = truth(); /* its stiffness and reach are given; the rest is fitted */
-  const supine_patient_surface_task task = {.rest = &rest,
-                                            .state = &moved,
-                                            .model = &model,
-                                            .options = {.law = SUPINE_PATIENT_PAPER},
-                                            .options.gravity = {0.0, 1.0, 0.0}};
+  const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER,
+                                              .gravity = {0.0, 1.0, 0.0}};
   static supine_patient_record fit;
   supine_error error = {0};
-  if (supine_patient_fit_surface(&task, &fit, &error) != SUPINE_OK) {
+  if (supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error) !=
+      SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   const supine_patient patient = fit.patient;
   const supine_patient_surface_report surface = fit.surface;
   /* The basis counts from the emptier state, so the scale has the opposite sign. */
-  supine_patient_record record = {.patient = patient, .reach = 10.0, .from_surface = true};
+  supine_patient_record record = {.patient = patient, .from_surface = true};
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
   supine_model found = truth();
@@ -120,11 +119,11 @@ TEST(test_fit_surface_other_law_basis_reaches_the_state) {
   double largest = 0.0;
   supine_mesh moved = other.mesh;
   moved.vertices = moved_by_truth(&other, &largest);
-  const supine_model model = truth();
-  const supine_patient_surface_task task = {
-      .rest = &rest, .state = &moved, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
+  const supine_patient_fit_options options = {.gravity = {0.0, 1.0, 0.0}};
   static supine_patient_record fit;
-  assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_OK);
+  assert_int_equal(
+      supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error),
+      SUPINE_OK);
   printf("largest move %.1f mm; %.2f mm before, %.3f in the end; deep alone %.2f, held out %.3f "
          "mm\n",
          largest, fit.surface.before, fit.surface.after,
@@ -160,12 +159,11 @@ TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
                      SUPINE_OK);
     moved.vertices = malloc(3 * moved.vertex_count * sizeof(double));
     supine_physics_solution_apply(&solution, &rest.mesh, 1.0, moved.vertices);
-    const supine_patient_surface_task task = {.rest = &rest,
-                                              .state = &moved,
-                                              .model = &model,
-                                              .options = {.law = SUPINE_PATIENT_PAPER},
-                                              .options.gravity = {0.0, k == 2 ? -1.0 : 1.0, 0.0}};
-    assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_OK);
+    const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER,
+                                                .gravity = {0.0, k == 2 ? -1.0 : 1.0, 0.0}};
+    assert_int_equal(
+        supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error),
+        SUPINE_OK);
     found[k] = fit.applied.correlation;
     printf("correlation %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f\n",
            fit.applied.correlation, fit.applied.slopes[0], fit.applied.slopes[1],
@@ -217,12 +215,12 @@ TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
 }
 
 static void refused(const supine_lungs *rest, const supine_mesh *moved, const char *words) {
-  const supine_model model = truth();
-  const supine_patient_surface_task task = {
-      .rest = rest, .state = moved, .model = &model, .options.gravity = {0.0, 1.0, 0.0}};
+  const supine_patient_fit_options options = {.gravity = {0.0, 1.0, 0.0}};
   static supine_patient_record fit;
   supine_error error = {0};
-  assert_int_equal(supine_patient_fit_surface(&task, &fit, &error), SUPINE_ERROR_MESH);
+  assert_int_equal(
+      supine_patient_fit_surface(rest, moved, &no_landmarks, &options, false, &fit, &error),
+      SUPINE_ERROR_MESH);
   if (strstr(error.message, words) == NULL) {
     fail_msg("'%s' does not say '%s'", error.message, words);
   }

@@ -10,9 +10,13 @@
 
 #include "sh/base/vec3.h"
 
+static const double apart = 35.0; /* largest distance of a vertex from the nearest centre, mm */
+static const double overlapping = 1.5; /* radius of a region over that distance */
+
 enum {
-  LANES = 16, /* regions solved for at once */
-  ROUNDS = 5  /* rounds of fitting and of finding the nearest points */
+  LOOKED_AT = 8192, /* most vertices considered as centres */
+  LANES = 16,       /* regions solved for at once */
+  ROUNDS = 5        /* rounds of fitting and of finding the nearest points */
 };
 
 /* Prior standard deviations of a: between neighbouring regions, and of any region from 1. */
@@ -24,14 +28,93 @@ static const double together = 10.0;   /* neighbouring rows with a common error,
 static const double near_by = 1.7; /* largest distance of neighbouring centres over the least one */
 static const double worth = 0.95;  /* ratio of held-out RMS, with over without, to keep it */
 
+/* --- the regions ----------------------------------------------------------------------------- */
+
+/* Find the vertex of a side farthest from the regions, and its distance, mm. */
+static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
+                       int side, double *distance) {
+  size_t found = 0;
+  const size_t step = lungs->mesh.vertex_count / LOOKED_AT + 1;
+  *distance = 0.0;
+  for (size_t i = 0; i < lungs->mesh.vertex_count; i += step) {
+    double nearest = supine_patient_side_of(lungs, i) == side ? INFINITY : 0.0;
+    for (size_t k = 0; k < stiffness->count; ++k) {
+      if (stiffness->mode[k].side == side) {
+        nearest =
+            fmin(nearest, supine_distance(stiffness->mode[k].centre, lungs->mesh.vertices + 3 * i));
+      }
+    }
+    if (nearest > *distance) {
+      *distance = nearest;
+      found = i;
+    }
+  }
+  return found;
+}
+
+/* Spread regions with a = 1 over the lungs' surface, some 45 mm apart. */
+static void spread_regions(const supine_lungs *lungs, supine_patient_stiffness *stiffness) {
+  *stiffness = (supine_patient_stiffness){0};
+  for (int side = 1; side >= -1; side -= 2) {
+    const size_t first = stiffness->count;
+    double distance;
+    size_t vertex = farthest(lungs, stiffness, side, &distance);
+    while (distance > apart && stiffness->count - first < SUPINE_PATIENT_MODES / 2) {
+      supine_patient_mode *mode = &stiffness->mode[stiffness->count++];
+      *mode = (supine_patient_mode){.side = side, .value = 1.0};
+      memcpy(mode->centre, lungs->mesh.vertices + 3 * vertex, sizeof mode->centre);
+      vertex = farthest(lungs, stiffness, side, &distance);
+    }
+    for (size_t k = first; k < stiffness->count; ++k) {
+      stiffness->mode[k].radius = overlapping * distance;
+    }
+  }
+}
+
+void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
+                                     const supine_lungs *lungs, size_t vertex, double *shares) {
+  const double *point = lungs->mesh.vertices + 3 * vertex;
+  const int side = supine_patient_side_of(lungs, vertex);
+  double sum = 0.0;
+  double least = INFINITY;
+  size_t nearest = 0;
+  for (size_t k = 0; k < stiffness->count; ++k) {
+    const supine_patient_mode *mode = &stiffness->mode[k];
+    const double distance = mode->side == side ? supine_distance(mode->centre, point) : INFINITY;
+    const double q = fmin(1.0, fmax(0.0, 2.0 - 2.0 * distance / mode->radius));
+    shares[k] = q * q * (3.0 - 2.0 * q);
+    sum += shares[k];
+    nearest = distance < least ? k : nearest;
+    least = fmin(least, distance);
+  }
+  for (size_t k = 0; k < stiffness->count; ++k) {
+    shares[k] = sum > 0.0 ? shares[k] / sum : (double)(k == nearest);
+  }
+}
+
+void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
+                                 const supine_lungs *lungs, double *e) {
+  double shares[SUPINE_PATIENT_MODES];
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    double a = stiffness->count == 0 ? 1.0 : 0.0;
+    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
+    for (size_t k = 0; k < stiffness->count; ++k) {
+      a += stiffness->mode[k].value * shares[k];
+    }
+    e[i] = 1.0 / a;
+  }
+}
+
+/* --- the fit --------------------------------------------------------------------------------- */
+
 /* Compute the prior precision [count, count] of a - 1. */
 static void find_precision(const supine_patient_stiffness *regions, double *precision) {
   const supine_patient_mode *mode = regions->mode;
   const size_t n = regions->count;
   double nearest = INFINITY;
   for (size_t i = 0; i < n * n; ++i) {
-    const double apart = supine_distance(mode[i / n].centre, mode[i % n].centre);
-    nearest = i / n != i % n ? fmin(nearest, apart) : nearest;
+    const double distance = supine_distance(mode[i / n].centre, mode[i % n].centre);
+    nearest = i / n != i % n ? fmin(nearest, distance) : nearest;
     precision[i] = i / n == i % n ? pow(regions_differ, -2.0) : 0.0;
   }
   for (size_t i = 0; i < n * n; ++i) {
@@ -48,8 +131,9 @@ static void find_precision(const supine_patient_stiffness *regions, double *prec
 /* Solve for the force on each region alone, LANES at a time. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,
-                                    const supine_model *model, const double gravity[3],
-                                    double *response, supine_error *error) {
+                                    const double gravity[3], double *response,
+                                    supine_error *error) {
+  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const size_t n = m->rest->mesh.vertex_count;
   double range[2];
   double *force = malloc(n * sizeof *force);
@@ -57,13 +141,13 @@ static supine_status find_responses(const supine_patient_matching *m,
   double *caught = malloc(n * LANES * sizeof *caught);
   supine_status status = SUPINE_ERROR_MEMORY;
   if (force == NULL || alone == NULL || caught == NULL ||
-      supine_physics_height_range(m->rest, model->force.pair, 1, gravity, range, range + 1) !=
+      supine_physics_height_range(m->rest, model.force.pair, 1, gravity, range, range + 1) !=
           SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
     goto cleanup;
   }
   const supine_gravities gravities = {1, gravity, range, range + 1};
-  supine_physics_force(m->rest, &model->force, &gravities, n, NULL, force);
+  supine_physics_force(m->rest, &model.force, &gravities, n, NULL, force);
   status = supine_physics_equilibrium_set_stiffness(m->equilibrium, NULL, error);
   for (size_t first = 0; first < regions->count && status == SUPINE_OK; first += LANES) {
     const size_t lanes = regions->count - first < LANES ? regions->count - first : LANES;
@@ -135,22 +219,20 @@ static supine_status settle(supine_patient_matching *m, const double *response,
 
 supine_status supine_patient_expand(supine_patient_matching *matching,
                                     const supine_patient_fit_options *options,
-                                    const supine_model *model, supine_patient *patient,
-                                    supine_patient_stiffness *stiffness,
+                                    supine_patient *patient, supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error) {
   supine_patient_matching *m = matching;
   supine_patient_fit_options wanted = *options;
   supine_patient_fit_report scores;
   *report = (supine_patient_expand_report){.tried = true};
-  supine_patient_stiffness_spread(m->rest, stiffness);
+  spread_regions(m->rest, stiffness);
   const size_t n = stiffness->count;
   double *response = malloc((m->count * n + 1) * sizeof *response);
   double *precision = malloc((n * n + 1) * sizeof *precision);
-  double *tissue = malloc(m->rest->mesh.vertex_count * sizeof *tissue);
   supine_status status =
-      response == NULL || precision == NULL || tissue == NULL
+      response == NULL || precision == NULL
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu regions", n)
-          : find_responses(m, stiffness, model, options->gravity, response, error);
+          : find_responses(m, stiffness, options->gravity, response, error);
   if (status == SUPINE_OK) {
     find_precision(stiffness, precision);
     wanted.region_count = n;
@@ -170,11 +252,9 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
     for (size_t k = 0; k < stiffness->count; ++k) {
       report->unseen += stiffness->mode[k].seen < SUPINE_PATIENT_SEEN ? 1.0 : 0.0;
     }
-    supine_patient_stiffness_of(stiffness, m->rest, tissue);
-    status = supine_patient_matching_solve(m, tissue, error);
+    status = supine_patient_matching_solve(m, stiffness, error);
   }
   free(response);
   free(precision);
-  free(tissue);
   return status;
 }

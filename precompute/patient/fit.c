@@ -52,9 +52,10 @@ static void add_rows(const study *s, const supine_patient_row *rows, size_t coun
     for (size_t j = i; j < i + s->components; ++j) {
       const supine_patient_row *row = &rows[j];
       double variance;
+      double x[SUPINE_PATIENT_TERMS];
       const double left[SCORES] = {row->value, supine_patient_affine_residual(map[0], row),
                                    supine_patient_affine_residual(map[1], row),
-                                   supine_patient_power_residual(&krige->alone, row),
+                                   supine_patient_power_design(&krige->alone, row, x),
                                    supine_patient_krige_predict(krige, row, &variance) -
                                        row->value};
       for (size_t k = 0; k < SCORES; ++k) {

@@ -87,18 +87,13 @@ static double height_at(const supine_patient_frame *frame, const supine_patient_
  * that takes part. */
 static supine_status take_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
                                supine_error *error) {
-  supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
-  double *stiffness = pairs != NULL ? NULL : malloc(rest->mesh.vertex_count * sizeof *stiffness);
   supine_status status = SUPINE_OK;
   if (pairs != NULL) {
     w->count = 3 * pairs->count;
     w->rows = malloc(w->count * sizeof *w->rows);
-  } else if (stiffness != NULL) {
-    supine_patient_stiffness_of(&w->record->stiffness, rest, stiffness);
-    model.reach = w->record->reach;
-    model.stiffness = stiffness;
-    status = supine_patient_matching_create(rest, w->surface, &model, VERTICES_MAX, 0, &w->matching,
-                                            error);
+  } else {
+    status = supine_patient_matching_create(rest, w->surface, &w->record->stiffness, VERTICES_MAX,
+                                            0, &w->matching, error);
     w->count = w->matching.count;
     w->rows = w->matching.rows;
   }
@@ -109,7 +104,6 @@ static supine_status take_rows(work *w, const supine_lungs *rest, const supine_p
   } else if (status == SUPINE_OK && pairs != NULL) {
     supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, w->rows);
   }
-  free(stiffness);
   return status;
 }
 

@@ -38,7 +38,7 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
   double u[3];
   supine_patient_direction(law, place, supine_patient_force_at(law, place), u);
   centre.size = supine_length(u);
-  memcpy(centre.at, place->arm, sizeof centre.at); /* relative, as only distances count */
+  memcpy(centre.at, place->arm, sizeof centre.at);
   return centre;
 }
 
@@ -428,16 +428,11 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
 
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient) {
   const supine_patient_krige *k = krige;
-  double middle[3];
-  supine_patient_centre_of(&patient->frame, middle);
   patient->power = k->law;
   patient->centre_count = 0;
   for (size_t i = 0; i < k->count && k->sill > 0.0; ++i) {
-    supine_patient_centre centre = k->centre[i];
+    const supine_patient_centre centre = k->centre[i];
     supine_patient_centre *last = patient->centre + patient->centre_count;
-    for (size_t a = 0; a < 3; ++a) {
-      centre.at[a] += middle[a];
-    }
     if (k->rows[i].weight <= 0.0) {
       continue;
     }

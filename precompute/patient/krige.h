@@ -56,10 +56,6 @@ enum { SUPINE_PATIENT_TERMS = 16, SUPINE_PATIENT_REGIONS_MAX = 256 };
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]);
 
-/* Compute the law's value less the row's, mm. */
-double supine_patient_power_residual(const supine_patient_power *law,
-                                     const supine_patient_row *row);
-
 /* --- maps without a law ---------------------------------------------------------------------- */
 
 enum { SUPINE_PATIENT_AFFINE = 12 };

@@ -90,9 +90,16 @@ static void free_chosen(supine_patient_matching *m) {
 }
 
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
-                                            const double *stiffness, supine_error *error) {
+                                            const supine_patient_stiffness *stiffness,
+                                            supine_error *error) {
   supine_patient_matching *m = matching;
-  supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, stiffness, error);
+  const size_t n = m->rest->mesh.vertex_count;
+  double *e = malloc(n * sizeof *e);
+  if (e == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  }
+  supine_patient_stiffness_of(stiffness, m->rest, e);
+  supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, e, error);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->columns,
                                               m->caught, NULL, error);
@@ -101,6 +108,7 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
     memcpy(m->rows[i].place.force, m->caught + SUPINE_PATIENT_COLUMNS * m->vertex[i],
            sizeof m->rows[i].place.force);
   }
+  free(e);
   return status;
 }
 
@@ -135,7 +143,7 @@ supine_status supine_patient_matching_choose(supine_patient_matching *matching, 
 }
 
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
-                                             const supine_model *model, size_t most,
+                                             const supine_patient_stiffness *stiffness, size_t most,
                                              size_t landmarks, supine_patient_matching *matching,
                                              supine_error *error) {
   const size_t n = rest->mesh.vertex_count;
@@ -156,9 +164,10 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
     const supine_patient_place place = supine_patient_find_vertex(rest, i);
     memcpy(m->columns + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
   }
-  supine_status status = supine_physics_model_equilibrium(rest, model, &m->equilibrium, error);
+  const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
+  supine_status status = supine_physics_model_equilibrium(rest, &model, &m->equilibrium, error);
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_solve(m, model->stiffness, error);
+    status = supine_patient_matching_solve(m, stiffness, error);
   }
   if (status == SUPINE_OK) {
     status = supine_patient_matching_choose(m, most, landmarks, error);

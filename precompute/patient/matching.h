@@ -33,7 +33,7 @@ typedef struct supine_patient_matching {
  * the rows of the landmarks. Zero-initialise before; free even after a failure.
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
-                                             const supine_model *model, size_t most,
+                                             const supine_patient_stiffness *stiffness, size_t most,
                                              size_t landmarks, supine_patient_matching *matching,
                                              supine_error *error);
 void supine_patient_matching_free(supine_patient_matching *matching);
@@ -44,10 +44,11 @@ void supine_patient_matching_free(supine_patient_matching *matching);
 supine_status supine_patient_matching_choose(supine_patient_matching *matching, size_t most,
                                              size_t landmarks, supine_error *error);
 
-/* Spread the force's columns under a stiffness [N] (NULL: 1); write them to `caught` and the rows.
- * @retval as the solve */
+/* Spread the force's columns under a stiffness; write them to `caught` and the rows.
+ * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
-                                            const double *stiffness, supine_error *error);
+                                            const supine_patient_stiffness *stiffness,
+                                            supine_error *error);
 
 /* Append the landmarks' rows, with the same total weight as the surface's rows. */
 void supine_patient_matching_append(supine_patient_matching *matching,
@@ -68,10 +69,6 @@ void supine_patient_matching_find(supine_patient_matching *matching);
  * @param rms    written: weighted RMS distance, mm */
 double supine_patient_matching_weigh(supine_patient_matching *matching, double scale, double *rms);
 
-/** Spread regions with a = 1 over the lungs' surface, some 45 mm apart. */
-void supine_patient_stiffness_spread(const supine_lungs *lungs,
-                                     supine_patient_stiffness *stiffness);
-
 /** Find the weights [count] of the regions at a vertex; they sum to 1. */
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
                                      const supine_lungs *lungs, size_t vertex, double *shares);
@@ -83,25 +80,24 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
 /** Find the expandability from motion ([Santhanam2008] VI): a stiffness for each region of a lung,
  * such that a known force moves it to the other surface.
  *
- * The motion depends only on the product a f of expandability and force, so f is fixed to the
- * model's (18). The spread force F is then linear in the regions' values a_k, F = sum of a_k F_k,
- * where F_k is the spread force of region k alone: one solve with a right-hand side for each
- * region. The values are fitted together with the constants of the paper law and the motion between
- * the scans (krige.h), with a prior that keeps neighbours alike and a near 1; fit and nearest
- * points alternate. Where the surfaces say little about a region, its neighbours determine it.
+ * The motion depends only on the product a f of expandability and force, so f is fixed to
+ * that of the law deep. The spread force F is then linear in the regions' values a_k, F = sum of
+ * a_k F_k, where F_k is the spread force of region k alone: one solve with a right-hand side for
+ * each region. The values are fitted together with the constants of the paper law and the motion
+ * between the scans (krige.h), with a prior that keeps neighbours alike and a near 1; fit and
+ * nearest points alternate. Where the surfaces say little about a region, its neighbours determine
+ * it.
  *
  * The result is kept only if it predicts held-out blocks of 40 mm better than uniform tissue
  * does under the same force.
  * @param matching   without landmarks; its force is spread by the stiffness afterwards
  * @param options    of the paper's law; the gravity of the other state
- * @param model      its force is held fixed
  * @param patient    its frame is set; overwritten
  * @param stiffness  no regions if it was not kept
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,
                                     const supine_patient_fit_options *options,
-                                    const supine_model *model, supine_patient *patient,
-                                    supine_patient_stiffness *stiffness,
+                                    supine_patient *patient, supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error);
 
 /** Find the force that the displacement to the other surface implies, averaged over blocks, and fit

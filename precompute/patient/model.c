@@ -12,11 +12,10 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between the centres of the surface's box and the nearest state's, over the width
- * of the latter, and largest ratio of their sizes: if the state's box is of landmarks, which is an
- * estimate, and if it is of a surface. */
-static const double apart_most[2] = {0.3, 0.15};
-static const double size_most[2] = {1.6, 1.25};
+/* Largest distance between the faces of the surface's box and the nearest state's, over the width
+ * of the latter: if the state's box is of landmarks, which is an estimate, and if it is of a
+ * surface. */
+static const double apart_most[2] = {0.45, 0.2};
 
 /* Least force, relative to its mean of 1, that a displacement is divided by. */
 static const double force_least = 0.2;
@@ -124,7 +123,6 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_solution solution = {0};
   model.force = record->force;
-  model.reach = record->reach;
   if (stiffness != NULL) {
     supine_patient_stiffness_of(&record->stiffness, &w->lungs, stiffness);
     model.stiffness = stiffness;
@@ -232,7 +230,6 @@ supine_status supine_patient_model(const supine_patient_record *record,
     }
   }
   model->force = record->force;
-  model->reach = record->reach;
   model->direction.vectors = directions;
 cleanup:
   free(ratio);
@@ -249,37 +246,33 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   const double *low[2] = {frame->minimum, record->emptier[0]};
   const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* largest difference of the boxes over a state's width */
+  double off[2] = {0.0, 0.0}; /* largest distance of the faces over a state's width */
+  size_t axis[2] = {0};
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(
         error, SUPINE_ERROR_MESH,
         "the patient's law was fitted to the %s lung alone: give that lung, or fit both",
         frame->only_side > 0 ? "left" : "right");
   }
-  for (size_t i = 0; i < 6; ++i) {
-    const size_t s = i / 3;
-    const size_t k = i % 3;
-    const double apart =
-        fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k]));
-    off[s] = fmax(off[s], apart / (high[s][k] - low[s][k]));
-  }
-  *state = off[1] < off[0] ? 1 : 0;
-  for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
-    const double from = low[*state][k];
-    const double to = high[*state][k];
-    const double size = (lungs->maximum[k] - lungs->minimum[k]) / (to - from);
-    const double apart =
-        0.5 * fabs(lungs->maximum[k] + lungs->minimum[k] - to - from) / (to - from);
-    if (apart > apart_most[record->from_surface] || size > size_most[record->from_surface] ||
-        size < 1.0 / size_most[record->from_surface]) {
-      return supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "the patient's law was fitted between %c = %.0f and %.0f mm, but the surface reaches "
-          "from %.0f to %.0f: give both in one frame and unit, of one person",
-          "xyz"[k], from, to, lungs -> minimum[k], lungs -> maximum[k]);
+  for (size_t s = 0; s < 2; ++s) { /* one lung of two is narrower along x */
+    for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
+      const double apart =
+          fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k])) /
+          (high[s][k] - low[s][k]);
+      axis[s] = apart > off[s] ? k : axis[s];
+      off[s] = fmax(off[s], apart);
     }
   }
-  return SUPINE_OK;
+  *state = off[1] < off[0] ? 1 : 0;
+  const size_t k = axis[*state];
+  return off[*state] <= apart_most[record->from_surface]
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "the patient's law was fitted between %c = %.0f and %.0f mm, but "
+                                "the surface reaches from %.0f to %.0f: give both in one frame "
+                                "and unit, of one person",
+                                "xyz"[k], low[*state][k], high[*state][k], lungs -> minimum[k],
+                                lungs -> maximum[k]);
 }
 
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {

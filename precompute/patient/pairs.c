@@ -20,7 +20,7 @@ enum {
   PAIRS_LEAST = 12 /* an affine map needs 4 pairs; three times that */
 };
 
-static const double flattest = 1.0;   /* least RMS distance from the best-fitting plane, mm */
+static const double flattest = 1.0;   /* least RMS distance of points from a plane, mm */
 static const double stillest = 0.05;  /* least RMS motion, mm: below the precision of a landmark */
 static const double size_most = 2.0;  /* largest ratio of sizes: a full breath gives 1.4 */
 static const double turn_most = 25.0; /* largest rotation between two scans, degrees */
@@ -140,6 +140,9 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
       map->m[k] = cross[k % 3][k / 3];
     }
     right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
+    for (size_t k = 0; k < 3; ++k) { /* RMS distance from the plane or line of the axes before */
+      right = right && scatter[k][k] >= flattest * sqrt((double)count);
+    }
   }
   supine_patient_map_apply(map, mean[0], moved);
   for (size_t k = 0; k < 3; ++k) {
@@ -162,7 +165,7 @@ typedef struct summary {
   double mean[2][3];
   double spread[2]; /* RMS distance from the mean, mm */
   double side[2];   /* longest side of the box, mm */
-  double thinnest;  /* RMS distance of the first points from their best-fitting plane, mm */
+  bool flat;        /* the first points lie in a plane */
   double turn;      /* best rotation, degrees */
   double growth;    /* determinant of the best affine map; negative: mirrored */
   double left;      /* RMS residual of that map, mm */
@@ -172,9 +175,6 @@ typedef struct summary {
 static summary measure(const supine_patient_pairs *pairs, bool moved) {
   const size_t n = pairs->count;
   supine_patient_affinity map;
-  double covariance[9];
-  double space[8];
-  double width[3] = {0.0};
   summary s = {.left = 0.0};
   for (size_t i = 0; i < 6; ++i) {
     const double *points = (i < 3 ? pairs->from : pairs->to) + i % 3;
@@ -185,15 +185,10 @@ static summary measure(const supine_patient_pairs *pairs, bool moved) {
     s.mean[i / 3][i % 3] = gsl_stats_mean(points, 3, n);
     s.spread[i / 3] = hypot(s.spread[i / 3], sqrt(gsl_stats_tss(points, 3, n) / (double)n));
   }
-  for (size_t k = 0; k < 9; ++k) {
-    covariance[k] = gsl_stats_covariance(pairs->from + k / 3, 3, pairs->from + k % 3, 3, n);
-  }
-  (void)LAPACKE_dsyev_work(LAPACK_COL_MAJOR, 'N', 'L', 3, covariance, 3, width, space, 8);
-  s.thinnest = sqrt(fmax(0.0, width[0]));
   (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_RIGID, n, pairs->from, pairs->to, &map);
   s.turn = acos(fmin(1.0, fmax(-1.0, 0.5 * (map.m[0] + map.m[4] + map.m[8] - 1.0)))) * 180.0 /
            3.14159265358979323846;
-  (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_AFFINE, n, pairs->from, pairs->to, &map);
+  s.flat = !supine_patient_map_fit(SUPINE_PATIENT_MAP_AFFINE, n, pairs->from, pairs->to, &map);
   s.growth = supine_triple(map.m, map.m + 3, map.m + 6);
   for (size_t i = 0; i < n; ++i) {
     double at[3];
@@ -237,11 +232,9 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                             "the other state is %.3g times as large as rest: are both in mm?",
                             size);
   }
-  if (s.thinnest < flattest) {
+  if (s.flat) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "all points lie in one plane (%.2g mm RMS): give landmarks spread "
-                            "over the lungs",
-                            s.thinnest);
+                            "all points lie in one plane: give landmarks spread over the lungs");
   }
   if (s.left > unmatched * s.spread[1]) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,

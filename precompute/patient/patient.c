@@ -19,27 +19,19 @@ static double inside(double box) {
   return fmin(1.0, fmax(0.0, box));
 }
 
-void supine_patient_centre_of(const supine_patient_frame *frame, double centre[3]) {
-  for (int k = 0; k < 3; ++k) {
-    centre[k] = 0.5 * (frame->minimum[k] + frame->maximum[k]);
-  }
-}
-
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side) {
   supine_patient_place place = {.force = {1.0}};
-  double centre[3];
   place.side = frame->only_side != 0       ? frame->only_side
                : side != 0.0               ? side
                : point[0] > frame->midline ? 1.0
                                            : -1.0;
   const double outer = place.side > 0.0 ? frame->maximum[0] : frame->minimum[0];
-  supine_patient_centre_of(frame, centre);
   for (int k = 0; k < 3; ++k) {
     place.box[k] = k == 0
                        ? (point[0] - frame->midline) / (outer - frame->midline)
                        : (frame->maximum[k] - point[k]) / (frame->maximum[k] - frame->minimum[k]);
-    place.arm[k] = point[k] - centre[k];
+    place.arm[k] = point[k] - 0.5 * (frame->minimum[k] + frame->maximum[k]);
     place.force[1 + k] = inside(place.box[k]) - 0.5;
   }
   return place;
@@ -121,10 +113,7 @@ double supine_patient_covariance(const supine_patient_centre *a, const supine_pa
 void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
                             double u[3]) {
   supine_patient_centre here = {.side = place->side, .size = supine_length(u)};
-  supine_patient_centre_of(&patient->frame, here.at);
-  for (int k = 0; k < 3; ++k) {
-    here.at[k] += place->arm[k];
-  }
+  memcpy(here.at, place->arm, sizeof here.at);
   for (size_t i = 0; i < patient->centre_count; ++i) {
     const supine_patient_centre *centre = &patient->centre[i];
     const double covariance = supine_patient_covariance(&here, centre);

@@ -59,7 +59,7 @@ typedef struct supine_patient_power {
 
 /** One kernel of the correction. */
 typedef struct supine_patient_centre {
-  double at[3];     /**< mm */
+  double at[3];     /**< from the box's centre, mm */
   double side;      /**< of its lung: +1 left, -1 right */
   double size;      /**< law's displacement there, mm */
   double weight[3]; /**< 1/mm */
@@ -86,9 +86,6 @@ typedef struct supine_patient_place {
  * @param side  of the point's lung, +1 or -1; 0: by the midline */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
-
-/** Compute the centre of a frame, mm. */
-void supine_patient_centre_of(const supine_patient_frame *frame, double centre[3]);
 
 /** Make a frame from points: their box, 10 mm larger on every side, as lungs extend beyond
  * landmarks.

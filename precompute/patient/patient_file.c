@@ -54,7 +54,6 @@ static const numbers table[] = {
     {"emptier_frame", "maximum_mm", 3, AT(emptier[1]), false},
     {"fuller", "volume_ml", 1, AT(volume[0]), false},
     {"emptier", "volume_ml", 1, AT(volume[1]), false},
-    {NULL, "reach_mm", 1, AT(reach), false},
     {"force", "base", 1, AT(force.base), false},
     {"force", "gain", 1, AT(force.gain), false},
     {"force", "gain_standard_error", 1, AT(gain_error), true},
@@ -283,7 +282,6 @@ static const char *take(const json_t *root, supine_patient_record *record) {
          : !take_state(text_of(root, "fuller", "state"), &record->state[0])  ? "fuller"
          : !take_state(text_of(root, "emptier", "state"), &record->state[1]) ? "emptier"
          : !is_box(record->emptier[0], record->emptier[1])                   ? "emptier_frame"
-         : !(record->reach >= 0.0)                                           ? "reach_mm"
          : !take_correction(root, patient)                                   ? "correction"
          : !take_regions(root, &record->stiffness)                           ? "expandability"
                                                                              : NULL;

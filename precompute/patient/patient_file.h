@@ -91,7 +91,6 @@ typedef struct supine_patient_record {
   char name[SUPINE_PATIENT_TEXT]; /**< name of the patient */
   supine_patient patient;
   supine_force_law force; /**< 1 at the box's centre in the emptier state's posture */
-  double reach;           /**< spreading length of the force, mm */
   supine_state state[2];  /**< the fuller and the emptier */
   double volume[2];       /**< mL; 0: unknown */
   double emptier[2][3];   /**< box of the emptier state, mm; the fuller one's is the frame */
@@ -166,17 +165,6 @@ supine_scan supine_patient_scan(const supine_patient_record *record, size_t stat
 
 /* --- from surfaces --------------------------------------------------------------------------- */
 
-/** Data and options of a fit to surfaces. */
-typedef struct supine_patient_surface_task {
-  const supine_lungs *rest;  /**< surface of the fuller state */
-  const supine_mesh *state;  /**< the same lungs, mm, same frame */
-  const supine_model *model; /**< stiffness and spreading of the force; with expandability its
-                              * force is held fixed */
-  const supine_patient_pairs *landmarks; /**< optional, fitted as well; not with expandability */
-  supine_patient_fit_options options;
-  bool expandability; /**< fit it too (supine_patient_expand), with the paper's law, uncorrected */
-} supine_patient_surface_task;
-
 /** Fit a law to a surface in another state, of any meshing; write patient, reports, stiffness and
  * applied force into the record.
  *
@@ -187,11 +175,18 @@ typedef struct supine_patient_surface_task {
  *
  * A small distance between surfaces does not prove the motion of points: sliding along the
  * surface is not observed.
+ * @param rest           surface of the fuller state
+ * @param state          the same lungs, mm, same frame
+ * @param landmarks      fitted as well, unless empty or with expandability
+ * @param expandability  fit it too (supine_patient_expand), with the paper's law, uncorrected
  * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too
  *   few compatible points
  * @retval those of supine_patient_fit */
-supine_status supine_patient_fit_surface(const supine_patient_surface_task *task,
-                                         supine_patient_record *record, supine_error *error);
+supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_mesh *state,
+                                         const supine_patient_pairs *landmarks,
+                                         const supine_patient_fit_options *options,
+                                         bool expandability, supine_patient_record *record,
+                                         supine_error *error);
 
 /* --- from scans in other postures ------------------------------------------------------------ */
 

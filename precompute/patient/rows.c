@@ -121,12 +121,6 @@ double supine_patient_power_design(const supine_patient_power *law, const supine
   return x[15] + supine_dot(motion, row->axis) - row->value;
 }
 
-double supine_patient_power_residual(const supine_patient_power *law,
-                                     const supine_patient_row *row) {
-  double x[SUPINE_PATIENT_TERMS];
-  return supine_patient_power_design(law, row, x);
-}
-
 /* Compute the derivatives of axis . (t + M arm) by t and M, with arm in units of 100 mm. */
 static void affine_design(const supine_patient_row *row, double x[SUPINE_PATIENT_AFFINE]) {
   for (size_t a = 0; a < 3; ++a) {

@@ -111,9 +111,8 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
 }
 
 /* Fit and judge the law, and find the force that the displacement implies. */
-static supine_status judge(matching *m, const supine_patient_surface_task *task,
-                           const supine_patient_fit_options *wanted, supine_patient_record *record,
-                           supine_error *error) {
+static supine_status judge(matching *m, const supine_patient_fit_options *wanted,
+                           supine_patient_record *record, supine_error *error) {
   supine_patient_fit_report *report = &record->report;
   supine_status status = supine_patient_fit(wanted, m->rows, m->count, m->landmark_rows_count / 3,
                                             &record->patient, report, error);
@@ -121,51 +120,53 @@ static supine_status judge(matching *m, const supine_patient_surface_task *task,
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
     report->explained = 100.0 * (1.0 - pow(record->expand.held_out[1] / report->baseline, 2.0));
   }
-  return status == SUPINE_OK
-             ? supine_patient_applied_find(m, &record->patient, task->options.gravity,
-                                           &record->applied, error)
-             : status;
+  return status == SUPINE_OK ? supine_patient_applied_find(m, &record->patient, wanted->gravity,
+                                                           &record->applied, error)
+                             : status;
 }
 
 /* Match the nearest points, then fit and judge the law. */
-static supine_status run(matching *m, const supine_patient_surface_task *task,
-                         const supine_patient_fit_options *wanted, supine_patient_record *record,
-                         supine_error *error) {
+static supine_status run(matching *m, const supine_patient_fit_options *wanted, bool expandability,
+                         supine_patient_record *record, supine_error *error) {
   record->patient = (supine_patient){.law = wanted->law, .frame = m->frame};
   supine_status status = look_at_rest(m, &record->surface, error);
   if (status == SUPINE_OK) {
     status = settle(m, wanted, &record->patient, &record->surface, error);
   }
-  if (status == SUPINE_OK && task->expandability) {
-    status = supine_patient_expand(m, wanted, task->model, &record->patient, &record->stiffness,
-                                   &record->expand, error);
+  if (status == SUPINE_OK && expandability) {
+    status = supine_patient_expand(m, wanted, &record->patient, &record->stiffness, &record->expand,
+                                   error);
     if (status == SUPINE_OK) { /* the law again, with the force spread over that tissue */
       status = settle(m, wanted, &record->patient, &record->surface, error);
     }
   }
-  return status == SUPINE_OK ? judge(m, task, wanted, record, error) : status;
+  return status == SUPINE_OK ? judge(m, wanted, record, error) : status;
 }
 
-supine_status supine_patient_fit_surface(const supine_patient_surface_task *task,
-                                         supine_patient_record *record, supine_error *error) {
-  const supine_patient_pairs *landmarks = task->expandability ? NULL : task->landmarks;
+supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_mesh *state,
+                                         const supine_patient_pairs *landmarks,
+                                         const supine_patient_fit_options *options,
+                                         bool expandability, supine_patient_record *record,
+                                         supine_error *error) {
+  const size_t landmark_count = expandability ? 0 : landmarks->count;
   matching m = {0};
-  supine_patient_fit_options wanted = task->options;
-  if (task->expandability) { /* the stiffness replaces the correction */
+  supine_patient_fit_options wanted = *options;
+  if (expandability) { /* the stiffness replaces the correction */
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }
-  supine_status status = supine_patient_check_boxes(&task->rest->mesh, task->state, error);
+  record->stiffness.count = 0;
+  supine_status status = supine_patient_check_boxes(&rest->mesh, state, error);
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_create(task->rest, task->state, task->model,
-                                            task->expandability ? EXPANDED_MAX : VERTICES_MAX,
-                                            landmarks != NULL ? landmarks->count : 0, &m, error);
+    status = supine_patient_matching_create(rest, state, &record->stiffness,
+                                            expandability ? EXPANDED_MAX : VERTICES_MAX,
+                                            landmark_count, &m, error);
   }
-  if (status == SUPINE_OK && landmarks != NULL) {
+  if (status == SUPINE_OK && landmark_count > 0) {
     supine_patient_matching_append(&m, landmarks);
   }
   if (status == SUPINE_OK) {
-    status = run(&m, task, &wanted, record, error);
+    status = run(&m, &wanted, expandability, record, error);
   }
   supine_patient_matching_free(&m);
   return status;
