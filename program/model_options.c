@@ -237,9 +237,8 @@ static void print_map(const char *path, const supine_source *source) {
 }
 
 /* Copy the law, force and stiffness of a person, and the scanned one of the two fitted states, into
- * the choice; the caller frees the stiffness. */
-static supine_status take_patient(supine_model_options *options, double **stiffness,
-                                  supine_error *error) {
+ * the choice. */
+static supine_status take_patient(supine_model_options *options, supine_error *error) {
   const supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;
   supine_model_choice *choice = &options->choice;
@@ -265,20 +264,14 @@ static supine_status take_patient(supine_model_options *options, double **stiffn
                         "note: assumed to be the %s of the two fitted states; --scanned changes it",
                         state == 0 ? "fuller" : "emptier");
   }
-  if (record->stiffness.count > 0) {
-    *stiffness = malloc(lungs->mesh.vertex_count * sizeof **stiffness);
-    if (*stiffness == NULL) {
-      return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              lungs->mesh.vertex_count);
-    }
-  }
-  choice->stiffness = *stiffness;
-  options->directions = malloc(3 * lungs->mesh.vertex_count * sizeof *options->directions);
-  return options->directions == NULL
-             ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                                lungs->mesh.vertex_count)
-             : supine_patient_model(record, &choice->resting, lungs, state, *stiffness,
-                                    options->directions, &choice->model, error);
+  options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
+  status = options->patient_arrays == NULL
+               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
+                                  lungs->mesh.vertex_count)
+               : supine_patient_model(record, &choice->resting, lungs, state,
+                                      options->patient_arrays, &choice->model, error);
+  choice->stiffness = choice->model.stiffness;
+  return status;
 }
 
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
@@ -286,7 +279,6 @@ supine_status supine_command_model_load(supine_model_options *options, const cha
                                         supine_error *error) {
   supine_progress progress = supine_options_progress_begin("label map");
   supine_source *source = &options->made_from;
-  double *stiffness = NULL;
   options->source.labels.progress = supine_options_progress_step;
   options->source.labels.progress_context = &progress;
   supine_status status = supine_precompute_source_load(&options->source, paths, count, source,
@@ -300,13 +292,12 @@ supine_status supine_command_model_load(supine_model_options *options, const cha
     options->choice.has_scan = true;
   }
   if (status == SUPINE_OK && options->patient != NULL) {
-    status = take_patient(options, &stiffness, error);
+    status = take_patient(options, error);
   }
   if (status == SUPINE_OK) {
     status = supine_precompute_prepare(&source->lungs, &options->choice, &options->prepared,
                                        &options->findings, error);
   }
-  free(stiffness);
   supine_options_say_findings(command, &options->findings);
   (void)snprintf(options->assumed, sizeof options->assumed, "%s; %s", source->summary,
                  options->prepared.summary);
@@ -341,7 +332,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
 }
 
 void supine_command_model_options_free(supine_model_options *options) {
-  free(options->directions);
+  free(options->patient_arrays);
   supine_precompute_source_free(&options->made_from);
   supine_precompute_prepared_free(&options->prepared);
 }

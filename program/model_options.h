@@ -18,7 +18,7 @@ typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
   const supine_patient_record *patient; /* patient model, owned by the caller; NULL: none */
-  double *directions;                   /* [N, 3] of the patient model, mm */
+  double *patient_arrays;               /* of the patient model: see supine_patient_model */
   supine_source made_from;  /* the lungs as loaded, and the axes and units of their files */
   supine_prepared prepared; /* their model */
   char assumed[800];        /* sentence about the assumptions */

@@ -62,10 +62,9 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
   supine_model found = truth();
   const supine_resting resting = supine_reference_resting_default();
-  double *directions = malloc(3 * rest.mesh.vertex_count * sizeof *directions);
-  assert_int_equal(
-      supine_patient_model(&record, &resting, &rest, 0, NULL, directions, &found, &error),
-      SUPINE_OK);
+  double *directions = malloc(4 * rest.mesh.vertex_count * sizeof *directions);
+  assert_int_equal(supine_patient_model(&record, &resting, &rest, 0, directions, &found, &error),
+                   SUPINE_OK);
   supine_solution solution = {0};
   assert_int_equal(supine_physics_solve(&rest, &found, supine_gravity, &solution, &error),
                    SUPINE_OK);

@@ -89,6 +89,40 @@ static void free_chosen(supine_patient_matching *m) {
   free(m->space);
 }
 
+void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
+                                     const supine_lungs *lungs, size_t vertex, double *shares) {
+  const double *point = lungs->mesh.vertices + 3 * vertex;
+  const int side = supine_patient_side_of(lungs, vertex);
+  double sum = 0.0;
+  double least = INFINITY;
+  size_t nearest = 0;
+  for (size_t k = 0; k < stiffness->count; ++k) {
+    const supine_patient_mode *mode = &stiffness->mode[k];
+    const double distance = mode->side == side ? supine_distance(mode->centre, point) : INFINITY;
+    const double q = fmin(1.0, fmax(0.0, 2.0 - 2.0 * distance / mode->radius));
+    shares[k] = q * q * (3.0 - 2.0 * q);
+    sum += shares[k];
+    nearest = distance < least ? k : nearest;
+    least = fmin(least, distance);
+  }
+  for (size_t k = 0; k < stiffness->count; ++k) {
+    shares[k] = sum > 0.0 ? shares[k] / sum : (double)(k == nearest);
+  }
+}
+
+void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
+                                 const supine_lungs *lungs, double *e) {
+  double shares[SUPINE_PATIENT_MODES];
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
+    double a = stiffness->count == 0 ? 1.0 : 0.0;
+    supine_patient_stiffness_shares(stiffness, lungs, i, shares);
+    for (size_t k = 0; k < stiffness->count; ++k) {
+      a += stiffness->mode[k].value * shares[k];
+    }
+    e[i] = 1.0 / a;
+  }
+}
+
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const supine_patient_stiffness *stiffness,
                                             supine_error *error) {

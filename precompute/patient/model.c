@@ -123,10 +123,8 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_solution solution = {0};
   model.force = record->force;
-  if (stiffness != NULL) {
-    supine_patient_stiffness_of(&record->stiffness, &w->lungs, stiffness);
-    model.stiffness = stiffness;
-  }
+  supine_patient_stiffness_of(&record->stiffness, &w->lungs, stiffness);
+  model.stiffness = stiffness;
   const supine_status status =
       supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
   for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
@@ -191,9 +189,11 @@ static void find_way(const work *w, const supine_resting *resting, const double 
 
 supine_status supine_patient_model(const supine_patient_record *record,
                                    const supine_resting *resting, const supine_lungs *lungs,
-                                   size_t state, double *stiffness, double *directions,
-                                   supine_model *model, supine_error *error) {
+                                   size_t state, double *arrays, supine_model *model,
+                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
+  double *directions = arrays;
+  double *stiffness = arrays + 3 * n;
   work w = {.record = record,
             .lungs = *lungs,
             .scan = lungs->mesh.vertices,
@@ -230,7 +230,12 @@ supine_status supine_patient_model(const supine_patient_record *record,
     }
   }
   model->force = record->force;
+  model->stiffness = record->stiffness.count > 0 ? stiffness : NULL;
   model->direction.vectors = directions;
+  for (size_t k = 0; k < 3; ++k) {
+    model->direction.c[2 * k] = -record->patient.power.c[2 * k] / way[k];
+    model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
+  }
 cleanup:
   free(ratio);
   free(w.lungs.mesh.vertices);

@@ -125,21 +125,21 @@ char *supine_patient_text(const supine_patient_record *record, const char *made_
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
-/** Set force, directions and reach of a model to a patient's. With u the displacement between the
- * two states, scaled to the whole way from full inflation to rest, and F the spread force in the
- * fitted posture, at least 0.2 of its mean, the directions are
+/** Set force, directions and stiffness of a model to a patient's. With u the displacement between
+ * the two states, scaled to the whole way from full inflation to rest, and F the spread force in
+ * the fitted posture, at least 0.2 of its mean, the directions are
  *
  *     d = -u / F               so that F d is the person's displacement
  *
  * @param resting     volumes at rest
  * @param state       of the surface: 0 the fuller, 1 the emptier
- * @param stiffness   [N], written: relative E by the record's regions; NULL: even tissue
- * @param directions  [N, 3] mm, written; must outlive the model
+ * @param arrays      [4 N], written: the directions [N, 3], mm, then the relative E [N] by the
+ *                    record's regions; must outlive the model
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
 supine_status supine_patient_model(const supine_patient_record *record,
                                    const supine_resting *resting, const supine_lungs *lungs,
-                                   size_t state, double *stiffness, double *directions,
-                                   supine_model *model, supine_error *error);
+                                   size_t state, double *arrays, supine_model *model,
+                                   supine_error *error);
 
 /** Find the state of a surface from its box.
  * @param state  0 the fuller, 1 the emptier
