@@ -58,7 +58,7 @@ static supine_status write_glb(const export_source *source, const request *wante
   if (status != SUPINE_OK) {
     return status;
   }
-  (void)printf("%s: %zu lung%s with morph targets%s, %.1f MB\n", wanted->path,
+  (void)printf("%s: %zu lung%s with morph targets%s, %.2f MB\n", wanted->path,
                source->info->lung_count, source->info->lung_count == 1 ? "" : "s",
                wanted->glb.animate ? " and animations" : "", 1e-6 * (double)bytes);
   return SUPINE_OK;

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(export_glb runtime_fixture supine_commands PkgConfig::JANSSON supine_gsl)
-supine_test(export_command runtime_fixture supine_commands supine_gsl)
 supine_test(export_html runtime_fixture supine_commands supine_gsl ${MESHOPT_LINK_LIBRARIES})
 
 # Exported files in other programs, against the C evaluator: needs node and npm's packages in tests/export (npm
