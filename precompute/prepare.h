@@ -8,7 +8,7 @@
 
 #include "precompute/lungs/disease.h"
 #include "precompute/lungs/expandability.h"
-#include "precompute/physics/capacity.h"
+#include "precompute/physics/reference.h"
 
 enum { SUPINE_LESIONS_MAX = 64 };
 

@@ -14,6 +14,7 @@
 #include "program/stream/address.h"
 #include "program/stream/tracked_patient.h"
 #include "sh/base/output.h"
+#include "sh/base/vec3.h"
 
 static const char name[] = "stream";
 
@@ -311,7 +312,6 @@ static void begin(void *chosen) {
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  const char *why = NULL;
   supine_stream_options *options = &wanted->options;
   options->ras = wanted->space == 1;
   options->smooth = 1e-3 * wanted->smooth;
@@ -321,18 +321,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   }
-  const double size = sqrt(wanted->body[0] * wanted->body[0] + wanted->body[1] * wanted->body[1] +
-                           wanted->body[2] * wanted->body[2] + wanted->body[3] * wanted->body[3]);
-  if (!(size > 1e-6) ||
-      supine_stream_gravity_down(&options->setup, wanted->down, options->setup.down, &why) !=
-          SUPINE_STREAM_EXACT) {
+  if (!supine_stream_rotation(wanted->body, options->setup.body) ||
+      !supine_normalise(wanted->down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--world-down or --body-from-tracker is zero: give a "
                             "direction and a rotation, as 0,0,-1 and 1,0,0,0");
   }
-  const double unit[4] = {wanted->body[0] / size, wanted->body[1] / size, wanted->body[2] / size,
-                          wanted->body[3] / size};
-  supine_stream_rotation(unit, options->setup.body);
   supine_basis *basis = NULL;
   supine_status status =
       supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);

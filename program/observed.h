@@ -6,7 +6,7 @@
 #include <supine/locate.h>
 
 #include "program/inside.h"
-#include "program/stream/sensors.h"
+#include "program/stream/server.h"
 
 typedef struct supine_command_observed {
   size_t count;

@@ -7,7 +7,7 @@
 #include <supine/volume.h>
 
 #include "precompute/lungs/phantom.h"
-#include "precompute/physics/capacity.h"
+#include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 

@@ -97,4 +97,28 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
                                           const double *directions, const double *amounts,
                                           supine_reference *reference, supine_error *error);
 
+typedef enum supine_sex { SUPINE_SEX_UNKNOWN = 0, SUPINE_SEX_FEMALE, SUPINE_SEX_MALE } supine_sex;
+
+/** Height and sex of a person, where they are known. */
+typedef struct supine_person {
+  double height; /**< cm; 0: not given */
+  supine_sex sex;
+} supine_person;
+
+/** Find the volume of both lungs at full inflation, supine, gas and tissue, mL: the least and the
+ * largest of usual adults if height or sex is unknown, else the same value twice. */
+void supine_reference_capacity(const supine_person *person, double range[2]);
+
+/** Append the full volume, mL, expected of the reference's lungs to text [size]: "expected 6500",
+ * or "an adult's 4566 to 8525" if height or sex is unknown. */
+void supine_reference_compare(const supine_reference *reference, const supine_person *person,
+                              char *text, size_t size);
+
+/** Warn if the full volume is implausible for the person, or if a scan at rest contradicts a given
+ * volume at rest.
+ * @param given  volumes at rest before supine_reference_resting_settle
+ * @param text   [size] the warning; empty if there is none */
+void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
+                            const supine_resting *given, char *text, size_t size);
+
 #endif

@@ -8,7 +8,7 @@
 #define CRC64_CARRY_LESS 1
 #endif
 
-#include "program/stream/crc64.h"
+#include "program/stream/message.h"
 
 static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* without the term x^64 */
 

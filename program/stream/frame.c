@@ -7,7 +7,6 @@
 
 #include <meshoptimizer.h>
 
-#include "program/stream/crc64.h"
 #include "program/stream/frame.h"
 #include "sh/base/library.h"
 #include "sh/base/parallel.h"

@@ -17,16 +17,19 @@ supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
-void supine_stream_rotation(const double q[4], double r[9]) {
+bool supine_stream_rotation(const double q[4], double r[9]) {
   const double w = q[0];
   const double x = q[1];
   const double y = q[2];
   const double z = q[3];
+  const double square = w * w + x * x + y * y + z * z;
+  const double s = 2.0 / square;
   const double rows[9] = {
-      1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+      1 - s * (y * y + z * z), s * (x * y - w * z),     s * (x * z + w * y),
+      s * (x * y + w * z),     1 - s * (x * x + z * z), s * (y * z - w * x),
+      s * (x * z - w * y),     s * (y * z + w * x),     1 - s * (x * x + y * y)};
   memcpy(r, rows, sizeof rows);
+  return isfinite(square) && square > 1e-12;
 }
 
 /* out = M^T v */
@@ -74,21 +77,18 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
 supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why) {
-  const double size = sqrt(quaternion[0] * quaternion[0] + quaternion[1] * quaternion[1] +
-                           quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3]);
+  double rotation[9];
+  double square = 0.0; /* of its length */
+  for (int i = 0; i < 4; ++i) {
+    square += quaternion[i] * quaternion[i];
+  }
   *why = "its quaternion is zero or not finite; send a rotation";
-  if (!isfinite(size) || !(size > 1e-6)) {
+  if (!supine_stream_rotation(quaternion, rotation)) {
     return SUPINE_STREAM_REFUSED;
   }
-  double unit[4];
-  for (int i = 0; i < 4; ++i) {
-    unit[i] = quaternion[i] / size;
-  }
-  double rotation[9];
-  supine_stream_rotation(unit, rotation);
   const supine_stream_verdict verdict =
       supine_stream_gravity_rotation(setup, rotation, gravity, why);
-  if (verdict != SUPINE_STREAM_EXACT || fabs(size - 1.0) <= slack) {
+  if (verdict != SUPINE_STREAM_EXACT || fabs(sqrt(square) - 1.0) <= slack) {
     return verdict;
   }
   *why = "its quaternion is not of length 1";
@@ -98,20 +98,16 @@ supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup
 supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setup,
                                                  const double down[3], double gravity[3],
                                                  const char **why) {
-  const double size = supine_length(down);
+  double unit[3];
+  double turned[3];
   *why = "its direction is zero or not finite; send a vector along gravity";
-  if (!isfinite(size) || !(size > 1e-9)) {
+  if (!supine_normalise(down, unit)) {
     return SUPINE_STREAM_REFUSED;
   }
-  const double unit[3] = {down[0] / size, down[1] / size, down[2] / size};
-  double turned[3];
   for (int i = 0; i < 3; ++i) {
     turned[i] = supine_dot(setup->body + 3 * i, unit);
   }
-  const double length = supine_length(turned); /* 1 but for rounding */
-  for (int i = 0; i < 3; ++i) {
-    gravity[i] = turned[i] / length;
-  }
+  (void)supine_normalise(turned, gravity); /* removes rounding */
   *why = NULL;
   return SUPINE_STREAM_EXACT;
 }

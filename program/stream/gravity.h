@@ -8,6 +8,8 @@
 #ifndef SUPINE_STREAM_GRAVITY_H
 #define SUPINE_STREAM_GRAVITY_H
 
+#include <stdbool.h>
+
 /** How the tracker is set up. */
 typedef struct supine_stream_setup {
   double down[3]; /**< direction of gravity in the tracker's world; unit */
@@ -17,8 +19,9 @@ typedef struct supine_stream_setup {
 /** Return the default setup: z of the world points up, and the marker's axes are the body's. */
 supine_stream_setup supine_stream_setup_default(void);
 
-/** Convert a unit quaternion W, X, Y, Z to a rotation matrix, by rows. */
-void supine_stream_rotation(const double quaternion[4], double rotation[9]);
+/** Convert a quaternion W, X, Y, Z of any length to a rotation matrix, by rows; return false where
+ * it is zero or not finite. */
+bool supine_stream_rotation(const double quaternion[4], double rotation[9]);
 
 /** Verdict on a pose. */
 typedef enum supine_stream_verdict {

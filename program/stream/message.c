@@ -4,7 +4,6 @@
 #include <endian.h>
 #include <string.h>
 
-#include "program/stream/crc64.h"
 #include "program/stream/message.h"
 #include "sh/base/clones.h"
 

@@ -96,4 +96,20 @@ size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 /** Write big-endian 32-bit floats. */
 void supine_stream_put_floats(size_t count, const float *values, unsigned char *bytes);
 
+/* The checksum of messages: CRC-64 of ECMA-182, most significant bit first, from 0,
+ *
+ *     crc(M) = M(x) x^64 mod P,     P = x^64 + 0x42F0E1EBA9EA3693
+ *
+ * It is linear, so that the checksums of two parts give that of the whole. */
+
+/** Continue from `crc` (0 at first) over more bytes. Thread-safe. */
+uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
+
+/** Compute x^(8 size) mod P, by which `size` further bytes multiply a checksum. */
+uint64_t supine_stream_crc64_power(size_t size);
+
+/** Join checksums: crc(A B) = crc(A) x^(8 |B|) + crc(B).
+ * @param power  supine_stream_crc64_power of the second part's size */
+uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, uint64_t power);
+
 #endif

@@ -4,7 +4,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
-#include "program/stream/poses.h"
+#include "program/stream/server.h"
 #include "sh/base/csv.h"
 #include "sh/base/vec3.h"
 

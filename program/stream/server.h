@@ -8,9 +8,41 @@
 #define SUPINE_STREAM_SERVER_H
 
 #include "program/stream/gravity.h"
-#include "program/stream/poses.h"
-#include "program/stream/sensors.h"
 #include "program/stream/web.h"
+
+/** Points observed inside the lungs, from which the lungs are located (supine/locate.h). */
+typedef struct supine_stream_sensors {
+  const supine_basis *inside; /**< basis made by 'supine embed' */
+  size_t count;
+  const char *name[SUPINE_LOCATE_POINTS_MAX];
+  supine_observation last[SUPINE_LOCATE_POINTS_MAX]; /**< last position; not-a-number: not seen */
+  bool ras;                                          /**< positions come in RAS */
+  double *space;                                     /**< [supine_locate_space(count)] workspace */
+  supine_location location;
+} supine_stream_sensors;
+
+/** Recorded poses: the direction of gravity in the body over time, as CSV with the columns seconds,
+ * gravity_x, gravity_y, gravity_z. Times start at 0 or later and never decrease. */
+typedef struct supine_stream_pose {
+  double seconds;
+  double gravity[3]; /**< unit */
+} supine_stream_pose;
+
+typedef struct supine_stream_poses {
+  size_t count;
+  supine_stream_pose *pose;
+} supine_stream_poses;
+
+/** Read a file; release with supine_stream_poses_free.
+ * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT (the message names the line), SUPINE_ERROR_MEMORY
+ */
+supine_status supine_stream_poses_load(const char *path, supine_stream_poses *poses,
+                                       supine_error *error);
+void supine_stream_poses_free(supine_stream_poses *poses);
+
+/** Write the header of such a file, and a line with enough digits to read back the same numbers. */
+void supine_stream_poses_begin(FILE *file);
+void supine_stream_poses_add(FILE *file, const supine_stream_pose *pose);
 
 /** Numbers of events so far. */
 typedef struct supine_stream_counts {

@@ -27,7 +27,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "program/stream/crc64.h"
 #include "program/stream/message.h"
 #include "sh/base/clock.h"
 

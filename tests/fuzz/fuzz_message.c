@@ -8,9 +8,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "program/stream/crc64.h"
 #include "program/stream/message.h"
-#include "program/stream/poses.h"
+#include "program/stream/server.h"
 
 #include "fuzz.h"
 

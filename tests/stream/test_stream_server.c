@@ -12,7 +12,6 @@
 #include <time.h>
 
 #include "program/stream/address.h"
-#include "program/stream/crc64.h"
 #include "program/stream/peer.h"
 #include "program/stream/tracked_patient.h"
 #include "sh/base/clock.h"

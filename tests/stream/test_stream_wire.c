@@ -12,7 +12,6 @@
 #include <igtl_transform.h>
 #include <igtl_util.h>
 
-#include "program/stream/crc64.h"
 #include "program/stream/frame.h"
 #include "tests/runtime_fixture.h"
 
