@@ -183,26 +183,20 @@ static float *to_float(const double *values, size_t count) {
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {
-  const supine_compression *field = content->compression;
-  const supine_volume_forms *forms = content->forms;
   static const double straight[3] = {0.0, 0.0, 0.0};
-  const double *field_bend = content->reference != NULL ? content->options->model.bend : straight;
-  const supine_normals_surface surface = {.vertex_count = content->lungs->mesh.vertex_count,
-                                          .triangle_count = content->lungs->mesh.triangle_count,
-                                          .lung_count = content->lungs->lung_count,
-                                          .mode_count = field->mode_count,
-                                          .band = field->band,
-                                          .lung_begin = content->lungs->lung_begin,
+  const double *bend = content->reference != NULL ? content->options->model.bend : straight;
+  const supine_lungs *lungs = content->lungs;
+  const supine_normals_surface surface = {.vertex_count = lungs->mesh.vertex_count,
+                                          .triangle_count = lungs->mesh.triangle_count,
+                                          .lung_count = lungs->lung_count,
+                                          .lung_begin = lungs->lung_begin,
                                           .vertices = vertices,
-                                          .triangles = content->lungs->mesh.triangles,
+                                          .triangles = lungs->mesh.triangles,
                                           .directions = directions,
-                                          .coefficients = field->coefficients,
-                                          .modes = field->modes,
-                                          .linear = forms != NULL ? forms->linear : NULL,
-                                          .quadratic = forms != NULL ? forms->quadratic : NULL,
-                                          .cubic = forms != NULL ? forms->cubic : NULL,
+                                          .field = content->compression,
                                           .resting = content->resting,
-                                          .bend = {field_bend[0], field_bend[1], field_bend[2]}};
+                                          .forms = content->forms,
+                                          .bend = {bend[0], bend[1], bend[2]}};
   return supine_normals_modes_create(&surface, normals, error);
 }
 

@@ -34,7 +34,8 @@ void supine_volume_contract(size_t count, size_t axes, const double *linear,
   }
 }
 
-double supine_volume_at(const double cubic[3], double scale) {
+/* Compute c[0] s + c[1] s^2 + c[2] s^3. */
+static double cubic_at(const double cubic[3], double scale) {
   return scale * (cubic[0] + scale * (cubic[1] + scale * cubic[2]));
 }
 
@@ -66,13 +67,13 @@ static double cubic_turn(const double c[3], double side) {
 /* Solve cubic(s) = volume between low and high, where it is monotone, by Newton's method, with a
  * bisection whenever a step leaves the bracket. */
 static double cubic_solve(const double c[3], double volume, double low, double high) {
-  const bool rising = supine_volume_at(c, high) > supine_volume_at(c, low);
+  const bool rising = cubic_at(c, high) > cubic_at(c, low);
   double s = volume / c[0];
   for (int i = 0; i < 200; ++i) {
     if (!(s > low && s < high)) {
       s = low + (high - low) / 2;
     }
-    const double residual = supine_volume_at(c, s) - volume;
+    const double residual = cubic_at(c, s) - volume;
     if (residual == 0 || s == low || s == high) {
       return s;
     }
@@ -105,7 +106,7 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
   const double side = volume / c[0] > 0 ? 1 : -1;
   double far = cubic_turn(c, side);
   if (isfinite(far)) {
-    const double reach = supine_volume_at(c, far);
+    const double reach = cubic_at(c, far);
     if (fabs(reach) < fabs(volume)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "a volume of %g mL is out of reach: the surface folds beyond %g mL",
@@ -113,7 +114,7 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     }
   } else {
     far = volume / c[0];
-    while (isfinite(far) && fabs(supine_volume_at(c, far)) < fabs(volume)) {
+    while (isfinite(far) && fabs(cubic_at(c, far)) < fabs(volume)) {
       far *= 2;
     }
     far *= 2;

@@ -54,7 +54,7 @@ static inline double posed_lung_volume(const supine_basis *basis, size_t lung,
                                        const double *weights, double scale) {
   double cubic[3] = {0.0, 0.0, 0.0};
   posed_cubic(basis, lung, weights, cubic);
-  return supine_volume_at(cubic, scale);
+  return scale * (cubic[0] + scale * (cubic[1] + scale * cubic[2]));
 }
 
 static inline supine_status posed_lung_scale(const supine_basis *basis, size_t lung,

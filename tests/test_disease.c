@@ -272,7 +272,8 @@ TEST(test_collapse_any_direction_rest_and_breath_scaled) {
         rests[ill][lung] = volume_of(&lungs, lung, rest);
         gains[ill][lung] = volume_of(&lungs, lung, moved) - rests[ill][lung];
       }
-      cubic[ill] = supine_volume_at(solution.cubic, scale);
+      cubic[ill] =
+          scale * (solution.cubic[0] + scale * (solution.cubic[1] + scale * solution.cubic[2]));
       supine_physics_solution_free(&solution);
     }
     for (size_t lung = 0; lung < 2; ++lung) {

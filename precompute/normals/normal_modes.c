@@ -346,11 +346,11 @@ SUPINE_CLONES static void place_range(void *context, size_t begin, size_t end, s
   const bool vector = s->directions == NULL;
   (void)thread;
   for (size_t row = begin; row < end; ++row) {
-    const float *c = s->coefficients + (vector ? row : row / 3) * s->mode_count;
+    const float *c = s->field->coefficients + (vector ? row : row / 3) * s->field->mode_count;
     const float d = vector ? 1.0f : s->directions[row];
     const float(*steer)[LANES] = (const float(*)[LANES])planes->steer[lung_of(s, row / 3)][row % 3];
     float sum[LANES] = {0.0f};
-    for (size_t k = 0; k < s->mode_count; ++k) {
+    for (size_t k = 0; k < s->field->mode_count; ++k) {
 #pragma GCC unroll 1 /* full unrolling would prevent vectorisation */
       for (size_t l = 0; l < LANES; ++l) {
         sum[l] += c[k] * steer[k][l];
@@ -416,7 +416,7 @@ static void find_steer(const planes_work *planes) {
         const size_t state = lane > 0 ? work->fits[lung].state[lane - 1] : 0;
         const double *phi = work->states.phi +
                             ((lung * work->states.room + state) * 3 + (axis + 2) % 3) * work->terms;
-        for (size_t k = 0; k < work->surface->mode_count; ++k) {
+        for (size_t k = 0; k < work->surface->field->mode_count; ++k) {
           planes->steer[lung][axis][k][l] = lane > 0 ? (float)phi[1 + k] : 0.0f;
         }
       }
@@ -475,12 +475,12 @@ supine_status supine_normals_modes_create(const supine_normals_surface *surface,
   if (work == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for normals");
   }
-  if (surface->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
+  if (surface->field->mode_count > SUPINE_NORMALS_FIELD_MAX || surface->triangle_count == 0) {
     free(work);
     return SUPINE_OK;
   }
   work->surface = surface;
-  work->terms = supine_normals_terms(surface->mode_count);
+  work->terms = supine_normals_terms(surface->field->mode_count);
   supine_status status = supine_normals_states_create(surface, STATES, 0.0, &work->states);
   if (status == SUPINE_OK) {
     status = supine_normals_states_create(surface, HELD_OUT, 0.37, &work->held_out);

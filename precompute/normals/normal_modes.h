@@ -22,21 +22,20 @@
 
 #include <supine/runtime.h>
 
+#include "precompute/projection/projection.h"
+
 /** The surface and the field that a basis file will hold. */
 typedef struct supine_normals_surface {
-  size_t vertex_count, triangle_count, lung_count, mode_count, band;
-  const size_t *lung_begin;  /**< [G + 1] */
-  const float *vertices;     /**< [N, 3] */
-  const uint32_t *triangles; /**< [M, 3] */
-  const float *directions;   /**< [N, 3]; NULL: a vector field */
-  const float *coefficients; /**< [N, K] or [N, 3, K] */
-  const double *modes;       /**< [K, (band + 1)^2] */
-  const double *resting;     /**< [G, 9] harmonics of the volume at rest, mL beyond the reference
-                                surface; NULL: unknown, and the volume forms are not used */
-  const double *linear;      /**< [G, 3, K] */
-  const double *quadratic;   /**< [G, 3, K, K] */
-  const double *cubic;       /**< [G, K, K, K] */
-  double bend[3];            /**< see supine_volume_bend */
+  size_t vertex_count, triangle_count, lung_count;
+  const size_t *lung_begin;         /**< [G + 1] */
+  const float *vertices;            /**< [N, 3] */
+  const uint32_t *triangles;        /**< [M, 3] */
+  const float *directions;          /**< [N, 3]; NULL: a vector field */
+  const supine_compression *field;  /**< coefficients [N, K] or [N, 3, K], and their modes */
+  const double *resting;            /**< [G, 9] harmonics of the volume at rest, mL beyond the
+                                       reference surface; NULL: unknown, and `forms` is not used */
+  const supine_volume_forms *forms; /**< of the field */
+  double bend[3];                   /**< see supine_volume_bend */
 } supine_normals_surface;
 
 /** The modes of every vertex's normal, and their error. */

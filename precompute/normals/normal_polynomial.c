@@ -71,11 +71,11 @@ void supine_normals_fans_free(supine_normals_fans *fans) {
  * vertex `from`, into side [3, COLUMNS]. */
 static void read_side(const supine_normals_surface *s, size_t from, size_t to,
                       double (*side)[COLUMNS]) {
-  const size_t modes = s->mode_count;
+  const size_t modes = s->field->mode_count;
   for (size_t axis = 0; axis < 3; ++axis) {
     const bool vector = s->directions == NULL;
-    const float *c = s->coefficients + (vector ? (3 * to + axis) * modes : to * modes);
-    const float *o = s->coefficients + (vector ? (3 * from + axis) * modes : from * modes);
+    const float *c = s->field->coefficients + (vector ? (3 * to + axis) * modes : to * modes);
+    const float *o = s->field->coefficients + (vector ? (3 * from + axis) * modes : from * modes);
     const double d = vector ? 1.0 : (double)s->directions[3 * to + axis];
     const double e = vector ? 1.0 : (double)s->directions[3 * from + axis];
     side[axis][0] = (double)s->vertices[3 * to + axis] - (double)s->vertices[3 * from + axis];
@@ -98,9 +98,10 @@ static void find_row(const supine_normals_surface *s, const supine_normals_fans 
     for (size_t axis = 0; axis < 3; ++axis) {
       const size_t y = (axis + 1) % 3;
       const size_t z = (axis + 2) % 3;
-      for (size_t k = 0; k <= s->mode_count; ++k) {
-        for (size_t l = 0; l <= s->mode_count; ++l) {
-          row[axis * terms + term_of(s->mode_count, k, l)] += a[y][k] * b[z][l] - b[y][k] * a[z][l];
+      for (size_t k = 0; k <= s->field->mode_count; ++k) {
+        for (size_t l = 0; l <= s->field->mode_count; ++l) {
+          row[axis * terms + term_of(s->field->mode_count, k, l)] +=
+              a[y][k] * b[z][l] - b[y][k] * a[z][l];
         }
       }
     }
@@ -110,7 +111,7 @@ static void find_row(const supine_normals_surface *s, const supine_normals_fans 
 supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          const supine_normals_fans *fans, size_t lung,
                                          size_t offset, size_t stride, supine_normals_rows *rows) {
-  const size_t terms = supine_normals_terms(surface->mode_count);
+  const size_t terms = supine_normals_terms(surface->field->mode_count);
   const size_t end = surface->lung_begin[lung + 1];
   const size_t begin = surface->lung_begin[lung];
   const size_t most = (end - begin) / stride + 1;

@@ -18,7 +18,7 @@ static const double highest_mm = 60.0;
 /* Find the largest displacement at weights w and gain 1, mm, over some of the vertices. */
 static double largest(const supine_normals_surface *s, const double *w) {
   enum { SOME = 4096 };
-  const size_t modes = s->mode_count;
+  const size_t modes = s->field->mode_count;
   const size_t axes = s->directions == NULL ? 3 : 1;
   double top = 0.0;
   for (size_t i = 0; i < s->vertex_count; i += 1 + s->vertex_count / SOME) {
@@ -26,7 +26,7 @@ static double largest(const supine_normals_surface *s, const double *w) {
     for (size_t axis = 0; axis < axes; ++axis) {
       double amount = 0.0;
       for (size_t k = 0; k < modes; ++k) {
-        amount += w[k] * (double)s->coefficients[(axes * i + axis) * modes + k];
+        amount += w[k] * (double)s->field->coefficients[(axes * i + axis) * modes + k];
       }
       square += amount * amount;
     }
@@ -45,13 +45,11 @@ static double largest(const supine_normals_surface *s, const double *w) {
  * Return false if the surface folds before. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
-  const size_t k = s->mode_count;
   *amount = 0.0;
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    supine_volume_form form = {{0.0}};
+    supine_volume_form form;
     double rest = 0.0;
-    supine_volume_contract(k, 3, s->linear + lung * 3 * k, s->quadratic + lung * 3 * k * k,
-                           s->cubic + lung * k * k * k, w, &form);
+    supine_physics_volume_forms_contract_lung(s->forms, lung, w, &form);
     for (size_t i = 0; i < 9; ++i) {
       rest += s->resting[9 * lung + i] * y[i];
     }
@@ -81,9 +79,7 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
   static const double volume_share =
       0.4142135623730950488; /* step from state to state: sqrt 2 - 1, not commensurable with the
                                 spiral's angle */
-  const size_t terms = 3 * supine_normals_terms(surface->mode_count);
-  const size_t harmonics = supine_sh_count(surface->band);
-  double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)] = {0.0};
+  const size_t terms = 3 * supine_normals_terms(surface->field->mode_count);
   double low[9];
   double w[SUPINE_MODES_MAX];
   *states = (supine_normals_states){.room = count, .range = {INFINITY, -INFINITY}};
@@ -98,18 +94,12 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
     supine_spiral(at, (double)count, 0.0, g);
     double gains[SUPINE_LUNGS_MAX][3];
     double amount = 0.0;
-    (void)supine_sh_evaluate(surface->band, g, y);
     (void)supine_sh_evaluate(2, g, low);
-    for (size_t k = 0; k < surface->mode_count; ++k) {
-      w[k] = 0.0;
-      for (size_t h = 0; h < harmonics; ++h) {
-        w[k] += surface->modes[k * harmonics + h] * y[h];
-      }
-    }
+    supine_projection_compression_weights(surface->field, g, w);
     if (surface->resting != NULL ? gains_from_rest(surface, low, w, share, gains, &amount)
                                  : common_gain(surface, w, share, gains, &amount)) {
       for (size_t lung = 0; lung < surface->lung_count; ++lung) {
-        supine_normals_monomials(surface->mode_count, w, gains[lung],
+        supine_normals_monomials(surface->field->mode_count, w, gains[lung],
                                  states->phi + (lung * count + states->count) * terms);
       }
       states->range[0] = fmin(states->range[0], amount);

@@ -46,9 +46,6 @@ SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const do
 SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
                                          double cubic[3]);
 
-/** Compute the cubic at s = `scale`. */
-SUPINE_API double supine_volume_at(const double cubic[3], double scale);
-
 /** Find the scale at which the cubic is `volume`, in the interval around 0 in which it is monotone.
  * @retval SUPINE_ERROR_NUMERICAL  there is none: the surface folds before, or the volume does not
  *                                 change with the scale */
