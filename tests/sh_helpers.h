@@ -1,21 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Repeatable random numbers and a comparison that prints its values. Include after cmocka.h. */
+/* Repeatable random numbers, directions and rotations. */
 #ifndef SH_HELPERS_H
 #define SH_HELPERS_H
 
 #include <math.h>
 #include <stdint.h>
-
-/* Print both values in double on failure; assert_float_equal of cmocka 1.1.5 prints float. */
-#define assert_close(value, expected, tolerance)                                                   \
-  do {                                                                                             \
-    const double value_ = (value);                                                                 \
-    const double expected_ = (expected);                                                           \
-    if (!(fabs(value_ - expected_) <= (tolerance))) {                                              \
-      fail_msg("%s = %.17g, not %.17g: off by %.3g", #value, value_, expected_,                    \
-               value_ - expected_);                                                                \
-    }                                                                                              \
-  } while (0)
 
 /* Return a uniform number in (-1, 1). G. Marsaglia, "Xorshift RNGs", J. Stat. Software 8(14), 2003.
  */

@@ -36,6 +36,17 @@
 void test_add(const char *name, CMUnitTestFunction test);
 void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
 
+/* Print both values in double on failure; assert_float_equal of cmocka 1.1.5 prints float. */
+#define assert_close(value, expected, tolerance)                                                   \
+  do {                                                                                             \
+    const double value_ = (value);                                                                 \
+    const double expected_ = (expected);                                                           \
+    if (!(fabs(value_ - expected_) <= (tolerance))) {                                              \
+      fail_msg("%s = %.17g, not %.17g: off by %.3g", #value, value_, expected_,                    \
+               value_ - expected_);                                                                \
+    }                                                                                              \
+  } while (0)
+
 /* Write a text as a file. */
 static inline void test_write(const char *path, const char *text) {
   FILE *file = fopen(path, "wb");

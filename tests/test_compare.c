@@ -13,13 +13,6 @@
 
 enum { LUNGS_MAX = 3 };
 
-static void check_near(double found, double wanted, double tolerance, int line) {
-  if (!(fabs(found - wanted) <= tolerance)) {
-    fail_msg("line %d: %.17g instead of %.17g +- %g", line, found, wanted, tolerance);
-  }
-}
-#define assert_near(found, wanted, tolerance) check_near(found, wanted, tolerance, __LINE__)
-
 /* A synthetic basis, opened, with its comparison. */
 typedef struct made {
   fixture *f;
@@ -136,7 +129,7 @@ static void check_rms(bool vector, size_t modes, size_t lungs) {
     }
     const double rms = supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
                                           POSED(m.basis, p.weights[1], p.scales[1]));
-    assert_near(rms, sqrt(square), 1e-6 * sqrt(square));
+    assert_close(rms, sqrt(square), 1e-6 * sqrt(square));
     assert_true(rms == supine_compare_rms(m.compare, POSED(m.basis, p.weights[1], p.scales[1]),
                                           POSED(m.basis, p.weights[0], p.scales[0])));
     assert_true(0 == supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
@@ -205,14 +198,14 @@ TEST(test_statistics_random_pairs_equal_sorting) {
     supine_compare_distances(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
                              POSED(m.basis, p.weights[1], p.scales[1]), distance);
     supine_compare_statistics(m.compare, distance, &found);
-    assert_near(found.mean, mean, 1e-6 * mean);
-    assert_near(found.rms, sqrt(square), 1e-6 * sqrt(square));
-    assert_near(found.p95, sorted[at].distance, 1e-6 * mean);
-    assert_near(found.max, sorted[m.f->vertices - 1].distance, 1e-6 * found.max);
-    assert_near(found.rms,
-                supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
-                                   POSED(m.basis, p.weights[1], p.scales[1])),
-                1e-6 * found.rms);
+    assert_close(found.mean, mean, 1e-6 * mean);
+    assert_close(found.rms, sqrt(square), 1e-6 * sqrt(square));
+    assert_close(found.p95, sorted[at].distance, 1e-6 * mean);
+    assert_close(found.max, sorted[m.f->vertices - 1].distance, 1e-6 * found.max);
+    assert_close(found.rms,
+                 supine_compare_rms(m.compare, POSED(m.basis, p.weights[0], p.scales[0]),
+                                    POSED(m.basis, p.weights[1], p.scales[1])),
+                 1e-6 * found.rms);
     free(direct);
   }
   memset(distance, 0, m.f->vertices * sizeof *distance);
@@ -255,7 +248,7 @@ TEST(test_energy_sums_to_mean_square_over_sphere) {
       mean += weight / (2.0 * LONGITUDES) * rms * rms;
     }
   }
-  assert_near(total, mean, 1e-12 * mean);
+  assert_close(total, mean, 1e-12 * mean);
   unmake(&m);
 }
 
@@ -315,7 +308,7 @@ TEST(test_slabs_reference_sum_to_volume_of_lung) {
         volume += slabs[lung * SLABS + s].volume;
       }
       const double whole = fixture_volume(m.f, lung, rest);
-      assert_near(volume, whole, 1e-9 * whole);
+      assert_close(volume, whole, 1e-9 * whole);
     }
   }
   free(rest);
@@ -344,8 +337,8 @@ TEST(test_slabs_bipyramid_follow_cube_of_height) {
   }
   for (size_t s = 0; s < SLABS / 2; ++s) {
     const double part = (pow((double)(s + 1) / 5, 3) - pow((double)s / 5, 3)) / 2;
-    assert_near(slabs[s].volume / whole, part, 1e-6);
-    assert_near(slabs[SLABS - 1 - s].volume / whole, part, 1e-6);
+    assert_close(slabs[s].volume / whole, part, 1e-6);
+    assert_close(slabs[SLABS - 1 - s].volume / whole, part, 1e-6);
   }
   supine_basis_close(basis);
   free(bytes);
@@ -377,7 +370,7 @@ TEST(test_slabs_linear_displacement_gains_its_determinant) {
       random_direction(&random, g);
       assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
       for (size_t s = 0; s < 2 * SLABS; ++s) { /* mL, of slabs of about 100: float positions */
-        assert_near(slabs[s].gain, (determinant - 1) * slabs[s].volume, 1e-3);
+        assert_close(slabs[s].gain, (determinant - 1) * slabs[s].volume, 1e-3);
       }
     }
     free(xyz);
@@ -404,8 +397,8 @@ TEST(test_slabs_any_state_sum_to_exact_volume) {
       for (size_t s = 0; s < SLABS; ++s) {
         gain += slabs[lung * SLABS + s].gain;
       }
-      assert_near(gain, posed_lung_volume(m.basis, lung, weights, scales[lung]),
-                  1e-3); /* mL: float positions */
+      assert_close(gain, posed_lung_volume(m.basis, lung, weights, scales[lung]),
+                   1e-3); /* mL: float positions */
     }
   }
   free(xyz);

@@ -6,8 +6,6 @@
 
 #include "program/options/pv.h"
 
-#define assert_near(value, expected, within) assert_true(fabs((value) - (expected)) <= (within))
-
 enum { COUNT = 61 };
 
 /* Error of quadrature and rounding relative to the volume range: some 400 times a double's epsilon.
@@ -42,8 +40,8 @@ TEST(test_evaluate_constant_control_gives_salazar_knowles) {
         supine_breath_curve_evaluate(&curve, COUNT, pressures, volumes, compliances, NULL),
         SUPINE_OK);
     for (size_t j = 0; j < COUNT; ++j) {
-      assert_near(volumes[j], -most * expm1(-k[i] * pressures[j]), integration * most);
-      assert_near(compliances[j], k[i] * most * exp(-k[i] * pressures[j]), integration * most);
+      assert_close(volumes[j], -most * expm1(-k[i] * pressures[j]), integration * most);
+      assert_close(compliances[j], k[i] * most * exp(-k[i] * pressures[j]), integration * most);
     }
   }
 }
@@ -60,7 +58,7 @@ TEST(test_evaluate_second_control_gives_gaussian_compliance) {
                    SUPINE_OK);
   for (size_t j = 0; j < COUNT; ++j) {
     const double x = pressures[j] / 20.0 - 1.0;
-    assert_near(volumes[j], 500.0 * (1.0 + erf(root * x) / erf(root)), integration * 1000.0);
+    assert_close(volumes[j], 500.0 * (1.0 + erf(root * x) / erf(root)), integration * 1000.0);
   }
 }
 
@@ -80,7 +78,7 @@ TEST(test_evaluate_any_controls_satisfy_equation) {
                      c[3] * (5.0 * x * x * x - 3.0 * x) / 2.0 +
                      c[4] * (35.0 * pow(x, 4) - 30.0 * x * x + 3.0) / 8.0;
     /* The error of the difference quotient is of order step^2. */
-    assert_near(log(compliances[1] / compliances[0]) / (2.0 * step), u, 100 * step * step);
+    assert_close(log(compliances[1] / compliances[0]) / (2.0 * step), u, 100 * step * step);
   }
 }
 
@@ -91,8 +89,8 @@ TEST(test_evaluate_ends_and_order_exact) {
   double volumes[5];
   assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 5, pressures, volumes, NULL, NULL),
                    SUPINE_OK);
-  assert_near(volumes[2], sigmoid.volume[0], 0.0);
-  assert_near(volumes[0], sigmoid.volume[1], 4.0 * DBL_EPSILON * sigmoid.volume[1]);
+  assert_close(volumes[2], sigmoid.volume[0], 0.0);
+  assert_close(volumes[0], sigmoid.volume[1], 4.0 * DBL_EPSILON * sigmoid.volume[1]);
   assert_true(volumes[0] == volumes[4]);
   assert_true(volumes[1] == volumes[3]);
   assert_true(volumes[1] > volumes[2] && volumes[1] < volumes[0]);
@@ -153,11 +151,11 @@ TEST(test_normal_lung_has_stated_curves) {
       SUPINE_OK);
   for (size_t j = 0; j < COUNT; ++j) {
     const double p = pressures[j];
-    assert_near(exhale[j], 6000.0 * expm1(-k * p) / expm1(-30.0 * k), 1e-4);
+    assert_close(exhale[j], 6000.0 * expm1(-k * p) / expm1(-30.0 * k), 1e-4);
     const double share =
         (1.0 / (1.0 + exp(-(p - 10.0) / 6.0)) - 1.0 / (1.0 + exp(10.0 / 6.0))) / rise;
-    assert_near(inhale[j], 6000.0 * share, 2.0); /* within 0.03 % of the range */
-    assert_true(exhale[j] >= inhale[j] - 1e-9);  /* hysteresis */
+    assert_close(inhale[j], 6000.0 * share, 2.0); /* within 0.03 % of the range */
+    assert_true(exhale[j] >= inhale[j] - 1e-9);   /* hysteresis */
   }
 }
 

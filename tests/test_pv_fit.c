@@ -7,8 +7,6 @@
 
 #include "program/options/pv.h"
 
-#define assert_near(value, expected, within) assert_true(fabs((value) - (expected)) <= (within))
-
 enum { SAMPLES = 33, HELD_OUT = 211 };
 
 /* A published curve: Venegas' sigmoid if d > 0, else Salazar-Knowles. */
@@ -104,13 +102,13 @@ TEST(test_fit_published_curves_under_one_percent) {
     assert_true(report.rms_percent < 1.0);
     assert_true(held_out < 1.0);
     assert_true(held_out < 0.3); /* % of the range: the limit of the form of the curve */
-    assert_near(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
-                1e-9 * report.rms + 1e-12);
+    assert_close(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
+                 1e-9 * report.rms + 1e-12);
     assert_true(curve.pressure[0] == truths[i].low && curve.pressure[1] == truths[i].high);
     if (truths[i].d == 0.0) { /* exact: c_1 = -k (P_high - P_low) / 2 */
-      assert_near(curve.control[0], -0.5 * truths[i].c * truths[i].high, 1e-6);
+      assert_close(curve.control[0], -0.5 * truths[i].c * truths[i].high, 1e-6);
       for (size_t c = 1; c < SUPINE_PV_CONTROLS; ++c) {
-        assert_near(curve.control[c], 0.0, 1e-6);
+        assert_close(curve.control[c], 0.0, 1e-6);
       }
     }
   }
@@ -178,10 +176,10 @@ TEST(test_fit_model_own_data_recovers_parameters) {
       assert_int_equal(fit(counts[n], pressures, volumes, 0.95, &curve, &report, NULL), SUPINE_OK);
       assert_int_equal(report.samples, counts[n]);
       for (size_t c = 0; c < SUPINE_PV_CONTROLS; ++c) {
-        assert_near(curve.control[c], model.control[c], 1e-6);
+        assert_close(curve.control[c], model.control[c], 1e-6);
       }
-      assert_near(curve.volume[0], model.volume[0], 1e-5);
-      assert_near(curve.volume[1], model.volume[1], 1e-5);
+      assert_close(curve.volume[0], model.volume[0], 1e-5);
+      assert_close(curve.volume[1], model.volume[1], 1e-5);
     }
   }
 }
@@ -224,7 +222,7 @@ TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
     for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
       print_message("unknown %zu: %.1f %% of intervals at %.0f %%\n", i,
                     100.0 * covered[level][i] / SEEDS, 100.0 * levels[level]);
-      assert_near(covered[level][i], SEEDS * levels[level], 5.0 * deviation);
+      assert_close(covered[level][i], SEEDS * levels[level], 5.0 * deviation);
     }
   }
 }
@@ -388,9 +386,9 @@ TEST(test_fit_dips_accepted_up_to_stated_limits) {
   double v[SAMPLES];
   supine_pv_curve curve;
   (void)least_refused_dip(14, 0.02, &curve, p, v);
-  assert_near(fall_of(v, 14), 0.08, 1e-6);
+  assert_close(fall_of(v, 14), 0.08, 1e-6);
   (void)least_refused_dip(15, 0.02, &curve, p, v);
-  assert_near(fall_of(v, 15), 0.15, 1e-6);
+  assert_close(fall_of(v, 15), 0.15, 1e-6);
   (void)least_refused_dip(SAMPLES, 0.001, &curve, p, v);
   double fitted[SAMPLES];
   double residual[SAMPLES];
@@ -408,5 +406,5 @@ TEST(test_fit_dips_accepted_up_to_stated_limits) {
       1.4826 * residual[SAMPLES / 2] * sqrt((double)SAMPLES / (SAMPLES - SUPINE_PV_CONTROLS - 2));
   const double fall = fall_of(v, SAMPLES);
   assert_true(fall < 0.1); /* limited by the noise, not by the range */
-  assert_near(fall, 7.0 * sqrt(2.0) * sigma, 1e-4 * fall);
+  assert_close(fall, 7.0 * sqrt(2.0) * sigma, 1e-4 * fall);
 }
