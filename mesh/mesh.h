@@ -52,14 +52,10 @@ typedef struct supine_mesh_load_options {
 
 /** Result of loading. */
 typedef struct supine_mesh_report {
-  size_t file_vertices;         /**< vertices in the file */
-  size_t file_faces;            /**< faces in the file, polygons as triangles */
-  size_t welded_vertices;       /**< vertices merged with an earlier one at the same position */
   size_t degenerate_faces;      /**< faces dropped: repeated corners, or not a polygon */
   size_t unreferenced_vertices; /**< vertices dropped: in no triangle */
   supine_axes axes;             /**< axes assumed for the file */
   bool axes_from_tag;           /**< the axes come from a SPACE tag */
-  bool comment_names_ras;       /**< untagged, read as LPS, but a comment mentions RAS */
 } supine_mesh_report;
 
 /** Read one surface: PLY and VTP directly, OBJ, STL and other formats through assimp. Polygons are

@@ -46,12 +46,6 @@ static void find_in_mesh(const char *path, const supine_mesh_report *report,
         report->degenerate_faces, report->degenerate_faces == 1 ? "" : "s",
         report->unreferenced_vertices, report->unreferenced_vertices == 1 ? "ex" : "ices");
   }
-  if (report->comment_names_ras) {
-    supine_findings_add(findings,
-                        "%s: note: read as LPS, but its comment mentions RAS: if its x points to "
-                        "the right, add --axes RAS",
-                        path);
-  }
 }
 
 static supine_status load_meshes(reading *r, supine_findings *findings, supine_error *error) {

@@ -75,7 +75,6 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
                                          64.0 * FLT_EPSILON, 0.5 / 256.0};
       expect_same(&again, &mesh, tolerance[k]);
       assert_true(report.axes_from_tag);
-      assert_false(report.comment_names_ras);
       assert_int_equal(report.axes,
                        all_axes[a] == SUPINE_AXES_RAS ? SUPINE_AXES_RAS : SUPINE_AXES_LPS);
       supine_mesh_free(&again);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Load a file into a welded surface in millimetres, LPS. */
+#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -47,21 +48,8 @@ static mesh_reader *find_reader(const mesh_file *file) {
   return NULL;
 }
 
-static supine_status read_bytes(FILE *stream, size_t size, mesh_file *file, supine_error *error) {
-  unsigned char *bytes = realloc(file->bytes, size + 1);
-  if (bytes == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu bytes",
-                            file->path, size);
-  }
-  file->bytes = bytes;
-  errno = 0;
-  file->size += fread(bytes + file->size, 1, size - file->size, stream);
-  bytes[file->size] = '\0';
-  return ferror(stream) != 0 ? cannot_read(file->path, error) : SUPINE_OK;
-}
-
-static supine_status open_regular(const char *path, FILE **stream, size_t *size,
-                                  supine_error *error) {
+/* Check that the path is a file, and return its size in *size. */
+static supine_status check_file(const char *path, size_t *size, supine_error *error) {
   struct stat about;
   errno = 0;
   if (stat(path, &about) != 0) {
@@ -75,39 +63,64 @@ static supine_status open_regular(const char *path, FILE **stream, size_t *size,
     return supine_error_set(error, SUPINE_ERROR_READ,
                             "%s: is not a regular file; save the mesh to one first", path);
   }
-  *stream = fopen(path, "rb");
-  if (*stream == NULL) {
-    return cannot_read(path, error);
-  }
   *size = (size_t)about.st_size;
   return *size == 0 ? supine_error_set(error, SUPINE_ERROR_FORMAT,
                                        "%s: the file is empty; save the mesh again", path)
                     : SUPINE_OK;
 }
 
-/* Open and read the file, and find its reader. */
+/* Find the axes named in the file's head as 3D Slicer writes them, SPACE=LPS. */
+static void find_space(mesh_file *file) {
+  char head[4096];
+  char letters[4] = "";
+  (void)snprintf(head, sizeof head, "%s", (const char *)file->bytes);
+  const char *tag = head;
+  while ((tag = strcasestr(tag, "SPACE=")) != NULL && tag > head &&
+         isalnum((unsigned char)tag[-1])) {
+    ++tag;
+  }
+  file->tagged = tag != NULL;
+  if (tag != NULL && !isalnum((unsigned char)tag[strnlen(tag, 9)])) {
+    for (size_t k = 0; k < 3; ++k) {
+      letters[k] = (char)toupper((unsigned char)tag[strnlen(tag, 6 + k)]);
+    }
+    (void)supine_mesh_axes_parse(letters, &file->space);
+  }
+}
+
+/* Read the file, and find its reader. */
 static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_error *error) {
-  FILE *stream = NULL;
   size_t size = 0;
-  supine_status status = open_regular(file->path, &stream, &size, error);
-  if (status == SUPINE_OK) {
-    status = read_bytes(stream, size < MESH_HEAD_SIZE ? size : MESH_HEAD_SIZE, file, error);
+  supine_status status = check_file(file->path, &size, error);
+  if (status != SUPINE_OK) {
+    return status;
   }
-  if (status == SUPINE_OK) {
-    supine_mesh_space_note(file, file->size);
-    *reader = find_reader(file);
-    status = *reader == NULL
-                 ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                    "%s: no importer for this ending; give the mesh as PLY, OBJ, "
-                                    "STL or VTP",
-                                    file->path)
-             : *reader == supine_mesh_import ? SUPINE_OK
-                                             : read_bytes(stream, size, file, error);
+  FILE *stream = fopen(file->path, "rb");
+  if (stream == NULL) {
+    return cannot_read(file->path, error);
   }
-  if (stream != NULL) {
-    (void)fclose(stream);
+  file->bytes = malloc(size + 1);
+  if (file->bytes == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory for %zu bytes",
+                              file->path, size);
+  } else {
+    errno = 0;
+    file->size = fread(file->bytes, 1, size, stream);
+    file->bytes[file->size] = '\0';
+    status = ferror(stream) != 0 ? cannot_read(file->path, error) : SUPINE_OK;
   }
-  return status;
+  (void)fclose(stream);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  find_space(file);
+  *reader = find_reader(file);
+  return *reader != NULL
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: no importer for this ending; give the mesh as PLY, OBJ, STL "
+                                "or VTP",
+                                file->path);
 }
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
@@ -124,7 +137,6 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   }
   report->axes = file->tagged ? file->space : SUPINE_AXES_LPS;
   report->axes_from_tag = file->tagged;
-  report->comment_names_ras = !file->tagged && file->mentions_ras;
   return SUPINE_OK;
 }
 
@@ -178,8 +190,6 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
       (status = convert(path, scale, found.axes, &loaded, error)) != SUPINE_OK) {
     goto cleanup;
   }
-  found.file_vertices = loaded.vertex_count;
-  found.file_faces = loaded.triangle_count + found.degenerate_faces;
   status = supine_mesh_weld(&loaded, &found);
   if (status != SUPINE_OK) {
     (void)supine_error_set(error, status, "%s: out of memory", path);
@@ -187,9 +197,7 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   }
   if (loaded.triangle_count == 0) {
     status = supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: no triangles (%zu vertices, %zu faces in the file); give a "
-                              "surface, not points or lines",
-                              path, found.file_vertices, found.file_faces);
+                              "%s: no triangles; give a surface, not points or lines", path);
     goto cleanup;
   }
   *mesh = loaded;

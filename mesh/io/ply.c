@@ -284,9 +284,6 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
             .faces = {.path = file->path, .mesh = mesh}};
   supine_status status = read_header(&in);
   status = status == SUPINE_OK ? check_header(&in) : status;
-  if (status == SUPINE_OK) {
-    supine_mesh_space_note(file, (size_t)(in.text.at - file->bytes));
-  }
   for (size_t e = 0; e < in.element_count && status == SUPINE_OK; ++e) {
     const element *of = &in.elements[e];
     if (of->kind == FACES && mesh->vertices == NULL) {

@@ -47,25 +47,15 @@ double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes
 /** A file being read. */
 typedef struct mesh_file {
   const char *path;
-  unsigned char *bytes; /**< all of the file, or its head if assimp opens it itself; then a 0 */
+  unsigned char *bytes; /**< the file, then a 0 */
   size_t size;
   bool tagged;       /**< a SPACE tag is present */
   supine_axes space; /**< the axes it names; AUTO: unknown ones */
-  bool mentions_ras; /**< a comment contains the word RAS */
 } mesh_file;
 
 /** Refuse a text with NUL bytes or with a CR that no LF follows, which other readers would split
  * differently. Return false, with SUPINE_ERROR_FORMAT set, if it is refused. */
 bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
-
-/* ---- space.c ---- */
-
-enum { MESH_HEAD_SIZE = 4096 };
-
-/** Find SPACE= with three letters, and the word RAS, in the first `size` bytes, at most
- * MESH_HEAD_SIZE; set tagged,
- * space and mentions_ras. */
-void supine_mesh_space_note(mesh_file *file, size_t size);
 
 /* ---- faces.c: faces added to a mesh that has its vertices. ---- */
 

@@ -75,7 +75,6 @@ supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report) {
   memset(slots, 0xFF, slot_count * sizeof *slots);
 
   size_t kept = join(mesh, remap, slots, slot_count);
-  report->welded_vertices += mesh->vertex_count - kept;
   mesh->vertex_count = kept;
   kept = drop_degenerate(mesh, remap);
   report->degenerate_faces += mesh->triangle_count - kept;
