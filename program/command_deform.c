@@ -21,8 +21,7 @@ typedef struct request {
   supine_orientation orientation;
   supine_volume_options volume;
   supine_from from;
-  bool has_scale, as_scanned;
-  double scale;
+  bool as_scanned;
   supine_deform_content content;
   const char *states; /* file of --states */
   char *output;       /* output of a row of that file */
@@ -43,9 +42,6 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {"scale", 0, "MM", "largest displacement, instead of a volume: for open surfaces",
-     SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
-     .rivals = "breath"},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
@@ -87,34 +83,6 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
     largest = fmax(largest, supine_distance(b, a));
   }
   return largest;
-}
-
-/* Compute the pose requested: by largest displacement from the reference surface, or by volumes. */
-static supine_status find_pose(const supine_basis *basis, const request *wanted,
-                               const double gravity[3], supine_pose *pose, supine_error *error) {
-  if (!wanted->has_scale) {
-    return supine_options_pose(basis, name, &wanted->volume, gravity, pose, error);
-  }
-  supine_mesh reference = {0};
-  supine_mesh mesh = {0};
-  (void)supine_basis_weights(basis, gravity, pose->weights); /* cannot fail: a unit vector */
-  supine_pose_fill(pose, 1.0);
-  supine_status status = supine_options_basis_rest_mesh(basis, &reference);
-  if (status == SUPINE_OK) {
-    status = deformed_mesh(basis, pose, &mesh);
-  }
-  if (status == SUPINE_OK) {
-    const double largest = largest_displacement(&reference, &mesh);
-    supine_pose_fill(pose, wanted->scale / largest);
-    status = largest > 0.0 ? SUPINE_OK
-                           : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                              "nothing moves in this direction of gravity, so no "
-                                              "--scale gives %g mm: give another posture",
-                                              wanted->scale);
-  }
-  supine_mesh_free(&reference);
-  supine_mesh_free(&mesh);
-  return status;
 }
 
 /* Print the file written, the displacement and the volume in one line. */
@@ -178,9 +146,10 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
     status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   }
   if (status == SUPINE_OK) {
-    status = find_pose(basis, wanted, moved.state.gravity, &moved.pose, error);
+    status =
+        supine_options_pose(basis, name, &wanted->volume, moved.state.gravity, &moved.pose, error);
   }
-  if (status == SUPINE_OK && !wanted->has_scale) {
+  if (status == SUPINE_OK) {
     status = supine_options_expected_find(basis, &moved.state, &moved.from.state, &moved.expected,
                                           error);
   }

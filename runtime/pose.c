@@ -227,7 +227,7 @@ static supine_status open_gains(const supine_basis *basis, const supine_state *s
                          volume->ml == 0 && state->lung_count == 0;
   if (!reference) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                            "the surface is open and encloses no volume: give --scale, or close "
+                            "the surface is open and encloses no volume: close "
                             "the mesh before 'supine precompute'");
   }
   supine_pose_fill(pose, 0);

@@ -173,7 +173,7 @@ TEST(test_pose_open_surface_refused) {
   supine_pose pose;
   supine_error error;
   assert_int_equal(supine_basis_pose(basis, &scan, &pose, &error), SUPINE_ERROR_OPEN_SURFACE);
-  assert_non_null(strstr(error.message, "--scale"));
+  assert_non_null(strstr(error.message, "close the mesh"));
   supine_basis_close(basis);
   free(bytes);
   fixture_destroy(f);

@@ -182,7 +182,7 @@ static void note_lungs(const supine_lungs *lungs, const char *name, supine_findi
   if (!t->closed) {
     supine_findings_add(findings,
                         "%s: note: the surface is not closed (%zu boundary, %zu non-manifold, %zu "
-                        "inconsistent edge%s): volumes are unknown, so give --scale",
+                        "inconsistent edge%s): volumes are unknown",
                         name, t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges,
                         plural(t->inconsistent_edges));
   }

@@ -38,9 +38,7 @@ typedef struct supine_pv_report {
  * intervals, while the curve itself still fits.
  *
  * Pressures must keep rising or keep falling. Volumes must rise with pressure except for noise: a
- * sample may lie below the local trend, or below the largest volume so far, by up to 8 % of the
- * range of volumes; from 15 samples on by up to 7 sigma of the difference of two samples (sigma
- * estimated from the median residual), at most 15 %.
+ * sample may lie below the largest volume before it by up to 10 % of the range of volumes.
  *
  * @param name        the samples' file, for messages
  * @param count       at least SUPINE_PV_UNKNOWNS + 1

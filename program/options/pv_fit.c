@@ -9,14 +9,12 @@
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_multifit_nlinear.h>
-#include <gsl/gsl_statistics.h>
 
 #include "program/options/pv.h"
 
 enum {
   LOW = SUPINE_PV_CONTROLS, /* indices of V_low and V_high among the unknowns */
-  HIGH,
-  NOISE_KNOWN = 15 /* least number of samples that also determine their noise */
+  HIGH
 };
 
 /* Sorted samples, and the workspace of their fit. */
@@ -26,10 +24,9 @@ typedef struct problem {
   supine_pv_sample *sample; /* [count] by rising pressure */
   gsl_multifit_nlinear_workspace *work;
   gsl_matrix *covariance;
-  double *x;       /* [count] pressures mapped to -1 to 1 */
-  double *v;       /* [count] volumes above the first, in shares of their range */
-  double *q;       /* [count] the curve with volumes 0 to 1 */
-  double *scratch; /* [count] */
+  double *x; /* [count] pressures mapped to -1 to 1 */
+  double *v; /* [count] volumes above the first, in shares of their range */
+  double *q; /* [count] the curve with volumes 0 to 1 */
 } problem;
 
 static supine_status refuse(const problem *limb, const supine_pv_sample *sample, const char *why,
@@ -73,23 +70,16 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
              : refuse_fall(limb, &sorted[count - 1], sorted[0].volume, error);
 }
 
-/* Refuse volumes that fall by more than `allowed` mL below the local trend, or below the largest
- * volume before them. */
-static supine_status check_falls(const problem *limb, double allowed, supine_error *error) {
-  const supine_pv_sample *s = limb->sample;
-  const size_t last = limb->count - 1;
-  double peak = s[0].volume;
-  for (size_t j = 1; j <= last; ++j) {
-    /* Predict the rise of this step from the samples on either side. */
-    const size_t before = j >= 2 ? j - 2 : 0;
-    const size_t after = j < last ? j + 1 : last;
-    const double expected =
-        fmax(0.0, (s[after].volume - s[before].volume) / (double)(after - before));
-    const double fall = s[j - 1].volume - s[j].volume;
-    if ((fall > 0.0 && fall + expected > allowed) || peak - s[j].volume > allowed) {
-      return refuse_fall(limb, &s[j], peak, error);
+/* Refuse volumes that fall below the largest one before them by more than noise explains. */
+static supine_status check_falls(const problem *limb, double span, supine_error *error) {
+  static const double allowed = 0.1; /* share of the range of volumes */
+  double peak = limb->sample[0].volume;
+  for (size_t j = 1; j < limb->count; ++j) {
+    const supine_pv_sample *sample = &limb->sample[j];
+    if (peak - sample->volume > allowed * span) {
+      return refuse_fall(limb, sample, peak, error);
     }
-    peak = fmax(peak, s[j].volume);
+    peak = fmax(peak, sample->volume);
   }
   return SUPINE_OK;
 }
@@ -146,11 +136,9 @@ static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *
   return GSL_SUCCESS;
 }
 
-/* Fill the report of a minimum found, and estimate the noise of a volume, mL, from the median
- * residual, which outliers do not affect. */
-static void describe(const problem *limb, double span, double confidence, supine_pv_report *report,
-                     double *sigma) {
-  static const double normal = 1.4826; /* sigma over median |error| of the normal distribution */
+/* Fill the report of a minimum found. */
+static void describe(const problem *limb, double span, double confidence,
+                     supine_pv_report *report) {
   const gsl_matrix *jacobian = gsl_multifit_nlinear_jac(limb->work);
   const gsl_vector *residual = gsl_multifit_nlinear_residual(limb->work);
   const size_t count = residual->size;
@@ -166,11 +154,6 @@ static void describe(const problem *limb, double span, double confidence, supine
     *(i < LOW ? &report->control_interval[i] : &report->volume_interval[i - LOW]) =
         i < LOW ? interval : span * interval;
   }
-  for (size_t j = 0; j < count; ++j) {
-    limb->scratch[j] = fabs(gsl_vector_get(residual, j));
-  }
-  *sigma =
-      span * normal * gsl_stats_median(limb->scratch, 1, count) * sqrt((double)count / freedom);
 }
 
 /* Minimise by Levenberg-Marquardt, from the straight line between the end samples. */
@@ -205,7 +188,6 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
   const double high = s[count - 1].pressure;
   double least = s[0].volume;
   double largest = s[0].volume;
-  double sigma = 0.0;
   for (size_t j = 1; j < count; ++j) {
     least = fmin(least, s[j].volume);
     largest = fmax(largest, s[j].volume);
@@ -215,7 +197,7 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
     limb->x[j] = ((s[j].pressure - low) - (high - s[j].pressure)) / (high - low);
     limb->v[j] = (s[j].volume - s[0].volume) / span;
   }
-  supine_status status = check_falls(limb, (count < NOISE_KNOWN ? 0.08 : 0.15) * span, error);
+  const supine_status status = check_falls(limb, span, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -229,11 +211,8 @@ static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curv
       .pressure = {low, high},
       .volume = {s[0].volume + span * found[LOW], s[0].volume + span * found[HIGH]}};
   memcpy(curve->control, found, sizeof curve->control);
-  describe(limb, span, confidence, report, &sigma);
-  if (count >= NOISE_KNOWN) {
-    status = check_falls(limb, 7.0 * sqrt(2.0) * sigma, error);
-  }
-  return status == SUPINE_OK ? supine_breath_curve_check(curve, error) : status;
+  describe(limb, span, confidence, report);
+  return supine_breath_curve_check(curve, error);
 }
 
 supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_sample *samples,
@@ -252,14 +231,13 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
                   .work = gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &options, count,
                                                      SUPINE_PV_UNKNOWNS),
                   .covariance = gsl_matrix_alloc(SUPINE_PV_UNKNOWNS, SUPINE_PV_UNKNOWNS),
-                  .x = malloc(4 * count * sizeof(double))};
+                  .x = malloc(3 * count * sizeof(double))};
   supine_status status = SUPINE_ERROR_MEMORY;
   if (limb.sample == NULL || limb.work == NULL || limb.covariance == NULL || limb.x == NULL) {
     (void)supine_error_set(error, status, "%s: no memory for %zu samples", name, count);
   } else {
     limb.v = limb.x + count;
     limb.q = limb.v + count;
-    limb.scratch = limb.q + count;
     status = sort(&limb, samples, error);
   }
   if (status == SUPINE_OK) {
