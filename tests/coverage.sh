@@ -9,7 +9,7 @@ set -eu
 cd "$(dirname "$0")/.."
 # Tests that are slow with gcov and reach few lines that others do not reach.
 slow='precompute|thread_count|field|patient_expand|program|breathe|projection|deform|deform_lung|cohort'
-slow="$slow|inside|no_data_lost|labels_orientation|postures|lit_angles|faults|bids|reference|validation_lungs|house"
+slow="$slow|inside|no_data_lost|labels_orientation|lit_angles|faults|bids|reference|validation_lungs|house"
 slow="$slow|readme_example|series_vtk|stream_page|stream_slicer|stream_link|stream_unity.*|export_.*_node|mesh_hostile"
 slow="$slow|fuzz_obj|fuzz_nrrd|fuzz_nii"
 mkdir -p build

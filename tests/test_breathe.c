@@ -16,8 +16,8 @@
 
 #include "command_helpers.h"
 #include "lungs_helpers.h"
-#include "program/options/pv.h"
 #include "program/options/breath_frames.h"
+#include "program/options/pv.h"
 
 #include "tests/poses.h"
 
@@ -268,7 +268,7 @@ TEST(test_breathe_options_shape_the_breath) {
   free(wanted);
 }
 
-TEST(test_breathe_bad_arguments_are_usage_errors) {
+TEST(test_breathe_bad_arguments_usage_error) {
   static const char *const bad[][2] = {{"--rate", "0"},
                                        {"--rate", "-3"},
                                        {"--rate", "often"},

@@ -33,7 +33,7 @@ TEST(test_lungs_two_files_any_order_left_first) {
 }
 
 /* One surface whose vertices alternate between the lungs. */
-TEST(test_lungs_interleaved_file_is_grouped) {
+TEST(test_lungs_interleaved_file_grouped) {
   supine_mesh lumps[2] = {helper_lump(4, -80.0, 3), helper_lump(4, 90.0, 4)};
   const size_t n = lumps[0].vertex_count;
   supine_mesh both = {2 * n, malloc(6 * n * sizeof(double)), 2 * lumps[0].triangle_count,

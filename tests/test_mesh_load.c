@@ -408,7 +408,7 @@ TEST(test_load_not_finite_mesh_vertex_named) {
   assert_int_equal(unlink(path), 0);
 }
 
-TEST(test_load_stl_binary_that_says_solid) {
+TEST(test_load_stl_binary_beginning_with_solid_read) {
   unsigned char stl[134] = "solid of a scanner that does not know better";
   const float soup[12] = {0, 0, 1, 0, 0, 0, 100, 0, 0, 0, 100, 0};
   stl[80] = 1;

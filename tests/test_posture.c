@@ -48,7 +48,7 @@ TEST(test_gravity_unknown_name_untouched) {
   }
 }
 
-TEST(test_name_every_index_is_known) {
+TEST(test_posture_name_every_index_known) {
   assert_int_equal(supine_posture_count(), 16);
   for (size_t i = 0; i < supine_posture_count(); ++i) {
     double g[3];

@@ -228,7 +228,7 @@ TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
 }
 
 /* The fit is a minimum: a small change of any parameter increases the misfit. */
-TEST(test_fit_result_is_a_minimum) {
+TEST(test_fit_result_at_minimum) {
   double pressures[SAMPLES];
   double volumes[SAMPLES];
   truth_sample(&truths[11], SAMPLES, pressures, volumes);

@@ -87,7 +87,7 @@ TEST(test_write_then_open_same_content) {
 }
 
 /* Data begins at a multiple of 8 bytes, for any length of the header. */
-TEST(test_write_header_of_any_length_is_padded_to_eight_bytes) {
+TEST(test_write_header_any_length_padded_to_eight_bytes) {
   char *folder = fixture_folder();
   char path[256];
   (void)snprintf(path, sizeof path, "%s/padded", folder);

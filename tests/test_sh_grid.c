@@ -45,7 +45,7 @@ TEST(test_grid_any_size_integrates_powers) {
   }
 }
 
-TEST(test_grid_direction_is_unit_and_in_place) {
+TEST(test_grid_direction_unit_and_in_order) {
   supine_sh_grid *grid = NULL;
   assert_int_equal(supine_sh_grid_create(6, 8, &grid), SUPINE_OK);
   for (size_t j = 0; j < 6; ++j) {
