@@ -48,8 +48,6 @@ changed centimetres '$4 /= 10; $5 /= 10; $6 /= 10'
 refused 2 'as if in cm; give landmarks in mm' --landmarks centimetres.csv
 changed both '$1 /= 10; $2 /= 10; $3 /= 10; $4 /= 10; $5 /= 10; $6 /= 10'
 refused 2 'as if in cm; give landmarks in mm' --landmarks both.csv
-changed inches '$4 *= 2.54; $5 *= 2.54; $6 *= 2.54'
-refused 2 'times as large as rest: are both in mm' --landmarks inches.csv --translation
 changed sides '$4 = -$4'
 refused 2 'mirror image of the other' --landmarks sides.csv
 changed ras '$4 = -$4; $5 = -$5'

@@ -95,7 +95,7 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
     assert_true(fabs(applied->slopes[k] - slopes[k]) < 0.15);
   }
   assert_true(applied->left < 0.3 * applied->spread);
-  assert_true(applied->matched > 0.95 && applied->blocks > 20);
+  assert_true(fit.surface.matched > 0.95 && applied->blocks > 20);
   supine_physics_solution_free(&solution);
   free(directions);
   free(positions);
@@ -238,7 +238,7 @@ TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
   for (size_t i = 0; i < n; ++i) {
     moved.vertices[i] = 0.1 * rest.mesh.vertices[i];
   }
-  refused(&rest, &moved, "check that units");
+  refused(&rest, &moved, "do not overlap along");
   for (size_t i = 0; i < n; ++i) {
     moved.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
   }

@@ -19,8 +19,7 @@ static const double shortest = 0.1;
 
 /* Find the spread force [N]: the law's, corrected by the remaining distance to the other surface
  * along its normal. */
-static void find_catch(supine_patient_matching *m, const supine_patient *patient, double *caught,
-                       supine_patient_applied *applied) {
+static void find_catch(supine_patient_matching *m, const supine_patient *patient, double *caught) {
   supine_patient law = *patient;
   double softener = 0.0; /* mm^2 */
   double d[3];
@@ -31,14 +30,12 @@ static void find_catch(supine_patient_matching *m, const supine_patient *patient
   }
   (void)supine_patient_matching_place(m, &law);
   supine_patient_matching_find(m);
-  applied->matched = 0.0;
   for (size_t v = 0; v < m->count; ++v) {
     const supine_patient_row *row = &m->rows[v];
     supine_patient_direction(&law.power, &row->place, 1.0, d);
     caught[v] =
         supine_patient_force_at(&law.power, &row->place) +
         row->weight * m->distance[v] * supine_dot(row->axis, d) / (supine_dot(d, d) + softener);
-    applied->matched += row->weight / (double)m->count;
   }
 }
 
@@ -107,7 +104,7 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
           : supine_patient_matching_choose(m, n, 0, error);
   if (status == SUPINE_OK) {
-    find_catch(m, patient, caught, applied);
+    find_catch(m, patient, caught);
     status = supine_physics_equilibrium_force(m->equilibrium, caught, caught + n, error);
   }
   if (status == SUPINE_OK) {

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "precompute/patient/fit.h"
+#include "precompute/patient/krige.h"
 
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
@@ -22,10 +22,10 @@ static const double band_component = 1.96;
 /* Factor on the expected error within 8 mm of the surface, measured on ten patients. */
 static const double near_surface = 1.3;
 
-/* Sums over rows of weighted squares, mm^2, and of weights; counts of points. */
+/* Sums over rows of weighted squares, mm^2, and of weights; numbers of points. All are doubles, so
+ * that sums can be added. */
 typedef struct squares {
-  double of[SCORES], expected, weight;
-  size_t points, within;
+  double of[SCORES], expected, weight, points, within;
 } squares;
 
 /* Inputs and working space of one fit. */
@@ -68,8 +68,8 @@ static void add_rows(const study *s, const supine_patient_row *rows, size_t coun
       weight += row->weight;
     }
     to->weight += weight;
-    to->points += weight > 0.0;
-    to->within += weight > 0.0 && square <= band * band * expected;
+    to->points += weight > 0.0 ? 1.0 : 0.0;
+    to->within += weight > 0.0 && square <= band * band * expected ? 1.0 : 0.0;
   }
 }
 
@@ -118,13 +118,9 @@ static supine_status hold_all_out(study *s, squares *held, supine_error *error) 
                               "fitting without the held-out blocks failed: %s",
                               supine_status_string(s->failed[item]));
     }
-    for (size_t k = 0; k < SCORES; ++k) {
-      held->of[k] += of->of[k];
+    for (size_t k = 0; k < sizeof *of / sizeof(double); ++k) {
+      ((double *)held)[k] += ((const double *)of)[k];
     }
-    held->expected += of->expected;
-    held->weight += of->weight;
-    held->points += of->points;
-    held->within += of->within;
   }
   return SUPINE_OK;
 }
@@ -186,7 +182,7 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
     status = hold_all_out(s, &held, error);
   }
   if (status == SUPINE_OK) {
-    report->explained_fitted = conclude(s, &fitted, report->fitted);
+    (void)conclude(s, &fitted, report->fitted);
     report->explained = conclude(s, &held, report->held_out);
     report->baseline = report->held_out[baseline_of(s)];
     report->expected = sqrt(held.expected * (double)s->components / held.weight);
@@ -194,7 +190,7 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
       report->expected_point = report->expected;
     }
     report->expected_constant = moved > 0.0 ? pow(report->expected_point, 2.0) / moved : 0.0;
-    report->band = held.points > 0 ? 100.0 * (double)held.within / (double)held.points : 0.0;
+    report->band = held.points > 0.0 ? 100.0 * held.within / held.points : 0.0;
   }
   supine_patient_krige_free(&krige);
   return status;

@@ -222,32 +222,15 @@ void supine_patient_matching_free(supine_patient_matching *matching) {
   free_chosen(m);
 }
 
-void supine_patient_matching_append(supine_patient_matching *matching,
-                                    const supine_patient_pairs *landmarks) {
-  supine_patient_matching *m = matching;
-  supine_patient_rows_of_pairs(&m->frame, landmarks, m->rows + m->count);
-  m->landmark_rows_count = 3 * landmarks->count;
-  for (size_t i = 0; i < m->landmark_rows_count; ++i) {
-    m->rows[m->count + i].weight = (double)m->count / (double)m->landmark_rows_count;
-  }
-}
-
-/* Arguments of the pass that moves the vertices. */
-typedef struct placing {
-  supine_patient_matching *m;
-  const supine_patient *patient;
-} placing;
-
 static void place_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
-  const placing *w = context;
-  supine_patient_matching *m = w->m;
+  supine_patient_matching *m = context;
   for (size_t i = begin; i < end; ++i) {
     const supine_patient_place *place = &m->rows[i].place;
     double u[3];
     double motion[3];
-    supine_patient_displacement(w->patient, place, 1.0, u);
-    supine_patient_motion(&w->patient->power, place, motion);
+    supine_patient_displacement(m->patient, place, 1.0, u);
+    supine_patient_motion(&m->patient->power, place, motion);
     m->space[i] = 0.0;
     for (size_t a = 0; a < 3; ++a) {
       const double at = m->rest->mesh.vertices[3 * m->vertex[i] + a] + u[a] + motion[a];
@@ -259,7 +242,7 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
 
 double supine_patient_matching_place(supine_patient_matching *matching,
                                      const supine_patient *patient) {
-  placing w = {matching, patient};
-  supine_parallel_for(matching->count, GRAIN, 0, place_range, &w);
+  matching->patient = patient;
+  supine_parallel_for(matching->count, GRAIN, 0, place_range, matching);
   return sqrt(gsl_stats_mean(matching->space, 1, matching->count));
 }

@@ -14,18 +14,19 @@ typedef struct supine_patient_matching {
   supine_patient_frame frame;
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
-  double *columns;              /* [N, COLUMNS] of the force before spreading */
-  double *caught;               /* [N, COLUMNS] of the force after spreading */
-  double *rest_normals;         /* [N, 3], unit */
-  double *state_normals;        /* [state vertices, 3], unit */
-  size_t count;                 /* vertices that take part */
-  size_t *vertex;               /* [count] indices in the reference surface */
-  double *moved;                /* [count, 3] positions after the law, mm */
-  supine_patient_row *rows;     /* [count + 3 landmarks] */
-  double *distance;             /* [count] from the moved vertex along the normal, mm */
-  supine_inside_place *nearest; /* [count] places of the moved vertices */
-  double *space;                /* [count] working space */
-  bool warm;                    /* nearest holds first guesses */
+  double *columns;               /* [N, COLUMNS] of the force before spreading */
+  double *caught;                /* [N, COLUMNS] of the force after spreading */
+  double *rest_normals;          /* [N, 3], unit */
+  double *state_normals;         /* [state vertices, 3], unit */
+  size_t count;                  /* vertices that take part */
+  size_t *vertex;                /* [count] indices in the reference surface */
+  double *moved;                 /* [count, 3] positions after the law, mm */
+  supine_patient_row *rows;      /* [count + 3 landmarks] */
+  double *distance;              /* [count] from the moved vertex along the normal, mm */
+  supine_inside_place *nearest;  /* [count] places of the moved vertices */
+  double *space;                 /* [count] working space */
+  const supine_patient *patient; /* law that the vertices were moved by last */
+  bool warm;                     /* nearest holds first guesses */
   size_t landmark_rows_count;
 } supine_patient_matching;
 
@@ -49,10 +50,6 @@ supine_status supine_patient_matching_choose(supine_patient_matching *matching, 
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const supine_patient_stiffness *stiffness,
                                             supine_error *error);
-
-/* Append the landmarks' rows, with the same total weight as the surface's rows. */
-void supine_patient_matching_append(supine_patient_matching *matching,
-                                    const supine_patient_pairs *landmarks);
 
 /* Move the vertices by the law at their rows, with a correction, and return the RMS change of
  * their positions, mm. */

@@ -22,11 +22,9 @@ enum {
 
 static const double flattest = 1.0;   /* least RMS distance of points from a plane, mm */
 static const double stillest = 0.05;  /* least RMS motion, mm: below the precision of a landmark */
-static const double size_most = 2.0;  /* largest ratio of sizes: a full breath gives 1.4 */
 static const double turn_most = 25.0; /* largest rotation between two scans, degrees */
 static const double apart_most = 0.5; /* largest distance of the states over the points' spread */
-static const double box_overlap_least = 0.5; /* least overlap of surfaces' boxes over the smaller */
-static const double box_size_most = 1.6;     /* largest ratio of their sizes */
+static const double box_overlap_least = 0.5; /* least overlap of surfaces' boxes over the larger */
 static const double unmatched = 0.7; /* largest residual of the affine map over the spread */
 
 /* --- reading --------------------------------------------------------------------------------- */
@@ -226,12 +224,6 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
           unit == NULL ? "" : ", as if in ", unit == NULL ? "" : unit);
     }
   }
-  const double size = s.spread[1] / s.spread[0];
-  if (size > size_most || size < 1.0 / size_most) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the other state is %.3g times as large as rest: are both in mm?",
-                            size);
-  }
   if (s.flat) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "all points lie in one plane: give landmarks spread over the lungs");
@@ -242,17 +234,11 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                             "both lists in the same order?",
                             s.left);
   }
-  if (s.growth < 0.0) {
+  if (s.growth < 0.0 || s.turn > turn_most) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "one state is the mirror image of the other: one of them has an axis "
-                            "reversed (landmarks are LPS: x to the left, y to the back, z to the "
-                            "head)");
-  }
-  if (s.turn > turn_most) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "one state is turned by %.0f degrees against the other: they are in "
-                            "different axes (landmarks are LPS: x to the left, y to the back, z "
-                            "to the head)",
+                            "one state is %s by %.0f degrees: they are in different axes "
+                            "(landmarks are LPS: x to the left, y to the back, z to the head)",
+                            s.growth < 0.0 ? "the mirror image of the other, turned" : "turned",
                             s.turn);
   }
   const double apart = supine_distance(s.mean[0], s.mean[1]);
@@ -278,16 +264,9 @@ supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_m
   supine_mesh_box(rest, low[0], high[0]);
   supine_mesh_box(state, low[1], high[1]);
   for (int k = 0; k < 3; ++k) {
-    const double size[2] = {high[0][k] - low[0][k], high[1][k] - low[1][k]};
+    const double larger = fmax(high[0][k] - low[0][k], high[1][k] - low[1][k]);
     const double overlap = fmin(high[0][k], high[1][k]) - fmax(low[0][k], low[1][k]);
-    if (!(size[1] > 0.0) || size[1] > box_size_most * size[0] ||
-        size[0] > box_size_most * size[1]) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "along %c the lungs are %.3g mm in the first state and %.3g mm in "
-                              "the other: check that units and lungs are the same",
-                              "xyz"[k], size[0], size[1]);
-    }
-    if (overlap < box_overlap_least * fmin(size[0], size[1])) {
+    if (!(overlap >= box_overlap_least * larger)) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
                               "the two surfaces do not overlap along %c (%.0f to %.0f and %.0f to "
                               "%.0f mm): check that frames, units and sides are the same",

@@ -67,8 +67,7 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
                               double to[3]);
 
 /** Check by their boxes that two surfaces can be two states of the same lungs.
- * @retval SUPINE_ERROR_MESH  sizes that differ by more than 1.6 times, or boxes that hardly overlap
- */
+ * @retval SUPINE_ERROR_MESH  boxes of which less than half of the larger overlaps */
 supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
                                          supine_error *error);
 

@@ -6,7 +6,7 @@
 
 #include <supine/state.h>
 
-#include "precompute/patient/fit.h"
+#include "precompute/patient/krige.h"
 #include "precompute/physics/model.h"
 #include "precompute/physics/reference.h"
 
@@ -72,7 +72,6 @@ typedef struct supine_patient_expand_report {
  * averaged over blocks of 40 mm of surface: the operator conserves sums. */
 typedef struct supine_patient_applied {
   double blocks;      /**< number of blocks; 0: not found */
-  double matched;     /**< share of the vertices with a compatible point on the other surface */
   double correlation; /**< between force and height along gravity, over the blocks */
   double slopes[3];   /**< c7 to c9 of (18) fitted to the force, 1 at the box's centre */
   double left;        /**< RMS residual of (18), in units of the force at the box's centre */

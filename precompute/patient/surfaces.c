@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_statistics.h>
+
 #include "precompute/patient/matching.h"
 
 enum {
@@ -98,10 +100,7 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
                                   supine_error *error) {
   report->vertices = (double)m->count;
   supine_patient_matching_find(m);
-  for (size_t i = 0; i < m->count; ++i) {
-    report->before += m->distance[i] * m->distance[i] / (double)m->count;
-  }
-  report->before = sqrt(report->before);
+  report->before = sqrt(gsl_stats_tss_m(m->distance, 1, m->count, 0.0) / (double)m->count);
   return report->before >= same_state
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
@@ -163,7 +162,11 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
                                             landmark_count, &m, error);
   }
   if (status == SUPINE_OK && landmark_count > 0) {
-    supine_patient_matching_append(&m, landmarks);
+    supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
+    m.landmark_rows_count = 3 * landmark_count;
+    for (size_t i = 0; i < m.landmark_rows_count; ++i) { /* of the same weight as the surface */
+      m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_rows_count;
+    }
   }
   if (status == SUPINE_OK) {
     status = run(&m, &wanted, expandability, record, error);
