@@ -11,7 +11,7 @@
 #include "program/options/command.h"
 #include "program/options/pv.h"
 #include "program/options/state_options.h"
-#include "program/stream/address.h"
+#include "program/stream/peer.h"
 #include "program/stream/tracked_patient.h"
 #include "sh/base/output.h"
 #include "sh/base/vec3.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Select a law, check a model, and set up its equilibrium. */
+/* Select a law, and set up the equilibrium of a model. */
 #include <math.h>
 
 #include "precompute/physics/model.h"
@@ -23,18 +23,15 @@ supine_model supine_physics_model(supine_law law) {
 
 const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1] = {SUPINE_LAWS(NAME) NULL};
 
-supine_status supine_physics_model_check(const supine_model *model, supine_error *error) {
-  return model->force.soften == 0.0 || model->reach > 0.0
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "--soften needs a reach: the paper's transfer depends on the "
-                                "stiffness, so it would change with gravity. Give --reach 10, or "
-                                "leave --soften out");
-}
-
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,
                                                supine_error *error) {
+  if (model->force.soften != 0.0 && !(model->reach > 0.0)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--soften needs a reach: the paper's transfer depends on the "
+                            "stiffness, so it would change with gravity. Give --reach 10, or "
+                            "leave --soften out");
+  }
   /* A longer reach spreads every force evenly over the lungs; the matrix is then nearly singular.
    */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);

@@ -61,16 +61,14 @@ supine_model supine_physics_model(supine_law law);
 /** Names of the laws, indexed by supine_law and ended by NULL. */
 extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
 
-/** Check that the model can be solved.
- * @retval SUPINE_ERROR_ARGUMENT  softening without a reach: the paper's transfer depends on the
- * stiffness, so it would change with gravity */
-supine_status supine_physics_model_check(const supine_model *model, supine_error *error);
-
 /** Set up the equilibrium of lungs with the model's stiffness, lesions and reach.
  * @param lungs        must outlive the equilibrium
  * @param equilibrium  points to NULL, then to a new equilibrium that the caller destroys; or to
  *                     that of the same lungs, whose vertices may have moved since: then updated
- * Statuses as supine_physics_equilibrium_create and supine_physics_equilibrium_set_stiffness */
+ * @retval SUPINE_ERROR_ARGUMENT  softening without a reach: the paper's transfer depends on the
+ * stiffness, so it would change with gravity
+ * Other statuses as supine_physics_equilibrium_create and supine_physics_equilibrium_set_stiffness
+ */
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,
                                                supine_error *error);

@@ -33,10 +33,7 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   made.catch_ = made.catch_ != NULL ? made.catch_ : malloc(n * sizeof *made.catch_);
   made.directions =
       made.directions != NULL ? made.directions : malloc(3 * n * sizeof *made.directions);
-  supine_status status = supine_physics_model_check(model, error);
-  if (status == SUPINE_OK) {
-    status = supine_physics_model_equilibrium(lungs, model, &made.equilibrium, error);
-  }
+  supine_status status = supine_physics_model_equilibrium(lungs, model, &made.equilibrium, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }

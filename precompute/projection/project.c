@@ -117,18 +117,14 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
                                        supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
   supine_projection made = {.vertex_count = n, .band = band};
-  supine_status status = supine_physics_model_check(model, error);
-  if (status == SUPINE_OK && band > SUPINE_SH_BAND_MAX) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu: give at most %d", band,
-                              SUPINE_SH_BAND_MAX);
-  }
-  if (status != SUPINE_OK) {
-    return status;
+  if (band > SUPINE_SH_BAND_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "band %zu: give at most %d", band,
+                            SUPINE_SH_BAND_MAX);
   }
   made.span = malloc(sizeof *made.span);
-  status = made.span == NULL
-               ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force")
-               : supine_projection_span_create(lungs, &model->force, made.span, error);
+  supine_status status =
+      made.span == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force")
+                        : supine_projection_span_create(lungs, &model->force, made.span, error);
   if (status == SUPINE_OK) {
     made.rank = made.span->rank;
     made.columns = malloc(n * made.rank * sizeof *made.columns);

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "program/stream/address.h"
+#include "program/stream/peer.h"
 
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error) {

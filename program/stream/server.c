@@ -10,7 +10,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "program/stream/address.h"
 #include "program/stream/peer.h"
 #include "program/stream/server.h"
 #include "program/stream/tracked_patient.h"

@@ -61,20 +61,14 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
 void supine_stream_patient_warn(supine_stream_patient *patient, double now, const char *format,
                                 ...) {
   if (now - patient->warned < 1.0) {
-    ++patient->unsaid;
     return;
   }
   char text[512];
   va_list arguments;
   va_start(arguments, format);
-  const int length = vsnprintf(text, sizeof text, format, arguments);
+  (void)vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
-  if (patient->unsaid > 0 && length > 0 && (size_t)length < sizeof text) {
-    (void)snprintf(text + length, sizeof text - (size_t)length, " (and %llu more)",
-                   (unsigned long long)patient->unsaid);
-  }
   patient->warned = now;
-  patient->unsaid = 0;
   patient->options->warn(patient->options->context, text);
 }
 

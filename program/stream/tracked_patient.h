@@ -44,7 +44,6 @@ typedef struct supine_stream_patient {
   double smoothed;                   /* when `smooth` was computed, s of the clock */
   bool turning;                      /* `smooth` has not reached the pose yet */
   double warned;                     /* s of the clock, of the last warning */
-  uint64_t unsaid;                   /* warnings since then */
   double gains[SUPINE_LUNGS_MAX][3]; /* gains of the last volume that could be reached */
 } supine_stream_patient;
 
@@ -53,7 +52,7 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
                                                   const supine_stream_options *options,
                                                   supine_stream_counts *counts, double now);
 
-/* Warn at most once a second; count the other warnings. */
+/* Warn, unless there was a warning within the last second. */
 void supine_stream_patient_warn(supine_stream_patient *patient, double now, const char *format, ...)
     SUPINE_PRINTF(3, 4);
 

@@ -11,7 +11,6 @@
 #include <sys/socket.h>
 #include <time.h>
 
-#include "program/stream/address.h"
 #include "program/stream/peer.h"
 #include "program/stream/tracked_patient.h"
 #include "sh/base/clock.h"
