@@ -114,7 +114,7 @@ static void print_profile(const supine_comparison *c, size_t most, bool share, F
     for (size_t s = SUPINE_COMPARISON_SLABS / 2; s < SUPINE_COMPARISON_SLABS; ++s) {
       gain += c->posture[i].slab[s].gain;
     }
-    (void)fprintf(to, share ? "%s %s %.0f %%" : "%s %s %.1f", i > 0 ? "," : "",
+    (void)fprintf(to, share ? "%s %s %.0f %%" : "%s %s %.1f", i > 0 ? "," : "",
                   supine_options_posture_label(c->postures.item[i].name),
                   share ? 100 * gain / supine_report_gain(c, i)
                         : supine_report_lowest_over_uppermost(c, i));

@@ -95,7 +95,7 @@ static json_t *chart(const supine_comparison *c, const slice *s, const double lo
     (void)json_array_append_new(lines, json_pack("{s:s, s:s, s:o}", "line", supine_report_line(i),
                                                  "name", name, "path", own));
     json_t *longer =
-        json_sprintf("%s%s %s %+.0f %%", json_string_value(title),
+        json_sprintf("%s%s %s %+.0f %%", json_string_value(title),
                      json_array_size(lines) > 1 ? "," : "", name, 100 * (area / before - 1));
     json_decref(title);
     title = longer;

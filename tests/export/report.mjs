@@ -105,7 +105,7 @@ for (const { title, paths } of outlines) {
   }));
   assert.ok(area.before > 1000, title);
   for (const posture of ['prone', 'left side', 'inverted']) {
-    const [, percent] = new RegExp(`${posture} ([-+]\\d+) %`).exec(title);
+    const [, percent] = new RegExp(`${posture} ([-+]\\d+)\\s%`).exec(title);
     assert.ok(Math.abs(100 * (area[posture] / area.before - 1) - percent) < 1, `${title}: ${JSON.stringify(area)}`);
   }
 }
