@@ -155,7 +155,7 @@ static void find_normals(const export_source *source, const export_targets *targ
  * the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.044; /* smallest length to divide by; limits what targets add */
+  static const double least = 0.2; /* smallest length to divide by; limits what targets add */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -238,7 +238,7 @@ supine_status supine_export_targets_normals(const export_source *source, double 
         d[i] = (d[i] - below[i]) / (float)(2 * step);
         sum += (double)d[i] * (double)d[i];
       }
-      const bool seen = sum > least * least * (double)(end - begin) / 3;
+      const bool seen = order == NULL || sum > least * least * (double)(end - begin) / 3;
       for (size_t i = begin; i < end; ++i) {
         d[i] = seen ? d[i] : 0;
         base[i] -= (float)weights[lung][j] * d[i];

@@ -46,10 +46,10 @@ void supine_export_targets_base(const export_source *source, const export_target
                                 size_t lung, size_t vertex, double xyz[3]);
 
 /** Compute unit normals of the base, [N, 3], and what each target adds to them at weight 1, [count,
- * N, 3], by linearising the surface's normals at supine, at rest; 0 where that is below 2.5
- * degrees (RMS over a lung).
- * @param order  [N] order in which vertices are written, to round what targets add so that it
- *               compresses well; NULL: do not round
+ * N, 3], by linearising the surface's normals at supine, at rest.
+ * @param order  [N] order in which vertices are written: round what targets add so that it
+ *               compresses well in this order, and to 0 where it is below 2.5 degrees (RMS over a
+ *               lung); NULL: do not round
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_targets_normals(const export_source *source, double breath,
                                             const export_targets *targets, const uint32_t *order,
