@@ -108,7 +108,7 @@ static const char *const themes[] = {"light", "dark", NULL};
 
 static const supine_option table[] = {
     {"posture", 0, "LIST", "postures to draw, up to 8; --postures is the same",
-     SUPINE_FILLS(request, postures), .alias = "postures"},
+     SUPINE_FILLS(request, postures)},
     {"turn", 0, "FROM:TO:SECONDS",
      "draw an animation instead: gravity turns from one posture to another at constant speed, "
      "as supine:left:5s, rests for a second, and starts again",

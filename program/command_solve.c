@@ -9,7 +9,6 @@
 #include <supine/volume.h>
 
 #include "program/model_options.h"
-#include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "solve";
@@ -19,7 +18,7 @@ typedef struct request {
   supine_orientation orientation;
   const char *path;
   supine_state state; /* its volume is rest where none was given */
-  bool has_scale, has_vertex, as_scanned, pitcher_catcher;
+  bool has_scale, has_vertex, pitcher_catcher;
   double scale;
   size_t vertex;
 } request;
@@ -44,7 +43,6 @@ static const supine_option table[] = {
      "the share of the force that remains and the largest difference from the direct solve. Slow: "
      "for small meshes. Needs --law paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
-    {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
@@ -258,11 +256,7 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
     solution.directions[i] *= gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
   }
   supine_physics_solution_apply(&solution, &rest, 1.0, deformed.vertices);
-  supine_mesh_save_options save = {.rest = rest.vertices};
-  if (wanted->as_scanned) {
-    save.axes = wanted->model.made_from.frame.axes;
-    save.millimetres_per_unit = wanted->model.made_from.frame.millimetres_per_unit;
-  }
+  const supine_mesh_save_options save = {.rest = rest.vertices};
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
     (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
@@ -299,12 +293,6 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (status == SUPINE_OK) {
     status = supine_command_model_load(&wanted->model, name, given->operand, given->count,
                                        wanted->has_vertex, error);
-  }
-  if (status == SUPINE_OK && wanted->as_scanned &&
-      wanted->model.made_from.frame.millimetres_per_unit == 0.0) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "--as-scanned needs surfaces in the same axes and units: convert "
-                              "them, or leave it out");
   }
   if (status == SUPINE_OK) {
     status = wanted->has_vertex ? write_column(lungs, wanted, error)

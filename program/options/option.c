@@ -164,16 +164,13 @@ static supine_status refuse_unknown(const reading *r, int got, const char *given
 
 /* Read argv into the request, or up to --help. */
 static supine_status read_options(reading *r, int argc, char **argv, supine_error *error) {
-  struct option names[2 * ROWS_MAX + 3] = {{0}};
+  struct option names[ROWS_MAX + 3] = {{0}};
   char letters[2 * ROWS_MAX + 4] = ":h";
   size_t n = 0;
   for (size_t i = 0; i < r->count; ++i) {
     const supine_option *option = r->rows[i].option;
     const int follows = option->argument != NULL ? required_argument : no_argument;
     names[n++] = (struct option){option->name, follows, NULL, FIRST_LONG + (int)i};
-    if (option->alias != NULL) {
-      names[n++] = (struct option){option->alias, follows, NULL, FIRST_LONG + (int)i};
-    }
     if (option->letter != 0) {
       const char letter[] = {option->letter, follows == required_argument ? ':' : '\0', '\0'};
       (void)strcat(letters, letter);

@@ -73,7 +73,6 @@ typedef struct supine_option {
   bool open;                  /* the ends of the range are excluded */
   const char *wants;          /* valid values, for messages; NULL: derived from kind and range */
   const char *const *choices; /* ends with NULL; only for completion where there is a reader */
-  const char *alias;          /* another long name, not shown */
   const char *rivals;         /* name of a group, of whose options at most one may be given, once */
   bool required;
   bool more; /* shown by --help-all only */
