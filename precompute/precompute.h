@@ -48,8 +48,8 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
 
-/** Fit, compress and cross-validate another simulator's fields, and write the basis file. Breath
- * scale 1 gives the fields as they were; closed surfaces have volumes.
+/** Fit, compress and cross-validate another simulator's fields, and write the basis file. Gain 1
+ * gives the fields as they were; closed surfaces have volumes.
  * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *path,

@@ -2,7 +2,7 @@
 /** @file Embed content in the lungs so that it moves with them. A point's displacement is the
  * biharmonic interpolation of its lung's surface displacement (biharmonic.h), mode by mode. The
  * result is a basis of kind vector with the modes, volume forms and metadata of the surface's
- * basis; the same weights and scales move both.
+ * basis; the same weights and gains move both.
  *
  * Near the surface, the residual of the interpolation is added,
  *
@@ -15,7 +15,7 @@
  * A rigid part belongs to the lung with most of its vertices (runtime/rigid.h).
  *
  * Content, x and q are given in the scan. The file holds the content at full inflation, as it
- * does the surface: x minus u at the scan's weights and scale. */
+ * does the surface: x minus u at the scan's weights and gains. */
 #ifndef SUPINE_INSIDE_EMBED_H
 #define SUPINE_INSIDE_EMBED_H
 

@@ -37,7 +37,7 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);
 
-/** Find the displacements of a lung's vertices by each of the K modes, at weight 1 and scale 1.
+/** Find the displacements of a lung's vertices by each of the K modes, at weight 1 and gain 1.
  * @param displacement  [vertex_count, 3, K] mm, written */
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);

@@ -40,7 +40,7 @@ typedef struct cutter {
   outline cut[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-/* Positions count from the first vertex, for precision. */
+/* Read a vertex. Positions count from the first vertex, for precision. */
 static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   corner out;
   for (size_t i = 0; i < 3; ++i) {
