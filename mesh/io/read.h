@@ -60,7 +60,7 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 /* ---- faces.c: faces added to a mesh that has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< corners of a face: the time to cut it grows with up to their cube */
+  MESH_CORNERS_MAX = 1024, /**< corners of a face: the time to cut it grows with their square */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
