@@ -9,7 +9,7 @@
 
 #include "mesh/mesh.h"
 
-/* ---- text.c: lines and words of a file with any content. ---- */
+/* ---- tokens.c: lines and words of a file with any content. ---- */
 
 /** The bytes from `at` up to `end`, not NUL-terminated. */
 typedef struct mesh_text {
