@@ -42,7 +42,6 @@ typedef struct fit {
   double *weights;                  /* [MOST, 3, terms] V */
   supine_normals_rows rows;         /* of held-out vertices */
   float *modes;                     /* [rows, 3, MOST] n of these */
-  double *exact;                    /* [rows, 3, HELD_OUT] their normals in the held-out states */
 } fit;
 
 typedef struct normals_work {
@@ -156,7 +155,7 @@ cleanup:
   return status;
 }
 
-/* Find one lung's modes, and its held-out vertices and their exact normals. */
+/* Find one lung's modes, and its held-out vertices. */
 static supine_status find_lung(const normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
   const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
@@ -178,14 +177,9 @@ static supine_status find_lung(const normals_work *work, size_t lung, fit *made)
   if (status == SUPINE_OK) {
     modes = malloc((count * MOST + 1) * sizeof *modes);
     made->modes = malloc((count * MOST + 1) * sizeof *made->modes);
-    made->exact = malloc((count * HELD_OUT + 1) * sizeof *made->exact);
-    status = modes == NULL || made->modes == NULL || made->exact == NULL ? SUPINE_ERROR_MEMORY
-                                                                         : SUPINE_OK;
+    status = modes == NULL || made->modes == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   }
   if (status == SUPINE_OK) {
-    const double *phi = work->held_out.phi + lung * work->held_out.room * all;
-    apply_rows(made->rows.terms, made->rows.count, work->terms, phi, work->held_out.count,
-               made->exact);
     apply_rows(made->rows.terms, made->rows.count, work->terms, mix, MOST, modes);
     for (size_t i = 0; i < count * MOST; ++i) {
       made->modes[i] = (float)modes[i];
@@ -266,23 +260,29 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
  * modes [rows, 3, count] and weights [count, 3, terms] are those of the file. */
 static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
                     const double *weights, supine_tally *tally, double *sum) {
+  enum { BLOCK = 16 }; /* vertices whose exact normals are computed at a time */
   const fit *made = &work->fits[lung];
   const size_t all = 3 * work->terms;
   const size_t states = work->held_out.count;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
+  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] */
   double normals[3 * HELD_OUT];
   double angles[HELD_OUT];
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
               (int)all, weights, (int)all, 0.0, v, (int)count);
   for (size_t r = 0; r < made->rows.count; ++r) {
     double packed[3][MOST];
+    if (r % BLOCK == 0) {
+      const size_t rows = made->rows.count - r < BLOCK ? made->rows.count - r : BLOCK;
+      apply_rows(made->rows.terms + r * all, rows, work->terms, phi, states, exact);
+    }
     for (size_t axis = 0; axis < 3; ++axis) {
       pack(modes + (3 * r + axis) * count, count, packed[axis]);
     }
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, 3, (int)states, (int)count, 1.0, packed[0],
                 MOST, v, (int)count, 0.0, normals, (int)states);
-    find_angles(states, made->exact + 3 * r * states, normals, angles);
+    find_angles(states, exact + r % BLOCK * 3 * states, normals, angles);
     for (size_t i = 0; i < states; ++i) {
       *sum += angles[i];
     }
@@ -511,7 +511,6 @@ cleanup:
     supine_normals_rows_free(&of->rows);
     free(of->weights);
     free(of->modes);
-    free(of->exact);
   }
   supine_normals_fans_free(&work->fans);
   supine_normals_states_free(&work->states);
