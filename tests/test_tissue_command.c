@@ -136,7 +136,7 @@ TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
   FILE *file = fopen(csv, "wb");
   assert_non_null(file);
-  (void)fputs("vertex,a\n", file);
+  (void)fputs("vertex,expandability\n", file);
   for (size_t i = mesh.vertex_count; i-- > 0;) {
     (void)fprintf(file, "%zu,1\n", i);
   }
