@@ -13,10 +13,12 @@ reason, and nothing left: no file, no part of one, no block of memory (of what a
 gives back). Never by a signal, nor by running on for more than a minute.
 """
 import filecmp
+import json
 import os
 import random
 import re
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -29,8 +31,6 @@ phantom --vertices 100 -o lungs.stl
 phantom --vertices 100 -o lungs.obj
 precompute lungs.ply --band 2 -o lungs.safetensors
 solve lungs.ply --posture supine --reach 10 --scale 5 -o state.ply
-solve lungs.ply --posture prone --reach 10 --scale 5 -o other.ply
-solve lungs.ply --posture left --reach 10 --scale 5 -o third.ply
 embed lungs.safetensors points.csv -o points.safetensors
 embed lungs.safetensors --grid 60 -o grid.safetensors
 fit --landmarks pairs.csv --law deep -o patient.json
@@ -46,7 +46,7 @@ precompute lungs.stl --band 2 --law paper --modes harmonics -o out/a.safetensors
 precompute lungs.obj --band 2 --law paper --reach 10 --soften 1 -o out/a.safetensors
 precompute lungs.ply --band 2 --lesion 0,0,0,5,3 --lung left:0.3 --scanned full-500 -o out/a.safetensors
 precompute mask.nrrd --labels left=1,right=2 --edge 20 --band 2 -o out/a.safetensors
-precompute lungs.ply --fields fields.csv -o out/a.safetensors
+precompute lungs.ply --fields fields.safetensors -o out/a.safetensors
 precompute lungs.ply --band 2 --patient patient.json -o out/a.safetensors
 solve lungs.ply --posture prone -o out/a.vtp
 solve lungs.ply --unit-force 3 -o out/a.csv
@@ -168,8 +168,13 @@ def samples(folder):
     (folder / "points.csv").write_text("name,x,y,z\ncarina,60,-180,-60\nnodule,-80,-120,-90\n")
     (folder / "samples.csv").write_text("pressure_cmH2O,volume_mL\n" + "".join(
         f"{p},{3000 / (1 + 2.718281828 ** ((8 - p) / 5)):.3f}\n" for p in range(-10, 36, 2)))
-    (folder / "fields.csv").write_text("gx,gy,gz,file\n0,1,0,state.ply\n0,-1,0,other.ply\n"
-                                       "1,0,0,third.ply\n")
+    vertices, made = 84, random.Random(5)  # as many as those of lungs.ply
+    shapes = {"gravity": [3, 3], "displacement": [3, vertices, 3]}
+    values = [0, 1, 0, 0, -1, 0, 1, 0, 0] + [made.uniform(-9, 9) for _ in range(9 * vertices)]
+    header = json.dumps({name: {"dtype": "F64", "shape": shapes[name], "data_offsets": at} for name, at in
+                         (("gravity", [0, 72]), ("displacement", [72, 72 + 72 * vertices]))}).encode()
+    (folder / "fields.safetensors").write_bytes(struct.pack(f"<Q{len(header)}s{len(values)}d", len(header),
+                                                            header, *values))
     (folder / "image.nrrd").write_text(
         "NRRD0004\ntype: float\ndimension: 3\nspace: LPS\nsizes: 6 6 5\nspace directions: "
         "(60,0,0) (0,60,0) (0,0,60)\nspace origin: (-150,-340,-260)\nencoding: ascii\n\n"
