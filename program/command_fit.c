@@ -364,8 +364,8 @@ static void keep(const request *wanted, supine_patient_record *record) {
       supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }
 
-static supine_status fit(const request *wanted, const supine_arguments *given,
-                         supine_patient_record *record, supine_error *error) {
+static supine_status fit(const request *wanted, supine_patient_record *record,
+                         supine_error *error) {
   supine_patient_fit_options options = {.law = (supine_patient_law)wanted->law,
                                         .moved = wanted->landmarks.rigid ? SUPINE_PATIENT_RIGID
                                                  : wanted->landmarks.translation
@@ -393,9 +393,6 @@ static supine_status fit(const request *wanted, const supine_arguments *given,
   if (status == SUPINE_OK) {
     keep(wanted, record);
     status = find_gain(wanted, &of, record, error);
-  }
-  if (status == SUPINE_OK && wanted->path != NULL) {
-    status = supine_patient_write(wanted->path, record, given->made_by, error);
   }
   evidence_free(&of);
   return status;
@@ -427,9 +424,15 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   static supine_patient_record record; /* about 90 kB, too large for the stack */
   supine_status status = check(wanted, given, error);
   if (status == SUPINE_OK) {
-    status = fit(wanted, given, &record, error);
+    status = fit(wanted, &record, error);
   }
-  return status == SUPINE_OK ? print(&record, given->made_by, wanted->json, error) : status;
+  if (status == SUPINE_OK) {
+    status = print(&record, given->made_by, wanted->json, error);
+  }
+  if (status == SUPINE_OK && wanted->path != NULL) { /* last: no failure follows */
+    status = supine_patient_write(wanted->path, &record, given->made_by, error);
+  }
+  return status;
 }
 
 const supine_command supine_command_fit = {

@@ -52,10 +52,8 @@ static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *r
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-  supine_status status = supine_breath_fit_file(path, chosen->confidence, &pv, reports, error);
-  if (status == SUPINE_OK && chosen->output != NULL) {
-    status = supine_breath_save(chosen->output, &pv, error);
-  }
+  const supine_status status =
+      supine_breath_fit_file(path, chosen->confidence, &pv, reports, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -73,7 +71,7 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
     }
   }
   supine_options_print(root, chosen->json);
-  return SUPINE_OK;
+  return chosen->output != NULL ? supine_breath_save(chosen->output, &pv, error) : SUPINE_OK;
 }
 
 static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
