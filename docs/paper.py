@@ -81,7 +81,7 @@ def percent(basis):
 
 
 def operations(basis):
-    return f"{basis['modes'] + 3} multiplications and {basis['modes'] + 2} additions"
+    return f"{basis['modes'] + 6} multiplications and {basis['modes'] + 2} additions"
 
 
 print(f"""# The paper, row by row
@@ -96,7 +96,7 @@ lungs of {best['vertices']:,} vertices.
 | III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other curves are fitted to under 1 % (`test_pv_fit`) | the paper leaves the control functions open; here they are Legendre polynomials (`<supine/breath.h>`) |
 | III-C, displacement at one orientation against volume | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | at most {off_line():.1f} % of the displacement at 500 mL off a straight line, 0 to 500 mL, four postures | with `deep` the path bends on purpose; with `paper` each vertex moves on a line |
 | III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | springs are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes |
-| (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row a vertex | |
+| (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row per vertex | |
 | (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits to an error of 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare it with the paper's iteration |
 | (9)-(14), all paths | `supine solve --law paper` | the same fixed point (`test_equilibrium`) | solved, not enumerated |
 | (15)-(17), directions | `--law`, `--constants`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits a person's own |

@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Tries a package in a clean Debian 12, as root: try_package.sh supine_*.deb EXAMPLE.c
-# Installs it by apt, runs the program, compiles the example against the library, and purges it.
+# Test a package in a clean Debian 12, as root: try_package.sh supine_*.deb EXAMPLE.c
+# Install it by apt, run the program, compile the example with the library, purge the package, and check that
+# no file is left.
 set -eu
 package=$1
 example=$2
@@ -17,8 +18,8 @@ inside 'find / -xdev -name "*supine*" ! -path "/root/*" ! -path "/proc/*"' >"$ro
 inside 'apt-get install -y -qq --no-install-recommends /root/supine.deb >/dev/null 2>&1'
 inside 'cd /root; supine phantom --vertices 2000 -o lungs.ply; supine precompute lungs.ply --band 3 -o lungs.safetensors
   supine deform lungs.safetensors --posture prone -o prone.vtp
-  gcc -o example example.c $(pkg-config --cflags --libs supine-runtime) && ./example lungs.safetensors prone 500
-  gcc -o static example.c -l:libsupine_runtime.a -lm && ./static lungs.safetensors prone 500
+  gcc -o example example.c $(pkg-config --cflags --libs supine-runtime) && ./example lungs.safetensors prone:rest+500
+  gcc -o static example.c -l:libsupine_runtime.a -lm && ./static lungs.safetensors prone:rest+500
   python3 -c "import supine; lungs = supine.open(\"lungs.safetensors\"); print(lungs.deform(lungs.pose(\"prone\"))[0])"
   man -w supine-deform 2>/dev/null || ls /usr/share/man/man1/supine-deform.1.gz /usr/share/bash-completion/completions/supine'
 inside 'apt-get purge -y -qq supine >/dev/null 2>&1'

@@ -5,12 +5,12 @@
     faults.py PROGRAM LIBFAULTS [EACH] [WORD]
     faults.py PROGRAM            each command once, without faults: for a program built with a sanitizer
 
-The n-th call fails in the n-th run, for every n; with EACH above 0, only so many spread over each
-command (tests take few, the campaign takes all with 0). WORD: only commands in which it stands.
+The n-th call fails in the n-th run, for every n; with EACH above 0, only about EACH calls spread over
+each command (CTest: 1; the default, 0: all). WORD selects the commands that contain it.
 
-Each run has to end with the whole outputs, or with an exit code above 0, a message that gives the
-reason, and nothing left: no file, no part of one, no block of memory (of what a run without faults
-gives back). Never by a signal, nor by running on for more than a minute.
+Each run must end within a minute and without a signal: with the complete outputs, or with an exit code
+above 0 and a message that gives the reason. A run that fails must leave no file, and no block of memory
+that a run without faults frees.
 """
 import filecmp
 import json
