@@ -13,7 +13,7 @@ seed=${3:-1}
 source=$(cd "$(dirname "$0")" && pwd)
 all=0
 failed=0
-for reader in ply:mesh:200 stl:mesh:200 vtp:mesh:200 text:text:200 basis:basis:200 message:text:1000 obj:mesh:1 \
+for reader in ply:mesh:200 stl:mesh:1 vtp:mesh:200 text:text:200 basis:basis:200 message:text:1000 obj:mesh:1 \
   nrrd:image:200 nii:image:200 mha:image:200 points_csv:text:200 points_json:text:200; do
   name=${reader%%:*}
   dictionary=${reader#*:}
