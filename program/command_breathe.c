@@ -187,7 +187,7 @@ static supine_status play(const supine_basis *basis, const request *wanted,
   double *origin = NULL;
   supine_reference_pose from;
   supine_status status = SUPINE_OK;
-  if (xyz == NULL || seconds == NULL || supine_options_basis_rest_mesh(basis, &rest) != SUPINE_OK) {
+  if (xyz == NULL || seconds == NULL || supine_options_basis_mesh(basis, &rest) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     goto cleanup;
   }

@@ -51,7 +51,7 @@ static const supine_option table[] = {
 /* Make the surface of a pose. */
 static supine_status deformed_mesh(const supine_basis *basis, const supine_pose *pose,
                                    supine_mesh *mesh) {
-  const supine_status status = supine_options_basis_rest_mesh(basis, mesh);
+  const supine_status status = supine_options_basis_mesh(basis, mesh);
   if (status == SUPINE_OK) {
     free(mesh->vertices);
     mesh->vertices = supine_options_basis_positions(basis, pose);

@@ -450,7 +450,7 @@ const supine_command supine_command_fit = {
         "corrected by kriging; held out in 5 folds of blocks of 40 mm, repeated 3 times. A small "
         "distance between surfaces does not prove the motion inside: points have been off by 14 mm "
         "where surfaces were 5 mm apart. The applied force is found from the displacement by the "
-        "inverse of the operator; left_rms is what (18) of Santhanam 2008 does not explain.\n"
+        "inverse of the operator; its residual is what (18) of Santhanam 2008 does not explain.\n"
         "\n"
         "Examples:\n"
         "  supine fit --landmarks pairs.csv --translation --rest supine:rest "

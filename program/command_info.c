@@ -34,7 +34,7 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
   return SUPINE_OK;
 }
 
-/* Metadata that is printed as it stands. */
+/* Keys of the metadata that are printed unchanged. */
 static const char *const facts[] = {"content",        "assumed",
                                     "patient",        "scanned",
                                     "resting_shares", "law",
@@ -44,7 +44,7 @@ static const char *const facts[] = {"content",        "assumed",
                                     "lung_share",     "lesions",
                                     "reach_mm",       "made_by",
                                     "error_method",   "turned_over_percent"};
-/* Metadata that is printed in the object "error", without "error_". */
+/* Keys of the metadata that are printed in the object "error", without "error_". */
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rest_part",
                                      "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
@@ -68,7 +68,7 @@ static json_t *list_numbers(const double *values, size_t count) {
   return list;
 }
 
-/* Add the number of embedded vertices in each lung, outside, and in rigid parts. */
+/* Add the number of embedded vertices in each lung and outside, and of rigid parts. */
 static void add_content(json_t *root, const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *depth = supine_basis_tensor(basis, "depth");
@@ -120,9 +120,9 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
 /* Add the error with the first 1, 4, 9, ... harmonics, or with the first 1, 2, ... modes. */
 static void add_errors(json_t *root, const supine_basis *basis, const char *key) {
   const supine_tensor *tensor = supine_basis_tensor(basis, key);
-  const bool well = tensor != NULL && tensor->dtype == SUPINE_F64 && tensor->rank == 1;
+  const bool valid = tensor != NULL && tensor->dtype == SUPINE_F64 && tensor->rank == 1;
   (void)json_object_set_new(root, key,
-                            well ? list_numbers(tensor->data, tensor->shape[0]) : json_array());
+                            valid ? list_numbers(tensor->data, tensor->shape[0]) : json_array());
 }
 
 static supine_status describe(const char *path, const supine_basis *basis, const double *energy,
@@ -207,16 +207,16 @@ const supine_command supine_command_info = {
         "with, and its accuracy.",
     .options = table,
     .notes =
-        "multiplications and additions are counted per vertex at run time.\n"
-        "error is that of the compression against the full solve, on held-out directions: in "
-        "percent of the RMS displacement; in mm at the volume volume_ml, or at the share rest_part "
-        "of the way from full inflation to rest. error_harmonics lists it, as a share, for the "
-        "bands up to 0, 1, 2, ...; error_modes for the best 1, 2, 3, ... modes.\n"
-        "turned_over_percent counts the triangles that turn over in the worst of six postures.\n"
-        "expected_error is that of a displacement from the scan: " SUPINE_EXPECTED_MEANING
+        "The compression error is the difference from the full solve on held-out directions: in "
+        "percent of the RMS displacement, and in mm at a volume or at a state between full "
+        "inflation (0) and rest (1). It is also listed, as a share, for the bands up to 0, 1, 2, "
+        "..., and for the best 1, 2, 3, ... modes.\n"
+        "Triangles that turn over are counted in the worst of six postures.\n"
+        "The expected error is that of a displacement from the scan: " SUPINE_EXPECTED_MEANING
         ". " SUPINE_EXPECTED_SUPPORT "\n"
-        "energy_per_band is the share of the squared displacement, over the surface and all "
-        "orientations, that the harmonics of each band l carry. Odd bands change sign when gravity "
+        "Displacement by band is the share of the squared displacement, over the surface and all "
+        "orientations, that the harmonics of each band l = 0, 1, 2, ... carry. Odd bands change "
+        "sign when gravity "
         "does; the even bands beyond l = 0 make prone differ from the exact reverse of supine.",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),

@@ -57,7 +57,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
                                          .lung = lung == NULL ? NULL : lung->data,
                                          .fields = fields,
                                          .field_count = 2};
-  supine_status status = supine_options_basis_rest_mesh(basis, &mesh);
+  supine_status status = supine_options_basis_mesh(basis, &mesh);
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "no memory for %zu vertices", n);
   }

@@ -38,8 +38,8 @@ static const supine_option table[] = {
      SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX},
      .more = true},
     {"modes", 0, "K|harmonics",
-     "number of functions of orientation, which is the number of multiplications per vertex at run "
-     "time: the best K of the band (all, where it has fewer), or its (L+1)^2 harmonics. "
+     "number of functions of orientation, each a multiplication per vertex at run time: the best K "
+     "of the band (or fewer, where fewer describe the displacement), or its (L+1)^2 harmonics. "
      "Santhanam 2008 used --band 3 --modes harmonics",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
      .wants = "1 to 64 or 'harmonics'", .more = true},
@@ -62,6 +62,10 @@ static const supine_option table[] = {
 /* Share of turned-over triangles above which the surface is reported as torn. */
 static const double turned_over_limit = 0.01;
 
+static const char *plural(size_t count) {
+  return count == 1 ? "" : "s";
+}
+
 static void report_result(const char *path, const supine_lungs *lungs,
                           const supine_precompute_options *options,
                           const supine_precompute_report *report) {
@@ -74,14 +78,16 @@ static void report_result(const char *path, const supine_lungs *lungs,
   } else {
     (void)snprintf(state, sizeof state, "%g of the way to rest", accuracy->volume);
   }
-  (void)printf("%s: %s, %zu vertices, band %zu, %zu %s\n", path,
+  (void)printf("%s: %s, %zu vertices, band %zu, %zu %s%s\n", path,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
-               options->band, report->mode_count, options->modes == 0 ? "harmonics" : "modes");
+               options->band, report->mode_count, options->modes == 0 ? "harmonic" : "mode",
+               plural(report->mode_count));
   (void)printf("assumed: %s\n", options->assumed);
-  (void)printf("error against the full solve, on %zu held-out directions:\n  %.3g %% RMS, %.3g "
+  (void)printf("error against the full solve, on %zu held-out direction%s:\n  %.3g %% RMS, %.3g "
                "%% 95th percentile, %.3g %% largest, of the RMS displacement\n",
-               accuracy->direction_count, 100.0 * accuracy->relative_rms,
-               100.0 * accuracy->relative_p95, 100.0 * accuracy->relative_max);
+               accuracy->direction_count, plural(accuracy->direction_count),
+               100.0 * accuracy->relative_rms, 100.0 * accuracy->relative_p95,
+               100.0 * accuracy->relative_max);
   if (accuracy->volume > 0.0) {
     (void)printf("  %.3g mm RMS, %.3g mm 95th percentile, %.3g mm largest, at %s\n",
                  accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, state);
@@ -101,13 +107,14 @@ static void report_result(const char *path, const supine_lungs *lungs,
 static void report_fit(const char *path, const supine_fields *fields,
                        const supine_fit_report *fit) {
   const size_t highest = fit->band_highest;
-  (void)printf("%s: field of %zu vertices from %zu directions, band %zu, %zu modes\n", path,
-               fields->vertex_count, fields->direction_count, fit->band, fit->mode_count);
-  (void)printf("the directions determine bands up to %zu (%zu harmonics); leave-one-out error:\n",
-               highest, (highest + 1) * (highest + 1));
+  (void)printf("%s: field of %zu vertices from %zu directions, band %zu, %zu mode%s\n", path,
+               fields->vertex_count, fields->direction_count, fit->band, fit->mode_count,
+               plural(fit->mode_count));
+  (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
+               highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
   for (size_t band = 0; band <= highest; ++band) {
     (void)printf("  band %-2zu  %8.3g %%%s\n", band, 100.0 * fit->error[band],
-                 band == fit->band ? "  <- taken" : "");
+                 band == fit->band ? "  <- chosen" : "");
   }
   (void)printf("condition number of the harmonics at these directions: %.3g\n", fit->condition);
   if (fit->band == highest && highest < SUPINE_FIT_BAND_MAX) {

@@ -235,21 +235,22 @@ const supine_command supine_command_validate = {
              "explained, beside what no motion, a translation and an affine map "
              "leave; and, of several states, how linear displacement is with volume.",
     .options = table,
-    .notes =
-        "Distances are between the surfaces, both ways (largest: Hausdorff), and between the "
-        "landmarks. none is the distance without motion; translation and affine "
-        "are fitted to the other state itself. explained is the part of the squared distance "
-        "without motion that is gone. A small distance between surfaces does not prove the "
-        "motion inside: landmarks measure it. Santhanam 2008 found surfaces within 2 mm, and "
-        "constants within 1 %.\n"
-        "With several states: nearest_scale is the breath scale that comes nearest to a "
-        "state's surface; off_percent is how far a straight line of scale over volume, through "
-        "the start of motion, misses those in one posture, in percent of the largest.\n"
-        "\n"
-        "Examples:\n"
-        "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
-        "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
-        "      --state supine:full:full.ply --landmarks pairs.csv",
+    .notes = "Distances are between the surfaces, both ways (largest: Hausdorff), and between the "
+             "landmarks. 'no motion' is the distance without motion; translation and affine "
+             "are fitted to the other state itself. explained is the part of the squared distance "
+             "without motion that is gone. A small distance between surfaces does not prove the "
+             "motion inside: landmarks measure it. Santhanam 2008 found surfaces within 2 mm, and "
+             "constants within 1 %.\n"
+             "With several states: the scale of the displacement that comes nearest to a state's "
+             "surface is "
+             "also found; the largest deviation is how far a straight line of scale over volume, "
+             "through "
+             "the start of motion, misses those in one posture, in percent of the largest.\n"
+             "\n"
+             "Examples:\n"
+             "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
+             "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
+             "      --state supine:full:full.ply --landmarks pairs.csv",
     .operands_least = 1,
     .operands_most = 1,
     .operands_missing = "name one basis file (made by 'supine precompute')",

@@ -97,9 +97,7 @@ int main(int argc, char **argv) {
     return SUPINE_EXIT_USAGE;
   }
   const char *name = argv[1];
-  const bool help =
-      strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0;
-  if (help && argc == 2) {
+  if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0) {
     print_help();
     return supine_options_finish("help");
   }
@@ -107,15 +105,9 @@ int main(int argc, char **argv) {
     (void)puts("supine " SUPINE_VERSION);
     return supine_options_finish("version");
   }
-  const char *wanted = help ? argv[2] : name; /* supine help COMMAND */
-  const supine_command *command = find_command(wanted);
+  const supine_command *command = find_command(name);
   if (command == NULL) {
-    return unknown_command(wanted);
-  }
-  if (help) {
-    char option[] = "--help";
-    char *arguments[] = {argv[2], option, NULL};
-    return supine_options_run(command, 2, arguments);
+    return unknown_command(name);
   }
   if (!supine_thread_count_sound()) {
     supine_options_say(name, "SUPINE_THREADS is '%s': set it to 1 to 256, or unset it",

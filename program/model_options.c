@@ -34,7 +34,7 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   return status;
 }
 
-/* Read "linear:z:0.5:1.5"; any other text names a file. */
+/* Read "uniform" or "linear:z:0.5:1.5"; any other text names a file. */
 static supine_status read_expandability(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -236,8 +236,8 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Copy the law, force and stiffness of a person, and the scanned one of the two fitted states, into
- * the choice. */
+/* Copy a patient's law, force and stiffness into the choice, and the fitted state that the scan
+ * shows. */
 static supine_status take_patient(supine_model_options *options, supine_error *error) {
   const supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;
@@ -313,12 +313,12 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   supine_source source = {.is_map = false};
   supine_findings findings = {""};
   char *names = strdup(operand);
-  char *left = names;
+  char *remaining = names;
   if (names == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a name");
   }
-  while (left != NULL && count <= FILES_MAX) {
-    paths[count++] = strsep(&left, ",");
+  while (remaining != NULL && count <= FILES_MAX) {
+    paths[count++] = strsep(&remaining, ",");
   }
   const supine_status status =
       count > FILES_MAX

@@ -79,7 +79,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   if (status == SUPINE_OK) {
     s->from_millilitres = held(s->basis, &pose);
     s->from_scale = pose.gains[0][0];
-    status = supine_options_basis_rest_mesh(s->basis, &s->rest);
+    status = supine_options_basis_mesh(s->basis, &s->rest);
   }
   if (status == SUPINE_OK) {
     free(s->rest.vertices);

@@ -65,7 +65,7 @@ double *supine_options_basis_positions(const supine_basis *basis, const supine_p
   return positions;
 }
 
-supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh) {
+supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t bytes = 3 * info->triangle_count * sizeof *mesh->triangles;
   supine_mesh made = {.vertex_count = info->vertex_count,

@@ -34,7 +34,7 @@ double *supine_options_basis_positions(const supine_basis *basis, const supine_p
 
 /* Copy the reference surface into a mesh; release it with supine_mesh_free.
  * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_options_basis_rest_mesh(const supine_basis *basis, supine_mesh *mesh);
+supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh);
 
 #define SUPINE_EXPECTED_MEANING                                                                    \
   "3-D RMS; half of all points lie within 0.9 times this distance, 95 % within 1.8 times"

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Report errors and progress, read numbers, suggest names, and end orderly when the user
- * interrupts. */
+/* Report errors and progress, read numbers, suggest names, and handle interrupts. */
 #include <errno.h>
 #include <math.h>
 #include <signal.h>
@@ -127,7 +126,7 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
   return best;
 }
 
-/* orderly 1: the command stops by itself after a signal; interrupted 1: one was received. */
+/* orderly: 1 if the command stops by itself after a signal; interrupted: 1 after a signal. */
 static volatile sig_atomic_t orderly, interrupted;
 static volatile time_t interrupted_at; /* when it was received, s since 1970 */
 

@@ -35,7 +35,7 @@ extern const supine_command *const supine_command_list[];
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
-/* Print the error's message, or for an empty one that of the status, and return the exit code. */
+/* Print the error's message, or if it is empty the status in words; return the exit code. */
 int supine_options_fail(const char *command, supine_status status, const supine_error *error);
 
 /* Flush standard output; return SUPINE_EXIT_OUTPUT where the disk is full or the pipe closed. */
@@ -50,8 +50,8 @@ void supine_options_print(json_t *value, bool json);
  * after its last slash. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
-/* Read a finite number, or a number without sign and fraction, that takes up the whole text; false
- * where the text is none. */
+/* Read a finite number, or a whole number of at least 0, that takes up the whole text; return false
+ * for any other text. */
 bool supine_options_parse_number(const char *text, double *value);
 bool supine_options_parse_count(const char *text, size_t *value);
 

@@ -105,10 +105,10 @@ static void say_wanted(const supine_option *option, char *text, size_t size) {
   }
 }
 
-static supine_status take(const row *taken, const char *text, supine_error *error) {
-  const supine_option *option = taken->option;
+static supine_status read_row(const row *target, const char *text, supine_error *error) {
+  const supine_option *option = target->option;
   supine_error reason = {.message = ""};
-  const supine_status status = read_value(option, text, taken->begin + option->offset, &reason);
+  const supine_status status = read_value(option, text, target->begin + option->offset, &reason);
   if (status == SUPINE_ERROR_ARGUMENT && reason.message[0] == '\0') {
     char wanted[384];
     say_wanted(option, wanted, sizeof wanted);
@@ -120,8 +120,8 @@ static supine_status take(const row *taken, const char *text, supine_error *erro
                                : SUPINE_OK;
 }
 
-static supine_status take_given(reading *r, row *taken, const char *text, supine_error *error) {
-  const supine_option *option = taken->option;
+static supine_status read_given(reading *r, row *target, const char *text, supine_error *error) {
+  const supine_option *option = target->option;
   if (option->file == SUPINE_FILE_OUT && option->endings != NULL && strcmp(text, "-") == 0) {
     (void)snprintf(r->standard, sizeof r->standard, "-%.*s", (int)strcspn(option->endings, ", "),
                    option->endings);
@@ -136,12 +136,12 @@ static supine_status take_given(reading *r, row *taken, const char *text, supine
                                     other->name, option->name);
     }
   }
-  taken->given = true;
-  taken->value = text;
+  target->given = true;
+  target->value = text;
   if (option->given != 0) {
-    *(bool *)(taken->begin + option->given - 1) = true;
+    *(bool *)(target->begin + option->given - 1) = true;
   }
-  return take(taken, text, error);
+  return read_row(target, text, error);
 }
 
 /* Report an unknown option, or one without its value. */
@@ -194,7 +194,7 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
     while (got < FIRST_LONG && r->rows[i].option->letter != got) {
       ++i;
     }
-    status = take_given(r, &r->rows[i], optarg, error);
+    status = read_given(r, &r->rows[i], optarg, error);
   }
   return status;
 }
@@ -306,7 +306,7 @@ static supine_status read_and_run(reading *r, int argc, char **argv, supine_erro
   supine_options_visit(command->options, 0, collect, r);
   for (size_t i = 0; i < r->count && status == SUPINE_OK; ++i) {
     if (r->rows[i].option->standard != NULL) {
-      status = take(&r->rows[i], r->rows[i].option->standard, error);
+      status = read_row(&r->rows[i], r->rows[i].option->standard, error);
     }
   }
   if (status == SUPINE_OK) {

@@ -32,7 +32,7 @@
 
 /* Kind of a value; SUPINE_FILLS derives it from the type of the field. */
 typedef enum supine_option_kind {
-  SUPINE_OPTION_OWN,     /* read by the reader of the option */
+  SUPINE_OPTION_OWN,     /* read by the option's `read` */
   SUPINE_OPTION_FLAG,    /* bool: no value; true where given */
   SUPINE_OPTION_NUMBER,  /* double: a finite number within the range */
   SUPINE_OPTION_NUMBERS, /* double[n]: n numbers separated by commas */
@@ -49,8 +49,8 @@ typedef enum supine_option_file {
   SUPINE_FILE_OUT
 } supine_option_file;
 
-/* Read `text` into `field`, the option's field; for an option without one, the struct that its
- * table fills.
+/* Read `text` into `field`, the option's field; for an option without a field, the
+ * struct that its table fills.
  * @retval SUPINE_ERROR_ARGUMENT  an invalid text; printed as "--NAME: MESSAGE", or where the reader
  *                                sets no message, as "--NAME takes WANTS, not 'TEXT'" */
 typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
@@ -73,7 +73,7 @@ typedef struct supine_option {
   bool open;                  /* the ends of the range are excluded */
   const char *wants;          /* valid values, for messages; NULL: derived from kind and range */
   const char *const *choices; /* ends with NULL; only for completion where there is a reader */
-  const char *rivals;         /* name of a group, of whose options at most one may be given, once */
+  const char *rivals;         /* a group of which at most one option may be given, once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;

@@ -9,17 +9,24 @@
 
 #include "program/options/command.h"
 
-enum { TEXT_MAX = 4096, COLUMNS_MAX = 16, NAME_WIDTH = 22 };
+enum { TEXT_MAX = 4096, COLUMNS_MAX = 16, LABEL_WIDTH = 36, LIST_MAX = 9 };
+static const double zero = 1e-12; /* smaller numbers are rounding errors, printed as 0 */
 
-/* Write a value, or a list of values, on one line. */
+/* Write a value, or the first LIST_MAX values of a list, on one line. */
 static void write_text(const json_t *value, char text[TEXT_MAX]) {
   size_t i;
   const json_t *item;
+  double real;
   text[0] = '\0';
   switch (json_typeof(value)) {
   case JSON_ARRAY:
     json_array_foreach(value, i, item) {
       char one[TEXT_MAX];
+      if (i == LIST_MAX) {
+        supine_text_add(text, TEXT_MAX, ", ... (%zu in all; --json prints them)",
+                        json_array_size(value));
+        break;
+      }
       write_text(item, one);
       supine_text_add(text, TEXT_MAX, "%s%s", i > 0 ? ", " : "", one);
     }
@@ -31,8 +38,12 @@ static void write_text(const json_t *value, char text[TEXT_MAX]) {
     supine_text_add(text, TEXT_MAX, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
     break;
   case JSON_REAL:
-    supine_text_add(text, TEXT_MAX, fabs(json_real_value(value)) < 1000.0 ? "%.4g" : "%.1f",
-                    json_real_value(value));
+    real = fabs(json_real_value(value)) < zero ? 0.0 : json_real_value(value);
+    supine_text_add(text, TEXT_MAX,
+                    real == floor(real)   ? "%.0f"
+                    : fabs(real) < 1000.0 ? "%.4g"
+                                          : "%.1f",
+                    real);
     break;
   default:
     supine_text_add(text, TEXT_MAX, "%s",
@@ -59,9 +70,99 @@ static bool is_row(json_t *object) {
   return json_is_object(object);
 }
 
-/* Write a name with spaces instead of underscores. */
-static void write_name(const char *name, char text[TEXT_MAX]) {
-  (void)snprintf(text, TEXT_MAX, "%s", name);
+/* Labels of members; `parent` is the member that holds them, NULL: any. */
+static const struct {
+  const char *parent, *key, *label;
+} labels[] = {{NULL, "additions", "additions per vertex"},
+              {NULL, "affine", "affine map"},
+              {NULL, "band", "highest harmonic band"},
+              {NULL, "band_95_percent_holds", "points within the 95 % band, %"},
+              {NULL, "c1_to_c9", "c1 to c9"},
+              {NULL, "confidence", "confidence level"},
+              {NULL, "constants_percent", "constants within, %"},
+              {NULL, "control", "control parameters c1 to c5"},
+              {NULL, "control_interval", "  confidence interval, +-"},
+              {NULL, "corrected", "law and kriging"},
+              {NULL, "directions", "held-out directions"},
+              {NULL, "energy_per_band", "displacement by band, share"},
+              {NULL, "error", "compression error"},
+              {"error", "volume_ml", "state of the mm: volume, mL"},
+              {NULL, "error_harmonics", "error by highest band, share"},
+              {NULL, "error_modes", "error by number of modes, share"},
+              {NULL, "expected_constant_mm", "expected error^2 / displacement, mm"},
+              {NULL, "expected_error", "expected error of a displacement from the scan"},
+              {NULL, "expected_rms_mm", "expected error, RMS, mm"},
+              {NULL, "fitted_rms_mm", "residual at the fitted points, RMS, mm"},
+              {NULL, "from_scale", "scale at the start of motion"},
+              {NULL, "gravity", "gravity (to left, back, head)"},
+              {NULL, "has_volume", "encloses a volume"},
+              {NULL, "held_out_rms_mm", "residual at held-out points, RMS, mm"},
+              {NULL, "kind", "kind of the modes"},
+              {NULL, "left_rms", "residual, RMS"},
+              {NULL, "left_rms_mm", "residual, RMS, mm"},
+              {NULL, "left_without_gain_mm", "without the gain, mm"},
+              {NULL, "linearity", "linearity of displacement with volume"},
+              {NULL, "lung_count", "number of lungs"},
+              {NULL, "max_mm", "largest, mm"},
+              {NULL, "max_percent", "largest, % of RMS displacement"},
+              {NULL, "midline_mm", "x of the midline, mm"},
+              {NULL, "mm", "length, mm"},
+              {NULL, "move", "displacement x, y, z, mm"},
+              {NULL, "multiplications", "multiplications per vertex"},
+              {NULL, "nearest_rms", "  its distance, RMS, mm"},
+              {NULL, "nearest_scale", "scale nearest to the surface"},
+              {NULL, "none", "no motion"},
+              {NULL, "of", "measured on"},
+              {NULL, "off_percent", "largest deviation, %"},
+              {NULL, "p95_mm", "95 %, mm"},
+              {NULL, "p95_percent", "95 %, % of RMS displacement"},
+              {NULL, "paper", "Santhanam 2008 found"},
+              {NULL, "pressure_cmH2O", "pressure, from and to, cmH2O"},
+              {NULL, "reach_mm", "reach of a force, mm"},
+              {NULL, "rest_part", "state of the mm: full 0, rest 1"},
+              {NULL, "resting_shares", "volume at rest, share of full"},
+              {NULL, "rms_after_mm", "distance after, RMS, mm"},
+              {NULL, "rms_before_mm", "distance before, RMS, mm"},
+              {NULL, "rms_mL", "residual, RMS, mL"},
+              {NULL, "rms_mm", "RMS, mm"},
+              {"error", "rms_percent", "RMS, % of RMS displacement"},
+              {NULL, "rms_percent", "residual, % of range of volumes"},
+              {"states", "scale", "scale of the displacement"},
+              {NULL, "scanned", "state in the scan"},
+              {NULL, "spread_rms", "spread, RMS"},
+              {NULL, "standard_errors", "standard errors of c1 to c9"},
+              {"linearity", "states", "states"},
+              {NULL, "states", "state"},
+              {NULL, "surface_mm", "surfaces within, mm"},
+              {NULL, "turned_over_percent", "triangles turned over, %"},
+              {NULL, "unseen_regions", "regions not determined"},
+              {"states", "landmarks", "distance between landmarks"},
+              {"states", "surface", "distance between surfaces"},
+              {"states", "volume_ml", "volume above the start, mL"},
+              {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
+              {NULL, "volume_mL", "volume, from and to, mL"}};
+
+/* Write the label of a member. Without one in the table, write its key with spaces instead of
+ * underscores, and a comma before a unit at its end. */
+static void write_label(const char *parent, const char *key, char text[TEXT_MAX]) {
+  static const char *const units[][2] = {
+      {"_mm", ", mm"}, {"_ml", ", mL"}, {"_percent", ", %"}, {"_rad", ", rad"}};
+  for (size_t i = 0; i < sizeof labels / sizeof *labels; ++i) {
+    if (strcmp(labels[i].key, key) == 0 &&
+        (labels[i].parent == NULL || strcmp(labels[i].parent, parent) == 0)) {
+      (void)snprintf(text, TEXT_MAX, "%s", labels[i].label);
+      return;
+    }
+  }
+  size_t length = strlen(key);
+  const char *unit = "";
+  for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
+    if (supine_text_ends_in(key, units[i][0])) {
+      unit = units[i][1];
+      length -= strlen(units[i][0]);
+    }
+  }
+  (void)snprintf(text, TEXT_MAX, "%.*s%s", (int)length, key, unit);
   for (char *at = text; (at = strchr(at, '_')) != NULL;) {
     *at = ' ';
   }
@@ -79,7 +180,7 @@ static void print_table(const json_t *rows) {
       size_t column = 0;
       json_object_foreach(first, name, member) {
         if (i == 0) {
-          write_name(name, text);
+          write_label("", name, text);
         } else {
           write_text(json_object_get(json_array_get(rows, i - 1), name), text);
         }
@@ -98,23 +199,23 @@ static void print_table(const json_t *rows) {
   }
 }
 
-static void print_object(json_t *object, int indent);
+static void print_object(const char *parent, json_t *object, int indent);
 
 /* Print a member: one line, a table where its rows are alike, else each of its objects. */
-static void print_member(const char *name, json_t *value, int indent) {
+static void print_member(const char *parent, const char *name, json_t *value, int indent) {
   char text[TEXT_MAX];
   char heading[TEXT_MAX];
   size_t i;
   json_t *item;
-  write_name(name, heading);
+  write_label(parent, name, heading);
   if (json_is_array(value) && json_is_string(json_array_get(value, 0))) {
     json_array_foreach(value, i, item) {
-      print_member(name, item, indent);
+      print_member(parent, name, item, indent);
     }
   } else if (!has_objects(value)) {
     write_text(value, text);
     if (text[0] != '\0') {
-      (void)printf("%*s%-*s %s\n", indent, "", NAME_WIDTH - indent, heading, text);
+      (void)printf("%*s%-*s %s\n", indent, "", LABEL_WIDTH - indent, heading, text);
     }
   } else if (is_row(json_array_get(value, 0))) {
     (void)printf("%*s%s\n", indent, "", heading);
@@ -122,22 +223,25 @@ static void print_member(const char *name, json_t *value, int indent) {
   } else if (json_is_array(value)) {
     json_array_foreach(value, i, item) {
       (void)printf("%s %zu\n", heading, i + 1);
-      print_object(item, indent + 2);
+      print_object(name, item, indent + 2);
     }
   } else {
     (void)printf("%*s%s\n", indent, "", heading);
-    print_object(value, indent + 2);
+    print_object(name, value, indent + 2);
   }
 }
 
-/* Print the members of an object; members that are all rows, as a table with their names. */
-static void print_object(json_t *object, int indent) {
+/* Print the members of an object, which is the member `parent` of another; members that are all
+ * rows, as a table with their labels. */
+static void print_object(const char *parent, json_t *object, int indent) {
   const char *name;
   json_t *member;
   json_t *rows = json_array();
+  char label[TEXT_MAX];
   json_object_foreach(object, name, member) {
     if (is_row(member)) {
-      json_t *row = json_pack("{s:s}", "", name);
+      write_label(parent, name, label);
+      json_t *row = json_pack("{s:s}", "", label);
       (void)json_object_update(row, member);
       (void)json_array_append_new(rows, row);
     }
@@ -146,7 +250,7 @@ static void print_object(json_t *object, int indent) {
     print_table(rows);
   } else {
     json_object_foreach(object, name, member) {
-      print_member(name, member, indent);
+      print_member(parent, name, member, indent);
     }
   }
   json_decref(rows);
@@ -159,7 +263,7 @@ void supine_options_print(json_t *value, bool json) {
   } else if (json_is_array(value)) {
     print_table(value);
   } else {
-    print_object(value, 0);
+    print_object("", value, 0);
   }
   json_decref(value);
 }

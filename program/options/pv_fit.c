@@ -17,7 +17,7 @@ enum {
   HIGH
 };
 
-/* Sorted samples, and the workspace of their fit. */
+/* Sorted samples of a limb, and the workspace of their fit. */
 typedef struct problem {
   const char *name;
   size_t count;
@@ -25,7 +25,7 @@ typedef struct problem {
   gsl_multifit_nlinear_workspace *work;
   gsl_matrix *covariance;
   double *x; /* [count] pressures mapped to -1 to 1 */
-  double *v; /* [count] volumes above the first, in shares of their range */
+  double *v; /* [count] volumes above the first, divided by their range */
   double *q; /* [count] the curve with volumes 0 to 1 */
 } problem;
 
@@ -39,7 +39,7 @@ static supine_status refuse_fall(const problem *limb, const supine_pv_sample *sa
                                  supine_error *error) {
   char why[192];
   (void)snprintf(why, sizeof why,
-                 "volume %g mL is below the %g mL at a lower pressure: volume must rise with "
+                 "volume %g mL is not above the %g mL at a lower pressure: volume must rise with "
                  "pressure, except for noise; correct or remove the sample",
                  sample->volume, larger);
   return refuse(limb, sample, why, error);
@@ -222,8 +222,8 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
   if (count <= SUPINE_PV_UNKNOWNS) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: %zu samples in a limb are too few for %d unknowns: give at least %d", name, count,
-        (int)SUPINE_PV_UNKNOWNS, (int)SUPINE_PV_UNKNOWNS + 1);
+        "%s: number of samples in a limb: %zu; give at least %d, for %d unknowns", name, count,
+        (int)SUPINE_PV_UNKNOWNS + 1, (int)SUPINE_PV_UNKNOWNS);
   }
   problem limb = {.name = name,
                   .count = count,
