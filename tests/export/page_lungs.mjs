@@ -61,7 +61,7 @@ async function checkRight(page) {
     const { basis: b } = window.supine;
     const lung = b.lungNames.indexOf('right lung');
     const [first, last] = [b.lungBegin[lung], b.lungBegin[lung + 1]];
-    return { xyz: Array.from(b.rest.slice(3 * first, 3 * last)), corners: Array.from(b.corners.slice(b.cornerBegin[lung], b.cornerBegin[lung + 1]), (v) => v - first) };
+    return { xyz: Array.from(b.surface.slice(3 * first, 3 * last)), corners: Array.from(b.corners.slice(b.cornerBegin[lung], b.cornerBegin[lung + 1]), (v) => v - first) };
   });
   const middle = xyz.reduce((sum, x, i) => sum + (i % 3 === 0 ? x : 0), 0) / (xyz.length / 3);
   assert.ok(middle < -40, `the right lung is at ${middle}`);
@@ -79,13 +79,13 @@ async function checkRight(page) {
     await settled(alone);
     const [at, ends] = await alone.evaluate(() => {
       const letters = Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => { const box = e.getBoundingClientRect(); return [e.textContent, box.x + box.width / 2]; }));
-      const { rest } = window.supine.basis;
+      const { surface } = window.supine.basis;
       const m = window.supine.panes()[0].toEye;
-      const seen = (v) => m[0] * rest[3 * v] + m[4] * rest[3 * v + 1] + m[8] * rest[3 * v + 2] + m[12];
+      const seen = (v) => m[0] * surface[3 * v] + m[4] * surface[3 * v + 1] + m[8] * surface[3 * v + 2] + m[12];
       let [leftmost, rightmost] = [0, 0]; // of the body
-      for (let v = 0; v < rest.length / 3; ++v) {
-        if (rest[3 * v] > rest[3 * leftmost]) leftmost = v;
-        if (rest[3 * v] < rest[3 * rightmost]) rightmost = v;
+      for (let v = 0; v < surface.length / 3; ++v) {
+        if (surface[3 * v] > surface[3 * leftmost]) leftmost = v;
+        if (surface[3 * v] < surface[3 * rightmost]) rightmost = v;
       }
       return [letters, [seen(leftmost), seen(rightmost)]];
     });

@@ -47,7 +47,7 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
     assert.equal(program.name, name);
     assert.equal(program.reported, name);
     assert.equal(seen.legend, `Displacement from ${name}`);
-    assert.match(seen.table, new RegExp(`Move from ${name.replace('+', '\\+')}`));
+    assert.match(seen.table, new RegExp(`Displacement from ${name.replace('+', '\\+')}`));
     const [, mean, largest] = /moves ([\d.]+) mm on average and ([\d.]+) mm at most, .* from (.*)\.$/.exec(seen.move).map(Number);
     assert.ok(seen.move.endsWith(` from ${name}.`));
     near(seen.nodule, program.nodule, `${posture} from ${name}: the nodule on the page and by deform`);

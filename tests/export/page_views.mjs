@@ -25,7 +25,7 @@ async function checkViews(page) {
   /* The left lung's vertices are where L is. */
   const [left, middle] = await page.evaluate(() => {
     const { basis } = window.supine;
-    const mean = (lung) => { let sum = 0; for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.rest[3 * v]; return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]); };
+    const mean = (lung) => { let sum = 0; for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.surface[3 * v]; return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]); };
     const names = basis.lungNames;
     return [mean(names.indexOf('left lung')), mean(names.indexOf('right lung'))];
   });

@@ -75,7 +75,7 @@ function readBasis() {
   for (const [name, text] of Object.entries(basis.colours)) basis.colours[name] = readColours(text);
   basis.colours.expansion = divergingMap();
   const { vertices: n } = basis;
-  basis.rest = takeRows('vertices', n, 3, basis.placeUnit, basis.middle);
+  basis.surface = takeRows('vertices', n, 3, basis.placeUnit, basis.middle);
   const directions = takeCounts('direction', n, 4, 'OCTAHEDRAL');
   basis.direction = Float32Array.from({ length: 3 * n }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
   basis.coefficients = takeRows('coefficients', n, basis.modes, basis.unit);
@@ -94,7 +94,7 @@ function readBasis() {
   basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => (names[i] ? `${names[i]} lung` : `lung ${i}`));
   basis.lungMiddles = basis.lungNames.map((_, lung) => [0, 1, 2].map((axis) => {
     let sum = 0;
-    for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.rest[3 * v + axis];
+    for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.surface[3 * v + axis];
     return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]);
   }));
   if (basis.inside) takeInside(basis);
@@ -171,13 +171,13 @@ function lungForm(basis, lung, w) {
 
 const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
 
-/** Return the coefficients c of that volume where all gains are s: c[0] s + c[1] s^2 + c[2] s^3. */
+/** Return the coefficients c of the volume formAt(f, [s, s, s]) = c[0] s + c[1] s^2 + c[2] s^3. */
 const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
 const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
 
-/** Return the s of the extremum of that volume nearest to 0 on one side, 1 or -1; infinite if none. */
+/** Return the s nearest to 0 at which cubicAt has an extremum, on one side, 1 or -1; infinite if none. */
 function cubicTurn(c, side) {
   const discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant < 0) return side * Infinity;
@@ -186,7 +186,7 @@ function cubicTurn(c, side) {
   return side * Math.min(Infinity, ...ahead);
 }
 
-/** Return the gain s at which that volume is `volume`, on the branch through s = 0; NaN if the surface
+/** Return the gain s at which cubicAt(c, s) is `volume`, mL, on the branch through s = 0; NaN if the surface
  * would fold before. */
 function scaleForVolume(c, volume) {
   if (volume === 0) return 0;
@@ -216,8 +216,8 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** Return the three gains, relative to that at rest, on the path from full inflation (sigma 0) through
- * rest (sigma 1). */
+/** Return the three gains, relative to the gain at rest, on the path from full inflation (sigma 0) through
+ * rest (sigma 1), as supine_volume_bend does. */
 function pathAt(bend, sigma) {
   const cube = sigma * sigma * sigma;
   const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
@@ -262,7 +262,7 @@ function volumesFor(basis, gravity) {
   return { rest, full: basis.references.map((ml) => (Number(basis.metadata.full_upright_gain) || 0) * up * ml) };
 }
 
-/** Return the resting volume of all lungs for gravity along a unit vector, mL beyond the reference surface. */
+/** Return the volume of all lungs at rest for gravity along a unit vector, mL beyond the reference surface. */
 const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
 
 /** Return the share of each lung in a total volume, mL beyond the reference surface: above rest, all have
@@ -282,7 +282,7 @@ function gainsFor(basis, forms, volumes, total) {
   return forms.map(() => gains);
 }
 
-/** Return one moment: the weights of the modes, three gains of each lung, and `held`, the volume of each
+/** Compute a moment, that is, the lungs in one state: the weights of the modes, three gains of each lung, and `held`, the volume of each
  * lung with its tissue, mL. `depth` is mL above rest. `folds` is true if the surface would fold before it holds that volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
@@ -336,17 +336,17 @@ function placeOf(basis, { weights, gains }, vertex) {
   const lung = lungOf(basis, vertex);
   let amount = 0;
   for (let k = 0; k < basis.modes; ++k) amount += weights[k] * basis.coefficients[vertex * basis.modes + k];
-  return [0, 1, 2].map((axis) => basis.rest[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
+  return [0, 1, 2].map((axis) => basis.surface[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
 }
 
 /** Compute the positions of all vertices, xyz, mm. */
-function placesOf({ rest, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
-  const places = new Float32Array(rest.length);
+function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
+  const places = new Float32Array(surface.length);
   for (let lung = 0; lung < lungs; ++lung) {
     for (let v = lungBegin[lung]; v < lungBegin[lung + 1]; ++v) {
       let amount = 0;
       for (let k = 0; k < modes; ++k) amount += weights[k] * coefficients[v * modes + k];
-      for (let axis = 0; axis < 3; ++axis) places[3 * v + axis] = rest[3 * v + axis] + gains[3 * lung + axis] * amount * direction[3 * v + axis];
+      for (let axis = 0; axis < 3; ++axis) places[3 * v + axis] = surface[3 * v + axis] + gains[3 * lung + axis] * amount * direction[3 * v + axis];
     }
   }
   return places;

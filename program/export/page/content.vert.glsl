@@ -3,7 +3,7 @@
 layout(location = 0) in vec3 ball;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 moved;
-layout(location = 3) in vec3 origin; // position that the colour measures from
+layout(location = 3) in vec3 origin; // position from which the colour is measured
 layout(location = 4) in float number; // index of the part
 uniform mat4 toEye;
 uniform mat4 projection;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Write the part under the pointer as a NaN with the part in its low bits, and the position, as bits.
+// Write the part under the pointer as a NaN that holds the part plus 1 in its low bits, and the position as bits.
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

@@ -3,7 +3,7 @@
 
 const $ = (id) => document.getElementById(id);
 
-/** Call drag(dx, dy, moves) when one pointer moves, where `moves` means to shift instead of turn;
+/** Call drag(dx, dy, shifts) when one pointer moves, where `shifts` means to shift instead of turn;
  * pinch(ratio, dx, dy, x, y) when two do; tap(event) when one is released without having moved. Distances
  * are CSS pixels. Return a function that tells whether a drag is under way. */
 function onDrag(element, drag, pinch, tap) {

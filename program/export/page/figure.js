@@ -52,7 +52,7 @@ function drawFigure(context, q, x, y, scale, tones) {
     xx: a * ex[0] * ex[0] + b * ey[0] * ey[0] + c * ez[0] * ez[0],
     xy: a * ex[0] * ex[1] + b * ey[0] * ey[1] + c * ez[0] * ez[1],
     yy: a * ex[1] * ex[1] + b * ey[1] * ey[1] + c * ez[1] * ez[1],
-    // Parts are drawn in the order of this depth: of the centre, and half of the extent towards the viewer.
+    // Depth by which the parts are sorted: that of the centre plus half of the extent towards the viewer.
     front: at[0] * ex[2] + at[1] * ey[2] + at[2] * ez[2] + 0.5 * Math.sqrt(a * ex[2] * ex[2] + b * ey[2] * ey[2] + c * ez[2] * ez[2]),
   })).sort((a, b) => a.front - b.front);
   context.save();

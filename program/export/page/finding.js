@@ -10,10 +10,10 @@ const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], '
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
 /** Return a weight of each vertex, proportional to the area of the triangles around it. */
-function areasOf({ rest, corners, vertices }) {
+function areasOf({ surface, corners, vertices }) {
   const areas = new Float32Array(vertices);
   for (let t = 0; t < corners.length; t += 3) {
-    const [a, b, c] = [0, 1, 2].map((i) => rest.subarray(3 * corners[t + i], 3 * corners[t + i] + 3));
+    const [a, b, c] = [0, 1, 2].map((i) => surface.subarray(3 * corners[t + i], 3 * corners[t + i] + 3));
     const piece = Math.hypot(...cross([0, 1, 2].map((i) => b[i] - a[i]), [0, 1, 2].map((i) => c[i] - a[i])));
     for (let i = 0; i < 3; ++i) areas[corners[t + i]] += piece;
   }
@@ -69,7 +69,7 @@ function lungWords(basis, held, before) {
 function findingOf(basis, moment, gravity, volume, stride) {
   const { from } = basis;
   const { mean, p95, largest } = moveBetween(basis, moment, from, stride);
-  if (largest < 0.05) return [`This is ${from.name}, which displacements count from.`, ''];
+  if (largest < 0.05) return [`This is ${from.name}, from which displacements are measured.`, ''];
   const where = `${whereWords(gravity)}${volume ? `${whereWords(gravity).endsWith(',') ? '' : ','} ${volume},` : ''}`;
   const move = `the surface moves ${mean.toFixed(1)} mm on average and ${largest.toFixed(1)} mm at most, 95 % of it within ${p95.toFixed(1)} mm, from ${from.name}.`;
   if (!moment.held) return [`${where} ${move}`, ''];
@@ -111,7 +111,7 @@ function errorWords(basis, moment, depth) {
   return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
 }
 
-/** Return the changes in a moment, short enough for a card: "L \u22121 %, R +18 %, 6.9 mm". */
+/** Return the changes of volume and the mean displacement in a moment as text for a card: "L \u22121 %, R +18 %, 6.9 mm". */
 function answerOf(basis, moment) {
   const { mean, largest } = moveBetween(basis, moment, basis.from, 1);
   if (largest < 0.05) return 'reference';
@@ -132,7 +132,7 @@ function writeFinding(element, text) {
   }));
 }
 
-/** Bars of the volume of each lung: grey for that before, then what has been gained or lost. */
+/** Bars of the volume of each lung: grey for the volume before, then orange for a gain or hatched for a loss. */
 class Holds {
   constructor(parent, { lungNames }) {
     this.rows = lungNames.map(() => {

@@ -17,12 +17,12 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
   inside.points = meshed.indexOf(1) < 0 ? n : n - meshed.reduce((sum, x) => sum + x, 0);
-  inside.rest = new Float32Array(4 * n); // reference position, mm, and lung
+  inside.reference = new Float32Array(4 * n); // reference position, mm, and lung
   inside.fields = new Float32Array(3 * k * n);
   inside.part = new Float32Array(n);
   inside.members = inside.names.map(() => []); // vertices of each part
   order.forEach((from, to) => {
-    inside.rest.set([...places.subarray(3 * from, 3 * from + 3), lungOf(inside, from)], 4 * to);
+    inside.reference.set([...places.subarray(3 * from, 3 * from + 3), lungOf(inside, from)], 4 * to);
     inside.fields.set(fields.subarray(3 * k * from, 3 * k * (from + 1)), 3 * k * to);
     inside.part[to] = of[from];
     inside.members[of[from]].push(to);
@@ -32,9 +32,9 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
 }
 
 /** Return the vertices' unit normals in the reference state; 0 for points. */
-function normalsOf({ rest, vertices, corners }) {
+function normalsOf({ reference, vertices, corners }) {
   const normals = new Float32Array(3 * vertices);
-  const at = (v) => [...rest.subarray(4 * v, 4 * v + 3)];
+  const at = (v) => [...reference.subarray(4 * v, 4 * v + 3)];
   for (let t = 0; t < corners.length; t += 3) {
     const [a, b, c] = [at(corners[t]), at(corners[t + 1]), at(corners[t + 2])];
     const n = cross(b.map((x, i) => x - a[i]), c.map((x, i) => x - a[i]));
@@ -48,11 +48,11 @@ function normalsOf({ rest, vertices, corners }) {
 }
 
 /** Return the position of a vertex by the displacement field, mm. */
-function fieldPlace({ rest, fields, modes: k }, { weights, gains }, vertex) {
+function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
     for (let m = 0, at = (3 * vertex + axis) * k; m < k; ++m) sum += weights[m] * fields[at + m];
-    return rest[4 * vertex + axis] + gains[3 * rest[4 * vertex + 3] + axis] * sum;
+    return reference[4 * vertex + axis] + gains[3 * reference[4 * vertex + 3] + axis] * sum;
   });
 }
 
@@ -79,7 +79,7 @@ function insidePlaces(inside, moment, part) {
   const members = inside.members[part];
   const to = members.map((vertex) => fieldPlace(inside, moment, vertex));
   if (!inside.rigid.includes(part)) return to;
-  const from = members.map((vertex) => [0, 1, 2].map((axis) => inside.rest[4 * vertex + axis]));
+  const from = members.map((vertex) => [0, 1, 2].map((axis) => inside.reference[4 * vertex + axis]));
   const [before, after] = [from, to].map((places) => [0, 1, 2].map((axis) => places.reduce((sum, p) => sum + p[axis], 0) / places.length));
   const h = new Array(9).fill(0);
   from.forEach((p, i) => { for (let k = 0; k < 9; ++k) h[k] += (p[Math.floor(k / 3)] - before[Math.floor(k / 3)]) * (to[i][k % 3] - after[k % 3]); });
@@ -120,11 +120,11 @@ function insideNearest(inside, part, moment, place) {
 const ROWS_SHOWN = 200;
 
 /** Table of the content, one row for each part: a button that toggles the part's name in the picture, its
- * position and how far it has moved. `state.named` lists the parts with names in the picture; `look`
+ * position and how far it has moved. `state.named` lists the parts with names in the picture; `redraw`
  * requests a new picture. */
 class InsideTable {
-  constructor(inside, state, look) {
-    Object.assign(this, { inside, state, look, rows: [], pointed: -1, written: null });
+  constructor(inside, state, redraw) {
+    Object.assign(this, { inside, state, redraw, rows: [], pointed: -1, written: null });
     $('inside-section').hidden = false;
     $('inside-find').hidden = inside.names.length <= 20;
     $('inside-find').addEventListener('input', () => this.list());
@@ -136,7 +136,7 @@ class InsideTable {
     const words = $('inside-find').value.trim().toLowerCase();
     const found = this.inside.names.flatMap((name, part) => (name.toLowerCase().includes(words) ? [part] : []));
     const { length } = this.inside.names;
-    write('inside-count', found.length === length && length <= ROWS_SHOWN ? '' : `${Math.min(found.length, ROWS_SHOWN)} of ${length} are listed`);
+    write('inside-count', found.length === length && length <= ROWS_SHOWN ? '' : `listed: ${Math.min(found.length, ROWS_SHOWN)} of ${length}`);
     this.rows = found.slice(0, ROWS_SHOWN).map((part) => this.row(part));
     $('inside-rows').replaceChildren(...this.rows.map(({ row }) => row));
     this.press();
@@ -150,7 +150,7 @@ class InsideTable {
     button.textContent = this.inside.names[part] || '(no name)';
     button.title = 'Keep its name in the picture';
     button.addEventListener('click', () => this.keep(part));
-    const point = (to) => () => { this.pointed = to; this.look(); };
+    const point = (to) => () => { this.pointed = to; this.redraw(); };
     for (const [type, to] of [['focus', part], ['blur', -1]]) button.addEventListener(type, point(to));
     for (const [type, to] of [['mouseenter', part], ['mouseleave', -1]]) row.addEventListener(type, point(to));
     head.append(button);
@@ -167,7 +167,7 @@ class InsideTable {
 
   press() {
     for (const { part, button } of this.rows) button.setAttribute('aria-pressed', String(this.state.named.includes(part)));
-    this.look();
+    this.redraw();
   }
 
   /** Write the positions now and the distances from another moment, unless the table shows them already. */

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Compute the position of each vertex of the content, captured by transform feedback. The page appends
 // `amount(axis)` and its attributes, the coefficients of the displacement along each axis.
-layout(location = 0) in vec4 rest; // reference position, mm; w: lung
+layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 out vec4 moved;
 
 float amount(int axis);
 
 void main() {
-  moved = vec4(supine_place(rest, vec3(amount(0), amount(1), amount(2)), 1.0), 1.0);
+  moved = vec4(supine_place(reference, vec3(amount(0), amount(1), amount(2)), 1.0), 1.0);
 }

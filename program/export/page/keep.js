@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 // Keep the view: in a link, or in a PNG of the picture.
 
+/** Fields of State that a link lists under `show`. */
+const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside'];
+
 const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
 
-/** Return the view as the text of a link: only what differs from the first view. */
+/** Return the view as the text of a link; empty values are omitted. */
 function linkOf(state) {
   const { camera } = state;
   const all = {
     posture: postureText(gravityOf(state.goal)), depth: round(state.depth, 1), tidal: round(state.tidal, 1),
     colour: state.kind, reference: postureText(gravityOf(state.pinnedQ)), room: state.room ? '' : '0',
-    show: ['contours', 'ghost', 'arrows', 'wires', 'beside'].filter((name) => state[name]).join('.') || 'nothing',
+    show: SHOWN.filter((name) => state[name]).join('.') || 'nothing',
     lungs: state.opacity.every((x) => x === (state.basis.inside ? FADED : 1)) ? '' : state.opacity.join(':'),
     cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
     range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
@@ -34,7 +37,7 @@ function takeLink(text, state) {
   state.room = link.get('room') !== '0';
   state.roomBlend = state.room ? 1 : 0;
   const shown = (link.get('show') ?? 'contours.ghost').split('.');
-  for (const name of ['contours', 'ghost', 'arrows', 'wires', 'beside']) state[name] = shown.includes(name);
+  for (const name of SHOWN) state[name] = shown.includes(name);
   const opacity = numbers('lungs');
   if (opacity.length === state.opacity.length && opacity.every((x) => x >= 0 && x <= 1)) state.opacity = opacity;
   const [axis, at] = (link.get('cut') ?? '').split(':');
@@ -52,7 +55,7 @@ function takeLink(text, state) {
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
 }
 
-/** Save the picture with its text as a PNG. `draw` is called first, so that its pixels can be read. */
+/** Return the picture with its text as a PNG blob. `draw` is called first, so that its pixels can be read. */
 function savePicture(canvas, draw, title, lines, range, colours, labels) {
   draw();
   const ratio = canvas.width / canvas.clientWidth;

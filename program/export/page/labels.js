@@ -19,18 +19,18 @@ const placed = (element, at, shown) => {
   if (shown) element.style.transform = where;
 };
 
-const LETTER_RADIUS = 12; // of a letter and the space around it, CSS pixels
-const ARROW_RADIUS = 13;  // of the head of gravity's arrow, CSS pixels
+const LETTER_RADIUS = 12; // radius of a letter with the space around it, CSS pixels
+const ARROW_RADIUS = 13;  // radius of the head of gravity's arrow, CSS pixels
 
 /** Move a letter off a plate that it would overlap: up, down, right or left, whichever is shortest and
  * stays in the picture. */
 function offPlate(at, plate, box) {
   const r = LETTER_RADIUS;
   if (at.x < plate.left - r || at.x > plate.right + r || at.y < plate.top - r || at.y > plate.bottom + r) return at;
-  const ways = [{ x: at.x, y: plate.top - r }, { x: at.x, y: plate.bottom + r }, { x: plate.right + r, y: at.y }, { x: plate.left - r, y: at.y }]
+  const candidates = [{ x: at.x, y: plate.top - r }, { x: at.x, y: plate.bottom + r }, { x: plate.right + r, y: at.y }, { x: plate.left - r, y: at.y }]
     .filter(({ x, y }) => x >= box.left + r && x <= box.right - r && y >= box.top + r && y <= box.bottom - r);
-  const far = (way) => Math.hypot(way.x - at.x, way.y - at.y);
-  return ways.reduce((best, way) => (far(way) < far(best) ? way : best), ways[0] ?? at);
+  const far = ({ x, y }) => Math.hypot(x - at.x, y - at.y);
+  return candidates.reduce((best, place) => (far(place) < far(best) ? place : best), candidates[0] ?? at);
 }
 
 /** Move a letter to the side of an arrow, [from, to], that it would overlap. */
@@ -42,7 +42,7 @@ function offArrow(at, [from, to], box) {
   if (Math.hypot(at.x - nx, at.y - ny) >= far) return at;
   const size = Math.hypot(dx, dy) || 1;
   const side = (at.x - nx) * -dy + (at.y - ny) * dx < 0 ? -1 : 1;
-  const beside = (way) => ({ x: nx - (way * far * dy) / size, y: ny + (way * far * dx) / size });
+  const beside = (sign) => ({ x: nx - (sign * far * dy) / size, y: ny + (sign * far * dx) / size });
   const inside = ({ x, y }) => x >= box.left + 12 && x <= box.right - 12 && y >= box.top + 12 && y <= box.bottom - 12;
   return inside(beside(side)) ? beside(side) : beside(-side);
 }
@@ -68,7 +68,7 @@ class Letters {
       const box = pane && { left: pane.box[0] / ratio, right: (pane.box[0] + pane.box[2]) / ratio, top: 0, bottom: pane.canvasHeight / ratio };
       const arrow = pane?.arrowEnds.map((end) => project(pane, end, ratio));
       Object.values(ENDS).forEach((end, j) => {
-        const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26; // the one along gravity, past the arrow
+        const beyond = pane && dot(end, pane.gravity) > 0.8 ? 0.95 : 0.26; // the letter along gravity is beyond the arrow
         let at = middle && project(pane, centre.map((c, k) => c + end[k] * (half[k] + beyond * Math.max(...half))), ratio);
         const far = at && Math.hypot(at.x - middle.x, at.y - middle.y) > 0.16 * Math.min(pane.box[2], pane.box[3]) / ratio;
         if (at) { // clamp to the picture

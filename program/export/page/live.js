@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Show the states that the server of this page sends by WebSocket, and send this device's tilt back
-// where the user asks for it.
+// if the user asks for it.
 
 window.supineLive = (() => {
   const said = document.createElement('p');

@@ -3,7 +3,7 @@
 // are measured from, turned so that gravity points down unless it is nearly normal to the plane.
 
 /** Return the closed lines, [[u, v], ...] each, where the surface crosses the plane at `at` mm along an
- * axis; u and v are along the other two axes, mm. At a hole of the surface, lines end open. */
+ * axis; u and v are along the other two axes, mm. A line that meets a hole of the surface stays open. */
 function linesAcross({ corners, vertices }, places, axis, at) {
   const [first, second] = [0, 1, 2].filter((i) => i !== axis);
   const links = new Map(); // from an edge to the next edges across its triangles
@@ -44,8 +44,8 @@ const PLANES = [
 ];
 
 class Outlines {
-  /** Make the canvases; `look` requests that they be drawn again. */
-  constructor(parent, basis, state, look) {
+  /** Make the canvases; `redraw` requests that they be drawn again. */
+  constructor(parent, basis, state, redraw) {
     Object.assign(this, { basis, state, kept: {} });
     this.canvases = PLANES.map((plane, i) => {
       const canvas = document.createElement('canvas');
@@ -56,7 +56,7 @@ class Outlines {
         const { low, high } = state.body;
         const { axis } = PLANES[1 - i];
         state.slices[1 - i] = Math.max(low[axis] + 1, Math.min(high[axis] - 1, state.slices[1 - i] + mm));
-        look();
+        redraw();
       };
       onDrag(canvas, (dx, dy) => move((this.across[i][0] * dx + this.across[i][1] * dy) / this.scale));
       canvas.addEventListener('keydown', (event) => {

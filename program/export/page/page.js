@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Connect the state, the picture and the controls of the page.
 
-const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside', 'inside']; // options that a link lists under `show`
+const CHECKBOXES = [...SHOWN, 'inside']; // ids, and the fields of State that they set
 const VIEW_ANGLE = 0.5; // vertical field of view of the camera, radians
 const KIND_TEXT = {
-  displacement: 'How far each place is from where it is FROM.',
-  difference: 'How far each place is from where it is in the other posture at the same breath.',
-  expansion: 'How much larger the surface is around each place than FROM, in area.',
-  height: 'How high each place is above the lowest one, along gravity.',
+  displacement: 'Distance of each point from its position FROM.',
+  difference: 'Distance of each point from its position in the other posture at the same breath.',
+  expansion: 'Growth of the surface area around each point, relative to its area FROM.',
+  height: 'Height of each point above the lowest one, along gravity.',
 };
 
 /** Compute the bounding box and sphere of positions. */
@@ -46,10 +46,10 @@ function start() {
   const { inside } = basis;
   const fromWhere = basis.from.name.replace(/^the /, 'in the '); // "supine at rest", "in the scan"
   const restOrScan = basis.resting ? 'rest' : 'scan';
-  const look = () => { unseen = true; }; // draw the picture again in the next frame
+  const redraw = () => { unseen = true; }; // draws the picture again in the next frame
   const tangent = Math.tan(VIEW_ANGLE / 2);
-  let stale = true;     // the vertices must be moved to the state
-  let unseen = true;    // the picture must be drawn again
+  let stale = true;     // whether the vertices must be moved to the state
+  let unseen = true;    // whether the picture must be drawn again
   let pointer = null;   // position of the pointer on the canvas, CSS pixels
   let asked = true;     // whether the value under the pointer was requested since it or the picture changed
   let wanted = null;    // {at, then}: position of a click, and the callback for the result
@@ -70,11 +70,11 @@ function start() {
 
   /** Return the largest coordinate of the lungs along a direction, mm, over all vertices where heights are
    * shown; some 400 are enough to place the arrow and the table. */
-  function reachAlong(moment, way) {
-    const { rest, direction, coefficients, modes } = basis;
+  function reachAlong(moment, towards) {
+    const { surface, direction, coefficients, modes } = basis;
     const { weights, gains } = moment;
-    const [x, y, z] = way;
-    const along = basis.references.map((_, lung) => way.map((g, axis) => g * gains[3 * lung + axis]));
+    const [x, y, z] = towards;
+    const along = basis.references.map((_, lung) => towards.map((g, axis) => g * gains[3 * lung + axis]));
     const stride = state.kind === 'height' ? 1 : Math.ceil(basis.vertices / 400);
     let reach = -Infinity;
     for (let i = 0; i < basis.vertices; i += stride) {
@@ -82,7 +82,7 @@ function start() {
       for (let k = 0; k < modes; ++k) amount += weights[k] * coefficients[i * modes + k];
       const at = 3 * i;
       const [u, v, w] = along[lungOf(basis, i)];
-      reach = Math.max(reach, x * rest[at] + y * rest[at + 1] + z * rest[at + 2] + amount * (u * direction[at] + v * direction[at + 1] + w * direction[at + 2]));
+      reach = Math.max(reach, x * surface[at] + y * surface[at + 1] + z * surface[at + 2] + amount * (u * direction[at] + v * direction[at + 1] + w * direction[at + 2]));
     }
     return reach;
   }
@@ -152,7 +152,7 @@ function start() {
     return [makePane('pinned', state.pinned, state.pinnedQ, [0, 0, half, h]), makePane('now', state.moment, state.q, [half, 0, w - half, h])];
   }
 
-  /** Return the pane at a position on the canvas (CSS pixels), and the position in it, -1 to 1 each way. */
+  /** Return the pane at a position on the canvas (CSS pixels), and the position in it, -1 to 1 each towards. */
   function paneAt({ x, y }) {
     const [px, py] = [x * ratio(), canvas.height - y * ratio()];
     const pane = panes.find(({ box }) => px >= box[0] && px < box[0] + box[2]) ?? panes[0];
@@ -231,7 +231,7 @@ function start() {
       button.className = 'quiet';
       button.textContent = 'Remove';
       button.setAttribute('aria-label', `Remove probe ${number + 1}`);
-      button.addEventListener('click', () => { state.probes.splice(number, 1); look(); });
+      button.addEventListener('click', () => { state.probes.splice(number, 1); redraw(); });
       item.append(document.createElement('span'), button);
       list.append(item);
     }
@@ -252,7 +252,7 @@ function start() {
   }
 
   /* Content of the lungs: its table, and names in the picture. */
-  const insideTable = inside && new InsideTable(inside, state, look);
+  const insideTable = inside && new InsideTable(inside, state, redraw);
   const insideNames = new InsideNames($('letters'));
 
   /** Return the position of the content's vertex nearest to the pointer, how far it has moved, and the value
@@ -288,7 +288,7 @@ function start() {
     if (!found || found.part !== undefined || state.probes.length === 8) return;
     const moment = found.pane === 'pinned' ? state.pinned : state.moment;
     state.probes.push(nearestVertex(basis, picture.read(moment)[0], found.at));
-    look();
+    redraw();
   }
 
   const buttons = makePostureButtons((i) => {
@@ -299,7 +299,7 @@ function start() {
   const amount = (value) => `${value.toFixed(0)} mL`;
 
   const holds = new Holds($('holds'), basis);
-  const outlines = new Outlines($('outlines'), basis, state, () => { told = null; look(); });
+  const outlines = new Outlines($('outlines'), basis, state, () => { described = null; redraw(); });
 
   /** Write the changes in each posture on its card; `most` is the largest volume of a lung in them, mL. */
   let answered = { depth: null };
@@ -316,11 +316,11 @@ function start() {
   /** Return the height of each lung's middle, mm. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
-  let told = null; // the moment that the sentences describe, and the stride of the vertices they use
+  let described = null; // the moment that the sentences describe, and the stride of the vertices they use
   /** Write the finding from every `stride`th vertex: all, or about 3000 while the moment changes. */
   function tellFinding(stride) {
-    if (told?.moment === state.moment && told.stride <= stride) return;
-    told = { moment: state.moment, stride };
+    if (described?.moment === state.moment && described.stride <= stride) return;
+    described = { moment: state.moment, stride };
     if (!state.playing && stride === 1) answerCards();
     const above = Math.round(state.depth) ? `${amount(state.depth)} above ${basis.resting ? 'rest' : 'the scan'}` : '';
     const { held } = state.moment;
@@ -390,12 +390,12 @@ function start() {
     write('pinned', `other posture: ${postureWords(gravityOf(state.pinnedQ))}`);
     for (const input of document.getElementsByName('kind')) input.checked = input.value === state.kind;
     for (const input of document.getElementsByName('frame')) input.checked = (input.value === 'room') === state.room;
-    for (const id of SHOWN) $(id).checked = state[id];
+    for (const id of CHECKBOXES) $(id).checked = state[id];
     if (inside) {
       const from = state.kind === 'difference' ? `${postureWords(gravityOf(state.pinnedQ))} at the same breath` : basis.from.name;
-      write('inside-text', `Move from ${from}${inside.corners.length ? '; of a mesh, the mean' : ''}`);
+      write('inside-text', `Displacement from ${from}${inside.corners.length ? '; of a mesh, the mean' : ''}`);
       $('inside-legend').hidden = !state.inside;
-      write('inside-legend', state.kind === 'expansion' ? 'inside, grey: points have no area' : 'balls and meshes inside: the same colours');
+      write('inside-legend', state.kind === 'expansion' ? 'inside: grey, because points have no area' : 'inside: balls and meshes in the same colours');
     }
     state.opacity.forEach((opacity, lung) => { for (const input of document.getElementsByName(`lung-${lung}`)) input.checked = Number(input.value) === opacity; });
     $('cut-axis').value = String(state.cut.axis);
@@ -456,7 +456,7 @@ function start() {
     idle = setTimeout(keepLink, 400);
   }
 
-  let kept = null; // the picture that holds the state `from`
+  let kept = null; // the Picture or Poster whose state `from` has been computed
   function deform() {
     if (!state.moment) return;
     if (kept !== picture) {
@@ -469,7 +469,7 @@ function start() {
 
   /* Boxes of the elements over the picture, CSS pixels; measured when their sizes change. */
   let covers = null;
-  const covered = new ResizeObserver(() => { covers = null; look(); });
+  const covered = new ResizeObserver(() => { covers = null; redraw(); });
   for (const plate of ['legend', 'ball']) covered.observe($(plate));
   function plates() {
     covers ??= ['legend', 'ball'].map((id) => ({ left: $(id).offsetLeft, top: $(id).offsetTop, right: $(id).offsetLeft + $(id).offsetWidth, bottom: $(id).offsetTop + $(id).offsetHeight }));
@@ -511,14 +511,14 @@ function start() {
   const orbit = (dx, dy) => {
     state.camera.azimuth += dx;
     state.camera.elevation = Math.max(-RIGHT_ANGLE, Math.min(RIGHT_ANGLE, state.camera.elevation + dy));
-    look();
+    redraw();
   };
   const boxSize = () => ({ width: sizeOf(canvas).width / (state.beside ? 2 : 1), height: sizeOf(canvas).height });
   const shift = (dx, dy) => { // CSS pixels
     const { width, height } = boxSize();
     const mm = (2 * tangent * distanceNow(width / height)) / height;
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
-    look();
+    redraw();
   };
   /** Zoom so that what is at a position on the canvas, at the depth of the pivot, stays there. */
   const zoom = (ratioOfSizes, at) => {
@@ -531,7 +531,7 @@ function start() {
       const { x, y } = paneAt(at);
       state.camera.pan = [state.camera.pan[0] + x * tangent * aspect * grown, state.camera.pan[1] + y * tangent * grown];
     }
-    look();
+    redraw();
   };
   const within = (x, y) => {
     const box = canvas.getBoundingClientRect();
@@ -549,7 +549,7 @@ function start() {
     else insideTable.keep(found.part);
     state.camera.pivot = found.at;
     state.camera.pan = [0, 0];
-    look();
+    redraw();
   }));
   canvas.addEventListener('wheel', (event) => {
     event.preventDefault();
@@ -574,7 +574,7 @@ function start() {
   const lookFrom = (letter) => {
     const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // to the viewer
     Object.assign(state.camera, { azimuth: Math.atan2(0 - x, 0 - y), elevation: Math.asin(Math.max(-1, Math.min(1, z))), pan: [0, 0] });
-    look();
+    redraw();
   };
 
   /* The ball: a drag turns the patient or, if the patient stays still, gravity. */
@@ -606,13 +606,13 @@ function start() {
     const found = postureFrom($('posture-name').value);
     $('posture-trouble').hidden = Boolean(found);
     if (!found) {
-      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d: supine, prone, left, right, upright, inverted, a tilt as supine+15, or gravity as 0.6:0:-0.8`);
+      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, a tilt as supine+15, or gravity as 0.6:0:-0.8`);
       return;
     }
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
-  $('posture-name').addEventListener('blur', () => { last.posture = null; look(); }); // the typed text may be no posture
+  $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // the typed text may be no posture
   const play = () => {
     state.playing = !state.playing;
     remeasure();
@@ -625,11 +625,11 @@ function start() {
   const colourBy = (kind) => change(() => { state.kind = kind; })();
   const holdStill = (room) => change(() => { state.room = room; })();
   const flip = (name) => change(() => { state[name] = !state[name]; })();
-  const reset = () => { state.camera = { ...FIRST_CAMERA }; look(); };
+  const reset = () => { state.camera = { ...FIRST_CAMERA }; redraw(); };
   $('play').addEventListener('click', play);
   $('pin').addEventListener('click', pin);
   $('reset').addEventListener('click', reset);
-  for (const id of SHOWN) $(id).addEventListener('change', () => flip(id));
+  for (const id of CHECKBOXES) $(id).addEventListener('change', () => flip(id));
   for (const input of document.getElementsByName('kind')) input.addEventListener('change', () => colourBy(input.value));
   for (const input of document.getElementsByName('frame')) input.addEventListener('change', () => holdStill(input.value === 'room'));
   $('cut-axis').addEventListener('change', change(() => { state.cut.axis = Number($('cut-axis').value); }));
@@ -641,7 +641,7 @@ function start() {
     }));
   }
   $('range-auto').addEventListener('click', change(() => { delete state.ownRanges[state.kind]; }));
-  $('probes-clear').addEventListener('click', () => { state.probes = []; look(); });
+  $('probes-clear').addEventListener('click', () => { state.probes = []; redraw(); });
   for (const [letter, name] of Object.entries(VIEWS)) {
     const button = document.createElement('button');
     button.type = 'button';
@@ -675,7 +675,7 @@ function start() {
   $('theme').addEventListener('click', () => {
     document.documentElement.dataset.theme = isDark() ? 'light' : 'dark';
     showTheme();
-    look();
+    redraw();
   });
   $('full').hidden = !document.fullscreenEnabled;
   $('full').addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
@@ -737,13 +737,13 @@ function start() {
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * pixels));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * pixels));
     if (state.moment && picture && !inHeadset) draw(); // resizing clears the canvas; redraw before it is shown
-    look();
+    redraw();
   };
   new ResizeObserver(resize).observe(canvas);
   canvas.addEventListener('webglcontextlost', (event) => {
     event.preventDefault(); // lets the browser restore the context
     picture = null;
-    tell('The browser took the graphics card away. Reload the page if it does not come back.');
+    tell('The browser has lost the graphics card. Reload the page if the picture does not come back.');
   });
   canvas.addEventListener('webglcontextrestored', () => {
     picture = pictureOn(canvas, basis);
@@ -789,7 +789,7 @@ function showFacts(basis) {
   const facts = [
     ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices`],
     ['field', `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`],
-    ['error', metadata.error_rms_percent && `${Number(metadata.error_rms_percent).toPrecision(2)} % RMS of the full solve, on directions not used`],
+    ['error', metadata.error_rms_percent && `${Number(metadata.error_rms_percent).toPrecision(2)} % RMS from the full solve, on held-out directions`],
     ['law', metadata.law], ['scan', metadata.scanned], ['force', metadata.force], ['stiffness', metadata.stiffness],
     ['made by', metadata.made_by], ['credit', metadata.attribution],
   ];

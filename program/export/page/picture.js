@@ -10,7 +10,7 @@ const ARROWS_SHOWN = 500;
 class Picture {
   constructor(canvas, basis) {
     const gl = canvas.getContext('webgl2', { antialias: true, alpha: true, premultipliedAlpha: true, powerPreference: 'high-performance' });
-    if (!gl) throw new Error('This browser offers no WebGL 2, which the lungs are drawn with.');
+    if (!gl) throw new Error('This browser has no WebGL 2. Open the page in another browser.');
     this.gl = gl;
     this.canvas = canvas;
     this.basis = basis;
@@ -42,7 +42,7 @@ class Picture {
     const all = Array.from({ length: this.basis.words }, (_, j) => j);
     return [...this.sized(), source('vertex.vert.glsl'),
       ...all.map((j) => `layout(location = ${6 + j}) in uvec3 n${j};`),
-      `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(rest, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
+      `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(reference, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
   }
 
   /** Return the shader that moves the content, with an attribute for each axis and four modes from location 1
@@ -110,20 +110,20 @@ class Picture {
     const { basis } = this;
     const k = basis.modes;
     const { words } = basis;
-    const inputs = (rest, direction, coefficients, normals) => {
+    const inputs = (reference, direction, coefficients, normals) => {
       const [buffer, turns] = [this.buffer(coefficients), this.buffer(normals)];
-      const attributes = [[this.buffer(rest), 4, 16, 0], [this.buffer(direction), 3, 12, 0]];
+      const attributes = [[this.buffer(reference), 4, 16, 0], [this.buffer(direction), 3, 12, 0]];
       for (let first = 0; first < 16; first += 4) attributes.push(first < k ? [buffer, Math.min(4, k - first), 4 * k, 4 * first] : null);
       for (let j = 0; j < words; ++j) attributes.push([turns, 3, 12 * words, 12 * j, 0, true]);
       return this.array(attributes);
     };
-    const rest = new Float32Array(4 * basis.vertices);
-    for (let i = 0; i < basis.vertices; ++i) rest.set([...basis.rest.subarray(3 * i, 3 * i + 3), lungOf(basis, i)], 4 * i);
+    const reference = new Float32Array(4 * basis.vertices);
+    for (let i = 0; i < basis.vertices; ++i) reference.set([...basis.surface.subarray(3 * i, 3 * i + 3), lungOf(basis, i)], 4 * i);
     const every = Math.max(1, Math.floor(basis.vertices / ARROWS_SHOWN));
     this.fewCount = Math.ceil(basis.vertices / every);
     const few = (values, size) => values.constructor.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
-    this.inputs = inputs(rest, basis.direction, basis.coefficients, basis.normals);
-    this.fewInputs = inputs(few(rest, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
+    this.inputs = inputs(reference, basis.direction, basis.coefficients, basis.normals);
+    this.fewInputs = inputs(few(reference, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
   }
 
   /** Make the buffers of the content: displacements, a ball, and meshes. */
@@ -133,7 +133,7 @@ class Picture {
     this.content = this.program('content.vert.glsl', 'surface.frag.glsl');
     this.contentPicker = this.program('content.vert.glsl', 'content_pick.frag.glsl');
     const fields = this.buffer(inside.fields);
-    const attributes = [[this.buffer(inside.rest), 4, 16, 0]];
+    const attributes = [[this.buffer(inside.reference), 4, 16, 0]];
     for (let axis = 0; axis < 3; ++axis) for (let first = 0; first < k; first += 4) attributes.push([fields, Math.min(4, k - first), 12 * k, 4 * (axis * k + first)]);
     this.insideInputs = this.array(attributes);
     this.insideParts = this.buffer(inside.part);
@@ -165,7 +165,7 @@ class Picture {
   makeOutputs() {
     const { gl, basis } = this;
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives the normals of arrows, which are not used
+    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // takes the arrows' normals, which nothing reads
     this.edges = null;
     this.states = {};
     this.arrays = {};
@@ -522,7 +522,7 @@ class Picture {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
     gl.viewport(0, 0, 1, 1);
-    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // not a number
+    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // a NaN without a part: nothing is there
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     gl.enable(gl.DEPTH_TEST);
     this.usePane(this.picker, pane, [x, y, pane.box[2], pane.box[3]]);

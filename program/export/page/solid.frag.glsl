@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Shade the arrows and the table in one colour.
 in vec3 facing;
 in vec3 body;
 uniform vec4 tint;

@@ -81,12 +81,12 @@ class State {
     this.arrows = false;
     this.wires = false;
     this.beside = false;                           // the reference posture beside this one
-    this.inside = Boolean(basis.inside);           // shown
-    this.named = [];                               // parts inside whose names are kept in the picture
+    this.inside = Boolean(basis.inside);           // whether the content is shown
+    this.named = [];                               // parts of the content whose names are kept in the picture
     this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
     this.cut = { axis: -1, at: 0.5 };              // normal to axis 0, 1 or 2, or -1 for none; at a fraction of the lungs' extent
-    this.ownRanges = {};                           // {begin, end} that the user typed, by kind
-    this.probes = [];                              // vertices
+    this.ownRanges = {};                           // ranges of the colours that the user typed, {begin, end}, by kind
+    this.probes = [];                              // marked vertices
     this.room = true;
     this.roomBlend = 1; // 0: the patient stays still; 1: the room does
     this.camera = { ...FIRST_CAMERA };
@@ -154,8 +154,8 @@ class State {
     return true;
   }
 
-  /** Range of the colours: as typed, or that of 95 % of the surface in each of six postures at the largest
-   * volume in use. */
+  /** Range of the colours: as typed, or one that holds 95 % of the surface in each of six postures at the
+   * largest volume in use. */
   get range() {
     const own = this.ownRanges[this.kind];
     if (!own) return this.ranges[this.kind];
@@ -167,7 +167,7 @@ class State {
     if (deepest === this.measured) return;
     this.measured = deepest;
     const at95 = (values) => values.sort((a, b) => a - b)[Math.floor(0.95 * values.length)];
-    const rest = samplePlaces(this.basis, this.from);
+    const before = samplePlaces(this.basis, this.from);
     const areas = (places) => Float64Array.from({ length: places.length / 3 }, (_, i) => {
       const [a, b, c] = places.slice(3 * i, 3 * i + 3);
       return Math.hypot(...cross(b.map((x, j) => x - a[j]), c.map((x, j) => x - a[j])));
@@ -179,14 +179,14 @@ class State {
       for (const value of values) most[kind] = Math.max(most[kind], value);
       found[kind].push(at95(values) || 0);
     };
-    const restAreas = areas(rest);
-    const all = [rest];
+    const areasBefore = areas(before);
+    const all = [before];
     const states = POSTURES.map((p) => momentFor(this.basis, gravityOf(tilted(p.q, p.tilt)), deepest))
       .filter((m) => !m.folds).map((m) => ({ gravity: m.gravity, places: samplePlaces(this.basis, m) }));
     states.forEach(({ gravity, places }, i) => {
-      take('displacement', far(places, rest));
+      take('displacement', far(places, before));
       all.push(places);
-      take('expansion', Array.from(areas(places), (area, j) => Math.abs(100 * (area / restAreas[j] - 1))));
+      take('expansion', Array.from(areas(places), (area, j) => Math.abs(100 * (area / areasBefore[j] - 1))));
       const along = places.map((p) => dot(p, gravity));
       const lowest = along.reduce((a, b) => Math.max(a, b), -Infinity);
       take('height', along.map((x) => lowest - x));

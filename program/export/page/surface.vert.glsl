@@ -2,7 +2,7 @@
 // Project the deformed surface to the screen, or to the single pixel under the pointer.
 layout(location = 0) in vec3 moved;
 layout(location = 1) in vec4 turned; // unit normal; w: area relative to the reference surface
-layout(location = 2) in vec3 origin; // position that the colour measures from: in the reference state or the other posture
+layout(location = 2) in vec3 origin; // position from which the colour is measured: in the state `from` or the other posture
 layout(location = 3) in vec4 before; // `turned` in that state
 uniform mat4 toEye;
 uniform mat4 projection;

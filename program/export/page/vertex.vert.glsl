@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Compute the position and the normal of each vertex, captured by transform feedback. The page appends
 // the normal's words as attributes and `turned_by_words()`, which sums them.
-layout(location = 0) in vec4 rest; // reference position, mm; w: lung
+layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 layout(location = 1) in vec3 direction;
 layout(location = 2) in vec4 c0;
 layout(location = 3) in vec4 c1;
@@ -16,7 +16,7 @@ void main() {
   vec4 c[4] = vec4[4](c0, c1, c2, c3);
   float amount = 0.0;
   for (int i = 0; i < SUPINE_VECTORS; ++i) amount += dot(supine_weights[i], c[i]);
-  moved = vec4(supine_place(rest, direction, amount), 1.0);
+  moved = vec4(supine_place(reference, direction, amount), 1.0);
   vec3 sum = turned_by_words();
   float size = length(sum);
   turned = vec4(size > 0.0 ? sum / size : vec3(0.0), size);
