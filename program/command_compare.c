@@ -51,17 +51,18 @@ static const supine_option table[] = {
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
-/* Displacements of all names in all postures. */
+/* Displacements of all named structures in all postures. */
 typedef struct content_moves {
   const supine_basis *basis;
   const supine_posture_list *postures;
   supine_command_names names;
-  float *step;    /* [N, 3] displacement of each vertex in one posture */
-  double *moves;  /* [postures, names, 3] mm from the reference surface */
-  double *errors; /* [names] expected errors between two postures, mm RMS; 0: unknown */
+  float *step;           /* [N, 3] displacement of each vertex in one posture */
+  double *moves;         /* [postures, names, 3] mm from the reference surface */
+  double *square_errors; /* [names] mean square expected errors between two postures, mm^2; 0:
+                            unknown */
 } content_moves;
 
-/* Average `width` numbers of each vertex over the vertices of each name. */
+/* Average the `width` values of each vertex over the vertices of each name. */
 static void average(const content_moves *c, size_t width, const float *values, double *mean) {
   const supine_command_names *names = &c->names;
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
@@ -95,9 +96,9 @@ static supine_status find_moves(const content_moves *c, const supine_state *stat
   return status;
 }
 
-/* Compute the root mean square of the expected errors of each name's vertices. */
-static supine_status find_errors(const content_moves *c, const supine_state *to,
-                                 const supine_state *from, supine_error *error) {
+/* Compute the mean square of the expected errors of each name's vertices. */
+static supine_status find_square_errors(const content_moves *c, const supine_state *to,
+                                        const supine_state *from, supine_error *error) {
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   supine_expected expected = {0};
   const supine_status status = supine_options_expected_find(c->basis, to, from, &expected, error);
@@ -105,7 +106,7 @@ static supine_status find_errors(const content_moves *c, const supine_state *to,
     expected.sigma[i] *= expected.sigma[i];
   }
   if (expected.sigma != NULL) {
-    average(c, 1, expected.sigma, c->errors);
+    average(c, 1, expected.sigma, c->square_errors);
   }
   supine_options_expected_free(&expected);
   return status;
@@ -120,7 +121,7 @@ static void add_pair(const content_moves *c, size_t from, size_t to, json_t *lis
     const double *after = c->moves + 3 * (to * c->names.count + part);
     const double move[3] = {after[0] - before[0], after[1] - before[1], after[2] - before[2]};
     const double length = supine_length(move);
-    const double sigma = sqrt(c->errors[part]);
+    const double sigma = sqrt(c->square_errors[part]);
     (void)json_array_append_new(list,
                                 json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from", text[0],
                                           "to", text[1], "name", text[2], "move", move[0], move[1],
@@ -140,7 +141,7 @@ static supine_status find_pairs(const content_moves *c, const supine_state *volu
   }
   for (size_t i = 0; i < c->postures->count; ++i) {
     for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
-      status = find_errors(c, &state[j], &state[i], error);
+      status = find_square_errors(c, &state[j], &state[i], error);
       add_pair(c, i, j, list);
     }
   }
@@ -157,8 +158,8 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
   if (status == SUPINE_OK) {
     c.step = malloc(3 * n * sizeof *c.step);
     c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
-    c.errors = calloc(c.names.count, sizeof *c.errors);
-    if (c.step == NULL || c.moves == NULL || c.errors == NULL) {
+    c.square_errors = calloc(c.names.count, sizeof *c.square_errors);
+    if (c.step == NULL || c.moves == NULL || c.square_errors == NULL) {
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
     }
   }
@@ -171,7 +172,7 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
   json_decref(list);
   free(c.step);
   free(c.moves);
-  free(c.errors);
+  free(c.square_errors);
   supine_command_names_close(&c.names);
   return status;
 }
@@ -202,8 +203,9 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (supine_basis_metadata(basis, "content") != NULL) { /* the basis is from 'supine embed' */
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                  "-o is for lungs, and this basis holds structures inside: give "
-                                  "the lungs' basis, or leave -o out")
+                                  "%s holds structures inside the lungs, and -o needs the lungs: "
+                                  "give their basis, or leave -o out",
+                                  path)
                : compare_content(basis, &comparison.postures, &comparison.state, wanted->json,
                                  error);
   }
@@ -248,10 +250,9 @@ const supine_command supine_command_compare = {
         "under '95 %'. Ventilation by height: the lungs before a breath are cut into ten slabs of "
         "equal thickness across gravity. What the tissue of a slab gains is the volume "
         "that its part of the surface and its two cuts enclose after the breath, less that before; "
-        "a cut follows its outline. The slabs' gains sum to the volume asked for; gain over volume "
-        "is the regional expansion. Structures inside: the displacement is the mean over a part, "
-        "mm to "
-        "the left, to the back and to the head.\n"
+        "a cut follows its outline. The slabs' gains sum to the volume of the breath; gain over "
+        "volume is the regional expansion. Structures inside: the displacement is the mean over a "
+        "part, mm to the left, to the back and to the head.\n"
         "\n"
         "Examples:\n"
         "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"

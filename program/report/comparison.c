@@ -85,8 +85,8 @@ double supine_report_from_supine(const supine_comparison *c, const double gravit
   return supine_compare_rms(c->compare, &pose[1], &pose[0]);
 }
 
-/* Find the direction of gravity farthest from supine among some that cover the sphere evenly, 4.5
- * degrees apart. */
+/* Find the direction of gravity farthest from supine among 2048 that cover the sphere evenly, about
+ * 4.5 degrees apart. */
 static void find_farthest(supine_comparison *c) {
   enum { DIRECTIONS = 2048 };
   for (size_t i = 0; i < DIRECTIONS; ++i) {

@@ -25,7 +25,7 @@ typedef struct supine_compared_posture {
 typedef struct supine_comparison {
   const char *path;    /* file of the basis, for output */
   const char *command; /* name of the running command, for messages */
-  const char *made_by; /* the command line */
+  const char *made_by; /* command line that made the report */
   bool allow_folds;
   const supine_basis *basis;
   supine_state state; /* holds the volume of every posture; its gravity is supine */
@@ -35,9 +35,9 @@ typedef struct supine_comparison {
   supine_reference_pose reference; /* displacements are measured from this pose */
   supine_compare *compare;
   supine_compared_posture *posture; /* [count] */
-  size_t directions;                /* sampled directions of gravity that reach the volume */
-  double farthest[3],
-      farthest_rms; /* of these, the one farthest from supine; its RMS distance, mm */
+  size_t directions;                /* number of sampled directions that reach the volume */
+  double farthest[3];               /* sampled direction farthest from supine, a unit vector */
+  double farthest_rms;              /* RMS distance of that direction from supine, mm */
 } supine_comparison;
 
 /* Compute all members after `postures`. Call supine_report_free in the end, also after failure. */
@@ -46,7 +46,7 @@ supine_status supine_report_find(supine_comparison *comparison, supine_error *er
 /* Free what supine_report_find allocated. */
 void supine_report_free(supine_comparison *comparison);
 
-/* Print the volume of all postures: "at rest" or "at rest + 300 mL". */
+/* Write the volume of all postures to `text`: "at rest" or "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
 /* Return the RMS distance of a direction of gravity from supine, mm; NaN if the lungs cannot reach

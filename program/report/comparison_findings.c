@@ -56,17 +56,17 @@ static void print_finding(const supine_comparison *c, size_t posture, FILE *to) 
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   double percent[SUPINE_LUNGS_MAX];
   double ml[SUPINE_LUNGS_MAX];
-  bool told[SUPINE_LUNGS_MAX] = {false};
+  bool done[SUPINE_LUNGS_MAX] = {false};
   print_where(c->postures.item[posture].name, to);
   find_changes(c, posture, percent, ml);
   for (size_t i = 0; i < info->lung_count; ++i) {
     size_t most = info->lung_count;
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
-      if (!told[lung] && (most == info->lung_count || fabs(ml[lung]) > fabs(ml[most]))) {
+      if (!done[lung] && (most == info->lung_count || fabs(ml[lung]) > fabs(ml[most]))) {
         most = lung;
       }
     }
-    told[most] = true;
+    done[most] = true;
     (void)fprintf(to, "%s the %s lung ", i > 0 ? ";" : "", info->lung_names[most]);
     if (fabs(percent[most]) < 1.5) {
       (void)fprintf(to, "keeps its volume (%+.0f %%)", percent[most]);

@@ -87,7 +87,7 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   (void)json_object_set_new(data, "postures", supine_report_postures(c));
   (void)json_object_set_new(data, "findings", supine_report_findings(c));
   (void)json_object_set_new(data, "lungs", lungs(c));
-  (void)json_object_set_new(data, "surface", json_string(c->reference.name));
+  (void)json_object_set_new(data, "reference", json_string(c->reference.name));
   (void)json_object_set_new(data, "map", supine_report_map(c));
   (void)json_object_set_new(data, "map_bar",
                             supine_report_bar(SUPINE_COLOURS_DIFFERENCE, c->farthest_rms, false,

@@ -56,7 +56,7 @@ static void print_postures(const supine_comparison *c, int width, FILE *file) {
 /* Print the share of each lung in the breath, mL. */
 static void print_gains(const supine_comparison *c, int width, FILE *file) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
-  (void)fprintf(file, "\nOf a breath of %.4g mL each lung takes, mL\n%-*s",
+  (void)fprintf(file, "\nShare of each lung in a breath of %.4g mL, mL\n%-*s",
                 supine_report_gain(c, 0), width, "posture");
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     (void)fprintf(file, " %6s lung", info->lung_names[lung]);
