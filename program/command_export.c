@@ -14,7 +14,7 @@ typedef struct request {
   const char *path;
   const char *title;
   supine_from from;
-  bool glb_only; /* set where an option was given that a page does not use */
+  bool glb_only; /* whether an option was given that only glTF has */
   const char *inside;
   export_glb_options glb;
 } request;
@@ -27,8 +27,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
     {"breath", 0, "ML",
-     "tidal volume of the breath played, and the largest for which the weights of morph targets "
-     "stay within 0 and 1",
+     "tidal volume of the breath played; up to it, the weights of morph targets stay within 0 and "
+     "1",
      SUPINE_FILLS(request, glb.breath), .standard = "500", SUPINE_ABOVE_ZERO,
      .wants = "millilitres above 0"},
     {.help = "For a page:"},
@@ -58,9 +58,11 @@ static supine_status write_glb(const export_source *source, const request *wante
   if (status != SUPINE_OK) {
     return status;
   }
-  (void)printf("%s: %zu lung%s with morph targets%s, %.2f MB\n", wanted->path,
+  const bool small = bytes < 100000;
+  (void)printf("%s: %zu lung%s with morph targets%s, %.*f %s\n", wanted->path,
                source->info->lung_count, source->info->lung_count == 1 ? "" : "s",
-               wanted->glb.animate ? " and animations" : "", 1e-6 * (double)bytes);
+               wanted->glb.animate ? " and animations" : "", small ? 0 : 2,
+               (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB");
   return SUPINE_OK;
 }
 
@@ -140,8 +142,8 @@ const supine_command supine_command_export = {
              "output's name selects it.",
     .options = table,
     .notes =
-        "In the .glb, each lung is a mesh with weights of its own; the file's extras say how they "
-        "follow from gravity and volume.\n"
+        "In a .glb file, each lung is a mesh with its own weights; the file's extras say how to "
+        "compute them from gravity and volume.\n"
         "\n"
         "Examples:\n"
         "  supine export lungs.safetensors -o lungs.html\n"

@@ -107,11 +107,10 @@ static supine_status read_turn(const char *text, void *field, supine_error *erro
 static const char *const themes[] = {"light", "dark", NULL};
 
 static const supine_option table[] = {
-    {"posture", 0, "LIST", "postures to draw, up to 8; --postures is the same",
-     SUPINE_FILLS(request, postures)},
+    {"posture", 0, "LIST", "postures to draw, up to 8", SUPINE_FILLS(request, postures)},
     {"turn", 0, "FROM:TO:SECONDS",
      "draw an animation instead: gravity turns from one posture to another at constant speed, "
-     "as supine:left:5s, rests for a second, and starts again",
+     "as supine:left:5s, stays for a second, and starts again",
      .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
@@ -139,7 +138,6 @@ static const supine_option table[] = {
      .more = true},
     {"theme", 0, "light|dark", "colours of the picture", SUPINE_FILLS(request, theme),
      .choices = themes, .standard = "light", .more = true},
-    {"title", 0, "TEXT", "heading of the picture", SUPINE_FILLS(request, title), .more = true},
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 

@@ -7,7 +7,7 @@
 #include "program/drawing.h"
 
 static const char name[] = "render";
-static const double seen_through = 0.35; /* default opacity of the lungs with --inside */
+static const double inside_opacity = 0.35; /* default opacity of the lungs with --inside */
 
 supine_status supine_command_studio_open(supine_command_studio *studio, supine_error *error) {
   supine_status status = supine_compare_create(studio->basis, &studio->compare, error);
@@ -77,7 +77,7 @@ supine_picture supine_command_drawing_picture(const supine_command_studio *studi
                                               char *label) {
   const supine_command_drawing *wanted = studio->wanted;
   const double opacity = wanted->opacity > 0.0    ? wanted->opacity
-                         : wanted->inside != NULL ? seen_through
+                         : wanted->inside != NULL ? inside_opacity
                                                   : 1.0;
   const double largest =
       wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(studio->ends[0]);
@@ -86,7 +86,6 @@ supine_picture supine_command_drawing_picture(const supine_command_studio *studi
                           .panel_count = count,
                           .view = wanted->view,
                           .view_count = wanted->view_count,
-                          .heading = wanted->title,
                           .bar_label = label,
                           .colours = SUPINE_COLOURS_DISPLACEMENT,
                           .largest = largest,

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Declare what still pictures and animations of 'supine render' share: options, states, pictures.
- */
+/* Draw the still pictures and animations of 'supine render'. */
 #ifndef SUPINE_COMMAND_DRAWING_H
 #define SUPINE_COMMAND_DRAWING_H
 
@@ -16,15 +15,14 @@ typedef struct supine_command_drawing {
   const char *output;
   const char *postures;
   supine_volume_options volume;
-  supine_from from; /* state that colours and displacements are measured from */
-  const char *title;
+  supine_from from;     /* state that colours and displacements are measured from */
   const char *inside;   /* file of --inside; NULL: none */
   double largest;       /* end of the colour bar, mm; 0: automatic */
   double opacity;       /* opacity of the lungs; 0: not given */
   size_t width, height; /* pixels; 0: automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
-  unsigned theme; /* 1: dark */
+  unsigned theme; /* 0: light; 1: dark */
   bool turns;
   breath_turn turn;
 } supine_command_drawing;
@@ -37,7 +35,8 @@ typedef struct supine_command_drawn {
   supine_command_marks marks;
 } supine_command_drawn;
 
-/* Objects needed for drawing. Set the first three, then open; close also after a failure. */
+/* Objects needed for drawing. Set the first three members, then open the studio; close it also
+ * after a failure. */
 typedef struct supine_command_studio {
   const supine_basis *basis;
   const supine_command_drawing *wanted;
@@ -72,7 +71,7 @@ supine_panel supine_command_drawn_panel(const supine_command_drawing *wanted,
                                         const supine_command_drawn *shown, const char *title,
                                         const double gravity[3]);
 
-/* Draw the turn as an animation. */
+/* Draw the turn as an animation, and write it. */
 supine_status supine_command_drawing_turn(supine_command_studio *studio, supine_error *error);
 
 /* Read "supine:left:10s", the value of --turn. Statuses as supine_option_reader. */

@@ -38,7 +38,7 @@ supine_status supine_command_read_turn(const char *value, breath_turn *turn, sup
 /* A turn being drawn. */
 typedef struct turning {
   supine_command_studio *studio;
-  size_t count; /* frames */
+  size_t count; /* number of frames */
   supine_command_drawn shown;
   supine_posture_item item;
   supine_panel panel;
@@ -67,7 +67,8 @@ static supine_picture make_picture(turning *t) {
   return picture;
 }
 
-/* Find the extents of colours and picture over the whole turn, so that they stay fixed. */
+/* Find the largest displacement and the extent of the picture over the whole turn, so that the
+ * colour bar and the scale stay fixed. */
 static supine_status measure(turning *t, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   supine_status status = SUPINE_OK;

@@ -520,7 +520,6 @@ TEST(test_render_options_change_the_picture) {
       "--volume scan+200",
       "--volume left=rest+100,right=rest+300",
       "--from prone:rest",
-      "--title Lungs",
       "--view anterior,posterior",
       "--view head,feet,oblique",
   };

@@ -26,7 +26,7 @@ typedef struct export_source {
 supine_status supine_export_source_open(const char *path, export_source *source,
                                         supine_error *error);
 
-/** Close it; a zeroed one is legal. */
+/** Close a source; a zeroed one is legal. */
 void supine_export_source_close(export_source *source);
 
 /** Extend the box from `low` to `high`, mm, to contain all vertices of the source. */
@@ -52,9 +52,9 @@ typedef struct export_parts {
 /** How to write glTF. */
 typedef struct export_glb_options {
   bool plain;    /**< float32 throughout, vertices in the basis' order; else positions as 16-bit
-                    counts of 0.045 mm (more for lungs beyond 1.4 m), within 0.1 mm of the library's,
-                    and normals as bytes (KHR_mesh_quantization), all in an order that compresses
-                    well (EXT_meshopt_compression) */
+                    counts of 0.045 mm (more for lungs beyond 1.4 m), within 0.1 mm of the library's
+                    for breaths of up to 500 mL, and normals as bytes (KHR_mesh_quantization), all
+                    in an order that compresses well (EXT_meshopt_compression) */
   bool animate;  /**< add an animation of breathing while the patient turns, and one of breathing in
                     each of the four lying postures */
   double breath; /**< tidal volume, mL, for which weights stay within 0 and 1 */
@@ -86,10 +86,10 @@ typedef struct export_page {
   double breath;           /**< tidal volume, mL */
   const supine_pose *from; /**< displacements are measured from this pose */
   const char *from_name;   /**< name of `from`, as "supine at rest" */
-  const char *title;
+  const char *title;       /**< UTF-8 */
   const export_source
       *inside; /**< content of the same lungs, a vector basis with the same modes; NULL: none */
-  const export_parts *parts; /**< names of the parts of `inside`; NULL without it */
+  const export_parts *parts; /**< names of the parts of `inside`; unused without it */
   bool live;                 /**< also show the states that the page's server sends (stream) */
 } export_page;
 

@@ -10,8 +10,7 @@
 #include "program/render/render.h"
 #include "sh/base/output.h"
 
-static const double step_mm = 0.045; /* smallest unit of quantized positions: they differ by up to
-                                    twice as much from the library's */
+static const double step_mm = 0.045; /* smallest unit of quantized positions */
 
 /* Compute the largest displacement of each vertex from supine over the lying postures, at rest, mm;
  * return the largest of all. glb.xyz and glb.normals are workspace. */

@@ -10,7 +10,7 @@
 #include "program/export/targets.h"
 
 /** Kinds of array. Unless the file is plain, positions and weights are stored as 16-bit integers
- * and normals as bytes, and those of meshes are compressed. */
+ * and normals as bytes, and arrays of meshes are compressed. */
 typedef enum glb_kind {
   GLB_CORNERS,  /**< uint32_t: vertex indices of triangles */
   GLB_PLACES,   /**< float [3]: positions or displacements in units of glb.step */
@@ -27,9 +27,9 @@ typedef struct glb {
   const export_source *source;
   const export_glb_options *options;
   export_targets targets;
-  export_order order; /**< of the vertices and triangles written */
+  export_order order; /**< order in which vertices and triangles are written */
   float *xyz;         /**< [N, 3] workspace */
-  float *normals;     /**< [N, 3] of the base */
+  float *normals;     /**< [N, 3] unit normals of the base mesh */
   float *added;       /**< [targets, N, 3] what targets add to normals */
   uint8_t *colours;   /**< [N, 4] RGBA */
   double step;        /**< unit of GLB_PLACES, mm; 1 in plain files */
@@ -40,7 +40,7 @@ typedef struct glb {
 } glb;
 
 /** Append an array of `count` rows and return its accessor's index.
- * @param order  [count] index in `rows` of each row; NULL: as they are */
+ * @param order  [count] index in `rows` of each row to write; NULL: 0, 1, 2, ... */
 json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
                                  size_t count);
 
@@ -49,7 +49,7 @@ json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 
 /** Append a mesh and a node that shows it; return the node's index. The mesh is in units of
  * glb.step, LPS, from the centre of the lungs; the node converts it to metres, y up.
- * @param mesh  the function takes ownership */
+ * @param mesh  the file takes ownership */
 json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
 
 /** Append the mesh of a lung, with morph targets; return its node's index. */

@@ -7,7 +7,7 @@
 #include "program/export/glb.h"
 
 static const double pi = 3.14159265358979323846;
-enum { RATE = 6, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
+enum { RATE = 6 /* frames per second */, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
 
 /* Gravity in the body is (sin t, cos t, 0) at roll t. In glTF's axes the patient turns by t about
  * y, the body's long axis, then by -90 degrees about x to lie down. */
@@ -35,7 +35,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
   double weights[EXPORT_TARGETS_MAX];
   supine_pose pose;
-  /* This succeeds: supine_export_targets_choose posed directions all around at both ends. */
+  /* This succeeds: supine_export_targets_choose has posed all directions at both ends. */
   (void)supine_export_breath_pose(g->source, g->options->breath, gravity, fraction, &pose, NULL);
   for (size_t i = 0; i < g->source->info->lung_count; ++i) {
     supine_export_targets_weights(g->source, &g->targets, &pose, i, weights);

@@ -8,7 +8,7 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-enum { FORMS_MAX = 32 }; /* with more targets, the volume forms would be larger than the mesh */
+enum { FORMS_MAX = 32 }; /* most targets with volume forms: more would be larger than the mesh */
 
 static const char frame_text[] =
     "Meshes of lungs are in the patient's axes, LPS (x left, y back, z head), from 'middle', mm: "
@@ -73,7 +73,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double largest_move) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* of modes: integers take half the space of printed fractions */
+  const double unit = 1e-7; /* modes are stored in it: integers need half the text of fractions */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();

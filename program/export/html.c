@@ -23,7 +23,7 @@ typedef struct page {
   double place_unit;  /* mm per count of a position */
   double unit;        /* mm per count of a coefficient, for directions of unit length */
   double inside_unit; /* mm per count of a coefficient of the content */
-  export_order order; /* of the lungs' vertices and triangles */
+  export_order order; /* order in which the lungs' vertices and triangles are written */
   supine_status *status;
 } page;
 
@@ -83,8 +83,8 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* Return a number of `bits` bits and a sign in steps of 1 << shift, plus NORMAL_BIAS: numbers near
- * 0 then have the same high byte, which compresses well. */
+/* Round a number of `bits` bits and a sign to steps of 1 << shift; return the steps plus
+ * NORMAL_BIAS: numbers near 0 then have the same high byte, which compresses well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
   const int32_t steps = (number + (1 << shift) / 2) >> shift;
@@ -165,7 +165,7 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* Write those tensors of doubles that the basis has, uncompressed. */
+/* Write the tensors of doubles uncompressed; skip those that the basis lacks. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -200,7 +200,7 @@ static json_t *colours(void) {
   return maps;
 }
 
-/* Return `begin`, [lungs + 1], as JSON: where each lung begins among vertices or corners. */
+/* Return `begin` as JSON: [lungs + 1] index of each lung's first vertex or corner, and the end. */
 static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
   for (size_t i = 0; i <= s->info->lung_count; ++i) {
@@ -316,9 +316,9 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
     return supine_error_set(
         error, SUPINE_ERROR_UNSUPPORTED,
         "a page shows scalar bases of up to %d modes; this is a %s basis of %zu "
-        "mode%s: precompute it with --modes %d, or export .glb",
+        "mode%s: %sexport .glb",
         EXPORT_PAGE_MODES_MAX, info->vector ? "vector" : "scalar", info->mode_count,
-        info->mode_count == 1 ? "" : "s", EXPORT_PAGE_MODES_MAX);
+        info->mode_count == 1 ? "" : "s", info->vector ? "" : "precompute it with --modes 16, or ");
   }
   supine_status status = supine_export_pack_begin(error);
   page p = {.source = source, .shown = shown, .status = &status};

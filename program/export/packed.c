@@ -64,8 +64,8 @@ static void sort_triangles(uint32_t *corners, size_t count, const float *level, 
   meshopt.optimizeVertexCacheStrip(corners, corners, count, vertices);
 }
 
-/* Number the vertices of a lung by their first corner, those in no triangle last, and its corners
- * likewise. `place` is workspace, [N]. */
+/* Number the vertices of a lung in the order in which its corners first use them, unused vertices
+ * last, and renumber the corners. `place` is workspace, [N]. */
 static void number_vertices(const export_source *source, size_t lung, uint32_t *place,
                             export_order *order) {
   const size_t *begin = source->info->lung_begin + lung;

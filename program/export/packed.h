@@ -17,7 +17,7 @@ typedef struct export_packed {
 supine_status supine_export_pack_begin(supine_error *error);
 
 /** Encode a unit vector for the decoder's filter OCTAHEDRAL as 4 signed integers; the last is 0.
- * @param size     of the 4 integers together, bytes: 4 or 8
+ * @param size     size of the 4 integers together, bytes: 4 or 8
  * @param numbers  [size] bytes; output */
 void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
 

@@ -7,8 +7,8 @@
 
 #include "sh/base/vec3.h"
 
-enum { DIRECTIONS = 4096 };
-/* Share of each range that is added at both ends, for directions between those sampled. */
+enum { DIRECTIONS = 4096 }; /* directions of gravity sampled */
+/* Fraction of each range that is added at both ends, for directions between the samples. */
 static const double margin = 0.02;
 
 /* Find s and t of gains s + t bend, from the axes that bend least and most. */
@@ -173,9 +173,9 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
-/* Round what targets add to normals to bytes, and keep the value of the vertex written before where
- * that is near, because equal rows compress to nearly nothing; correct the base so that the normals
- * at `weights` stay the same. */
+/* Round what targets add to normals to bytes, or to the value of the vertex written before if that
+ * is near, because equal rows compress to nearly nothing; correct the base so that the normals at
+ * `weights` stay the same. */
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
@@ -206,8 +206,8 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
-  static const double step = 0.2;
-  static const double least = 0.044; /* radians, 2.5 degrees */
+  static const double step = 0.2;    /* of a weight, for central differences */
+  static const double least = 0.044; /* smallest RMS change that is kept: 2.5 degrees */
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

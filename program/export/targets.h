@@ -24,8 +24,8 @@ typedef struct export_weights {
 
 typedef struct export_targets {
   size_t count;     /**< K or 2 K */
-  double middle[3]; /**< of the box of the vertices, mm */
-  double reach;     /**< half of its longest edge, mm */
+  double middle[3]; /**< centre of the box of the vertices, mm */
+  double reach;     /**< half of the longest edge of the box, mm */
   export_weights lung[SUPINE_LUNGS_MAX];
 } export_targets;
 
@@ -41,7 +41,7 @@ void supine_export_targets_weights(const export_source *source, const export_tar
 /** Compute the displacement of field `j` at a vertex, mm. */
 void supine_export_targets_field(const export_source *source, size_t vertex, size_t j, double u[3]);
 
-/** Compute a vertex of the base, mm from the middle. */
+/** Compute a vertex of the base mesh, mm from the middle. */
 void supine_export_targets_base(const export_source *source, const export_targets *targets,
                                 size_t lung, size_t vertex, double xyz[3]);
 

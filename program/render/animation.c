@@ -29,8 +29,8 @@ supine_status supine_render_animation_open(size_t width, size_t height,
   }
   supine_animation *made = calloc(1, sizeof *made);
   if (made != NULL && WebPAnimEncoderOptionsInit(&options) && WebPConfigInit(&made->config)) {
-    options.kmax =
-        1; /* key frames only: differences between lossy frames add up to visible steps of colour */
+    /* Use key frames only: differences between lossy frames add up to visible steps of colour. */
+    options.kmax = 1;
     made->config.quality = quality;
     made->config.method = EFFORT;
     made->width = width;

@@ -52,7 +52,7 @@ typedef struct corner {
 struct supine_renderer {
   const supine_basis *basis;
   const supine_basis_info *info;
-  float *scratch;  /* [N, 6]: positions, normals */
+  float *scratch;  /* [2, N, 3] positions, mm, and unit normals */
   corner *corners; /* [N] */
 };
 
@@ -178,7 +178,7 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 
 /* Data shared by the drawing threads. */
 typedef struct canvas {
-  const supine_renderer *renderer;
+  supine_renderer *renderer;
   const supine_scene *scene;
   size_t width, height;             /* samples */
   uint32_t *nearest;                /* [height, width] triangle nearest to the viewer, or NOTHING */
@@ -189,12 +189,12 @@ typedef struct canvas {
 } canvas;
 
 static void find_corners(const canvas *c) {
-  const supine_renderer *r = c->renderer;
+  supine_renderer *r = c->renderer;
   const camera cam = find_camera(r, c->scene);
   const double size[2] = {(double)c->width, (double)c->height};
   const double near = cam.away - depth_in_radii * cam.radius;
   double frame[4];
-  find_frame((supine_renderer *)(uintptr_t)r, c->scene, frame);
+  find_frame(r, c->scene, frame);
   supine_deform(r->basis, c->scene->pose, r->scratch);
   const float *normals = r->scratch + 3 * r->info->vertex_count;
   supine_normals(r->basis, r->scratch, r->scratch + 3 * r->info->vertex_count);
@@ -301,7 +301,7 @@ static float value_at(const face *f, float x, float y) {
          nearness_at(f, share);
 }
 
-/* Return the coverage by contour lines at a sample, 0 to 1, as in contour.glsl. */
+/* Return the coverage by contour lines at a sample, 0 to 1, much as contour.glsl does. */
 static float contour(const face *f, float x, float y, float value, float spacing) {
   const float steps = value / spacing;
   const float width =

@@ -59,7 +59,6 @@ static const double accent[3] = {0.91, 0.33, 0.17}; /* colour of the arrow of gr
 typedef struct layout {
   double font;
   double margin;
-  double top; /* y of the first cells, below the heading */
   double cell_width, cell_height;
   double strip; /* height of the head of a cell, above its lungs */
   double bar;   /* height of the foot, which holds the colour bar */
@@ -112,10 +111,10 @@ static void rounded(cairo_t *cr, double x, double y, double width, double height
   cairo.close_path(cr);
 }
 
-static void ground(cairo_t *cr, const supine_picture *picture, const theme *look) {
+static void ground(cairo_t *cr, const supine_picture *picture, const theme *style) {
   cairo_pattern_t *fade = cairo.pattern_create_linear(0, 0, 0, (double)picture->height);
-  cairo.pattern_add_color_stop_rgb(fade, 0, look->top[0], look->top[1], look->top[2]);
-  cairo.pattern_add_color_stop_rgb(fade, 1, look->bottom[0], look->bottom[1], look->bottom[2]);
+  cairo.pattern_add_color_stop_rgb(fade, 0, style->top[0], style->top[1], style->top[2]);
+  cairo.pattern_add_color_stop_rgb(fade, 1, style->bottom[0], style->bottom[1], style->bottom[2]);
   cairo.set_source(cr, fade);
   cairo.paint(cr);
   cairo.pattern_destroy(fade);
@@ -162,15 +161,15 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
 
 /* Draw the ball that shows the body's axes and gravity. */
 static void ball(cairo_t *cr, double x, double y, double radius, supine_view view,
-                 const double gravity[3], const theme *look) {
+                 const double gravity[3], const theme *style) {
   static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
   double axes[3][3];
   double seen[3] = {0, 0, 0};
   supine_render_view_axes(view, axes);
   cairo.arc(cr, x, y, radius, 0, 2 * pi);
-  cairo.set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.13);
+  cairo.set_source_rgba(cr, style->faint[0], style->faint[1], style->faint[2], 0.13);
   cairo.fill_preserve(cr);
-  cairo.set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.5);
+  cairo.set_source_rgba(cr, style->faint[0], style->faint[1], style->faint[2], 0.5);
   cairo.set_line_width(cr, fmax(0.6, radius * 0.035));
   cairo.stroke(cr);
   font(cr, radius * 0.4, false);
@@ -183,21 +182,21 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
     if (hypot(dx, dy) < 0.3) {
       continue;
     }
-    cairo.set_source_rgba(cr, look->faint[0], look->faint[1], look->faint[2], 0.45);
+    cairo.set_source_rgba(cr, style->faint[0], style->faint[1], style->faint[2], 0.45);
     cairo.move_to(cr, x - 0.62 * radius * dx, y - 0.62 * radius * dy);
     cairo.line_to(cr, x + 0.62 * radius * dx, y + 0.62 * radius * dy);
     cairo.stroke(cr);
     for (int end = 0; end < 2; ++end) {
       const double reach = (end == 0 ? 0.8 : -0.8) * radius;
-      cairo.set_source_rgba(cr, look->text[0], look->text[1], look->text[2], 0.8);
+      cairo.set_source_rgba(cr, style->text[0], style->text[1], style->text[2], 0.8);
       text(cr, x + reach * dx, y + reach * dy + 0.145 * radius, 0.5, ends[axis][end]);
     }
   }
   gravity_arrow(cr, x, y, radius * 0.66, seen);
 }
 
-/* Move the name `count` down until it overlaps none of those before it. `box` holds the left end,
- * the baseline and the width of each name, pixels. */
+/* Move name `count` down until it overlaps no name before it. `box` holds the left end, the
+ * baseline and the width of each name, pixels. */
 static void place_name(double (*box)[3], size_t count, double line) {
   double *own = box[count];
   for (size_t i = 0; i < count; ++i) {
@@ -213,7 +212,7 @@ static void place_name(double (*box)[3], size_t count, double line) {
  * where: the scene lies at (x, y), and `size` is that of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y,
-                                const theme *look) {
+                                const theme *style) {
   double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
   double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
   size_t placed = 0;
@@ -238,7 +237,7 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
         colour(cr, rgb);
         cairo.fill_preserve(cr);
         cairo.set_line_width(cr, size * 0.1);
-        colour(cr, mark->point ? look->text : rgb);
+        colour(cr, mark->point ? style->text : rgb);
         cairo.stroke(cr);
         continue;
       }
@@ -250,10 +249,10 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
       place_name(box, placed++, size);
       cairo.move_to(cr, x + own[0], y + own[1]);
       cairo.text_path(cr, mark->label);
-      cairo.set_source_rgba(cr, look->card[0], look->card[1], look->card[2], 0.85);
+      cairo.set_source_rgba(cr, style->card[0], style->card[1], style->card[2], 0.85);
       cairo.set_line_width(cr, size * 0.25);
       cairo.stroke_preserve(cr);
-      colour(cr, look->text);
+      colour(cr, style->text);
       cairo.fill(cr);
     }
   }
@@ -315,27 +314,27 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
-  const theme *look = &themes[picture->dark ? 1 : 0];
+  const theme *style = &themes[picture->dark ? 1 : 0];
   const supine_panel *panel = &picture->panel[column];
   const supine_view view = picture->view[row];
   const double gap = at->margin / 2;
   const double x = at->margin + (double)column * (at->cell_width + gap);
-  const double y = at->top + (double)row * (at->cell_height + gap);
+  const double y = at->margin + (double)row * (at->cell_height + gap);
   const double radius = at->strip * 0.4;
   const double words = x + 2 * radius + at->font * 1.5;
   const double room = x + at->cell_width - words - at->font;
   rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
-  colour(cr, look->card);
+  colour(cr, style->card);
   cairo.fill_preserve(cr);
-  colour(cr, look->edge);
+  colour(cr, style->edge);
   cairo.set_line_width(cr, 1);
   cairo.stroke(cr);
   ball(cr, x + radius + at->font * 0.7, y + at->strip / 2 + at->font * 0.2, radius, view,
-       panel->gravity, look);
-  colour(cr, look->text);
+       panel->gravity, style);
+  colour(cr, style->text);
   fitted_text(cr, words, y + at->strip / 2 - at->font * 0.25, at->font * 1.3, true, room,
               panel->title);
-  colour(cr, look->faint);
+  colour(cr, style->faint);
   fitted_text(cr, words, y + at->strip / 2 + at->font * 0.95, at->font * 0.82, false, room,
               panel->subtitle);
   fitted_text(cr, words, y + at->strip / 2 + at->font * 2.0, at->font * 0.82, false, room,
@@ -348,7 +347,7 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
 static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
                        const bar_scale *bar) {
   enum { STOPS = 64 };
-  const theme *look = &themes[picture->dark ? 1 : 0];
+  const theme *style = &themes[picture->dark ? 1 : 0];
   const double width = fmin((double)picture->width - 2 * at->margin, 34 * at->font);
   const double x = ((double)picture->width - width) / 2;
   const double y = (double)picture->height - at->bar + at->font * 1.65;
@@ -369,9 +368,9 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
   cairo.fill(cr);
   cairo.pattern_destroy(fade);
   font(cr, at->font * 0.85, false);
-  colour(cr, look->text);
+  colour(cr, style->text);
   text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
-  colour(cr, look->faint);
+  colour(cr, style->faint);
   cairo.set_line_width(cr, 1);
   for (int i = 0; i * bar->step <= bar->largest * (1 + 1e-9); ++i) {
     char number[32];
@@ -392,13 +391,12 @@ static layout make_layout(const supine_picture *picture) {
       fmin(width / (double)picture->panel_count / 19, height / (double)picture->view_count / 24);
   at.font = fmin(28, at.font);
   at.margin = at.font * 0.9;
-  at.top = at.margin + (picture->heading != NULL ? at.font * 2.4 : 0);
   at.strip = at.font * 5.2;
   at.bar = at.font * 4.6;
   const double gap = at.margin / 2;
   at.cell_width = (width - 2 * at.margin - gap * (double)(picture->panel_count - 1)) /
                   (double)picture->panel_count;
-  at.cell_height = (height - at.top - at.bar - gap * (double)(picture->view_count - 1)) /
+  at.cell_height = (height - at.margin - at.bar - gap * (double)(picture->view_count - 1)) /
                    (double)picture->view_count;
   return at;
 }
@@ -421,23 +419,19 @@ void supine_render_picture_extent(supine_renderer *renderer, const supine_pictur
 
 static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                              supine_error *error) {
-  const theme *look = &themes[picture->dark ? 1 : 0];
+  const theme *style = &themes[picture->dark ? 1 : 0];
   const layout at = make_layout(picture);
   const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
   supine_status status = SUPINE_OK;
   if (at.font < 4) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu x %zu pixels are too few for %zu postures and %zu "
-                            "views: give a larger --size",
+                            "%zu x %zu pixels are too few for %zu posture%s and %zu view%s: give "
+                            "a larger --size",
                             picture->width, picture->height, picture->panel_count,
-                            picture->view_count);
+                            picture->panel_count == 1 ? "" : "s", picture->view_count,
+                            picture->view_count == 1 ? "" : "s");
   }
-  ground(cr, picture, look);
-  if (picture->heading != NULL) {
-    colour(cr, look->text);
-    fitted_text(cr, at.margin * 1.2, at.margin + at.font * 1.5, at.font * 1.5, true,
-                (double)picture->width - 2.4 * at.margin, picture->heading);
-  }
+  ground(cr, picture, style);
   for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
     double extent[4] = SUPINE_EXTENT_NONE;
     if (picture->extent != NULL) {

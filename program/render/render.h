@@ -62,7 +62,7 @@ typedef struct supine_scene {
   const supine_pose *pose;
   const float *value; /**< [N] values that colours show, mm */
   double largest;     /**< value at the end of the colours, mm, > 0 */
-  double line_step;   /**< distance of contour lines, mm; 0: none */
+  double line_step;   /**< distance between contour lines, mm; 0: none */
   supine_colours colours;
   supine_view view;
   bool dark;            /**< shade for a dark background */
@@ -125,8 +125,7 @@ typedef struct supine_picture {
   const supine_panel *panel;
   size_t panel_count; /**< 1 to SUPINE_PANELS_MAX */
   const supine_view *view;
-  size_t view_count;   /**< 1 to SUPINE_VIEWS_MAX */
-  const char *heading; /**< or NULL */
+  size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
   double largest;            /**< value at the end of the colours, mm */
   double transparency;       /**< of the lungs, 0 to 1 */
@@ -138,8 +137,8 @@ typedef struct supine_picture {
   size_t width, height; /**< pixels */
 } supine_picture;
 
-/** Return the distance of the ticks on a colour bar: a round number that fits 4 to 10 times into
- * `value`. */
+/** Return the distance between the ticks of a colour bar: a round number that fits 4 to 10 times
+ * into `value`. */
 double supine_render_bar_step(double value);
 /** Return the end of a colour bar: `value`, below which most values lie, rounded up to a tick. */
 double supine_render_bar_end(double value);
