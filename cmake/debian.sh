@@ -45,7 +45,7 @@ demo)
   exec sh cmake/demo.sh build/release/supine demo
   ;;
 build | test)
-  # What exported files are opened with: another node or browser that is there serves as well.
+  # Tests open exported files in node and Chromium; use those on PATH if there are any.
   command -v npm >/dev/null || tests="$tests nodejs npm"
   command -v chromium >/dev/null || tests="$tests chromium"
   # shellcheck disable=SC2086

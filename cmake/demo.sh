@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Makes lungs, precomputes their basis and deforms them: demo.sh PROGRAM FOLDER
+# Make synthetic lungs, precompute their basis and deform them: demo.sh PROGRAM FOLDER
 set -eu
 supine=$1
 folder=$2

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Files as an array in C: cmake -D OUTPUT=assets.c -D ARRAY=name -D FILES=a;b -D SOURCES=c;d -P embed.cmake
-# Each becomes an entry {name, bytes, size} of ARRAY, in the order given. Every {{name}} in a .html
-# among them must be another of the files, or stand as "name" in one of the sources that fill it.
+# Embed files as an array in C: cmake -D OUTPUT=assets.c -D ARRAY=name -D FILES=a;b -D SOURCES=c;d -P embed.cmake
+# Each becomes an entry {name, bytes, size} of ARRAY, in the order given. Every {{name}} in an .html file must be
+# the name of another file, or occur as "name" in one of SOURCES.
 set(known "")
 foreach(path IN LISTS FILES)
   get_filename_component(name "${path}" NAME)

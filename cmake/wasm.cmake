@@ -8,8 +8,8 @@ set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR wasm32)
 set(CMAKE_C_COMPILER clang)
 set(CMAKE_C_COMPILER_TARGET wasm32-wasi)
-set(CMAKE_C_FLAGS_INIT -mbulk-memory) # as old as 128-bit vectors, which the kernel has
+set(CMAKE_C_FLAGS_INIT -mbulk-memory) # every browser with 128-bit vectors, which the kernel uses, has it
 set(CMAKE_C_FLAGS_MINSIZEREL "-Oz -DNDEBUG" CACHE STRING "")
-set(CMAKE_SYSROOT /usr) # whose include/wasm32-wasi and lib/wasm32-wasi clang takes
-# xxhash.h, a header alone, is the host's.
+set(CMAKE_SYSROOT /usr) # clang searches its include/wasm32-wasi and lib/wasm32-wasi
+# xxhash.h contains the whole implementation, so the host's serves.
 set(SUPINE_XXHASH_HEADER /usr/include/xxhash.h CACHE FILEPATH "xxhash.h")

@@ -9,5 +9,5 @@ set(CMAKE_FIND_ROOT_PATH /usr/x86_64-w64-mingw32)
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
-# xxhash.h, a header alone, is the host's.
+# xxhash.h contains the whole implementation, so the host's serves.
 set(SUPINE_XXHASH_HEADER /usr/include/xxhash.h CACHE FILEPATH "xxhash.h")

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A BIDS App's front: lungs of a dataset to bases, comparisons and one page of them all.
+"""BIDS App: make bases and comparisons of all lungs of a dataset, and one page of all subjects.
 
     bids.py BIDS_DIR OUTPUT_DIR participant [--participant_label LABEL...] [-- PRECOMPUTE OPTIONS]
     bids.py BIDS_DIR OUTPUT_DIR group
 
-A subject's lungs are what lies anywhere in its folder sub-LABEL: label maps (*_dseg.nii.gz), masks
-(*_mask.nii.gz) or surfaces (*_mesh.ply, .stl, .obj, .off), the first kind that is there; several are parts of
-one model. Each subject leaves sub-LABEL/basis.safetensors, report.html and result.json; a subject that
-fails is named on the group's page and stops nobody. The program is $SUPINE, or supine."""
+A subject's lungs are found anywhere in its folder sub-LABEL: label maps (*_dseg.nii.gz), else masks
+(*_mask.nii.gz), else surfaces (*_mesh.ply, .stl, .obj, .off); several files make one model. For each subject,
+write sub-LABEL/basis.safetensors, report.html and result.json; a subject that fails is named on the page of
+the group and does not stop the others. The program is $SUPINE, or supine."""
 import argparse
 import json
 import os
@@ -30,7 +30,7 @@ def lungs_of(folder):
 
 
 def describe(output):
-    """What makes the output a derivative dataset of its own."""
+    """Write dataset_description.json, which makes the output a derivative dataset."""
     output.mkdir(parents=True, exist_ok=True)
     program = os.environ.get("SUPINE", "supine")
     said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
@@ -47,7 +47,7 @@ def participant(dataset, output, labels, options):
     if not folders:
         sys.exit(f"{dataset}: no folder sub-*")
     for folder in folders:
-        # Without lungs, the subject's own failure says so.
+        # Without lungs, give a missing file, so that the subject's result names it.
         meshes = lungs_of(folder) or [str(folder / "*_dseg.nii.gz")]
         subprocess.run([sys.executable, HERE / "subject.py", output / folder.name / "result.json",
                         "rest", "yes", " ".join(options), *meshes], check=True)

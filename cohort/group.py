@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All subjects in one table and one page: volumes, moves, outliers, failures.
+"""Write one table and one page of all subjects: volumes, displacements, outliers, failures.
 
     python3 group.py GROUP.csv GROUP.html RESULT.json...
 
@@ -16,7 +16,7 @@ TO_SIGMA = 1.4826  # of a median absolute deviation, for normal numbers
 
 
 def numbers(result):
-    """The columns of one subject, in order."""
+    """Return the columns of one subject, in order."""
     info, comparison = result["info"], result["comparison"]
     found = {"vertices": info["vertices"], "error_rms_percent": info["error"].get("rms_percent")}
     lungs = info["lungs"].split(",")
@@ -30,7 +30,7 @@ def numbers(result):
 
 
 def outliers(column):
-    """Which of a column's numbers stand apart."""
+    """Return whether each number of a column is an outlier."""
     known = [x for x in column if x is not None]
     if len(known) < 5:
         return [False] * len(column)
@@ -66,7 +66,7 @@ thead th {{ vertical-align: bottom; }} tbody th {{ text-align: left; white-space
 <h1>{len(subjects) + len(failures)} subjects: {len(subjects)} done, {len(failures)} failed</h1>
 {'<h2>Failed</h2><ul>' + failed + '</ul>' if failures else ''}
 <h2>Results</h2>
-<p>{strange} with a number that stands apart (shaded: farther from the median than {LIMIT} times
+<p>{strange} with an outlier (shaded: farther from the median than {LIMIT} times
 {TO_SIGMA} median absolute deviations); {warned} with a warning (the last column).</p>
 <div><table><thead><tr><th></th>{head}<th>warnings</th></tr></thead><tbody>
 {body}</tbody></table></div></body></html>
@@ -80,7 +80,7 @@ def main(table_path, page_path, *paths):
             results.append(json.load(file))
     names = [r["subject"] for r in results]
     if len(set(names)) < len(names):
-        sys.exit(f"given twice: {', '.join(sorted({n for n in names if names.count(n) > 1}))}")
+        sys.exit(f"results given twice: {', '.join(sorted({n for n in names if names.count(n) > 1}))}")
     failures = [(r["subject"], r["failure"]) for r in results if "failure" in r]
     done = [r for r in results if "failure" not in r]
     rows = [numbers(r) for r in done]

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One subject: basis, comparison, and what came of it.
+"""Make the basis and the comparison of one subject, and record the results or the failure.
 
     python3 subject.py FOLDER/result.json VOLUME yes|no 'PRECOMPUTE OPTIONS' MESH...
 
-Leaves basis.safetensors, report.html and result.json in the folder. A subject's own failure (bad
-input, impossible numbers) is a result too, with the program's message; a full disk is not: it ends
-with the program's exit code, so that the subject is done again. The program is $SUPINE."""
+Write basis.safetensors, report.html (if yes) and result.json into the folder. A failure of the subject (bad
+input, impossible numbers) is recorded in result.json with the program's message. If an output cannot be
+written or a signal ends the program, exit with 1, so that the subject is computed again. The program is
+$SUPINE, or supine."""
 import json
 import os
 import shlex

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Completions for bash and zsh, from the commands' tables: write_completions FOLDER writes
- * FOLDER/supine.bash and FOLDER/_supine. */
+/* Write completions for bash and zsh from the commands' tables of options, as FOLDER/supine.bash
+ * and FOLDER/_supine:
+ *
+ *     write_completions FOLDER */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +11,7 @@
 
 #include "program/options/command.h"
 
-/* Write FOLDER/NAME by `write`; end the program where that fails. */
+/* Write FOLDER/NAME by `write`; end the program if that fails. */
 static void write_file(void (*write)(FILE *file), const char *folder, const char *name) {
   char path[4096];
   supine_output output;
@@ -36,7 +38,8 @@ static void bash_words(const supine_option *option, FILE *file) {
   }
 }
 
-/* What follows an option: its choices, a file, or nothing that could be guessed. */
+/* Write the case that completes an option's value in bash: its choices, names of files, or nothing.
+ */
 static void bash_value(void *given, const supine_option *option, size_t base) {
   const context *c = given;
   (void)base;
@@ -98,7 +101,8 @@ static void write_bash(FILE *file) {
               file);
 }
 
-/* Text within zsh's '...[...]...': its own signs left out, up to the first end of a thought. */
+/* Write a text within zsh's '...[...]...': up to the first of ; : . or the end of the line, with a
+ * space for each character that zsh would interpret. */
 static void zsh_text(const char *text, FILE *file) {
   const size_t length = strcspn(text, ";:\n.");
   for (size_t i = 0; i < length; ++i) {

@@ -1,13 +1,13 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Make a manual page of every command from its --help-all: manual.sh PROGRAM FOLDER VERSION. Wants help2man.
+# Make a manual page of every command from its --help-all: manual.sh PROGRAM FOLDER VERSION. Needs help2man.
 set -eu
 mkdir -p "$2"
 out=$(cd "$2" && pwd)
 cd "$(dirname "$1")"
 program=./$(basename "$1")
 
-# page COMMAND SUMMARY: the page of a command, or of the program where COMMAND is empty.
+# page COMMAND SUMMARY VERSION: make the page of a command, or of the program if COMMAND is empty.
 page() {
   name=supine${1:+-$1}
   help2man --no-info --name="$2" --version-string="$3" --no-discard-stderr --help-option="${1:+$1 }--help${1:+-all}" \

@@ -25,11 +25,10 @@ if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
   # All sources of the build; the source that defines supine_error_set does not get analyse.h.
   {
     sed -n 's|^ *"file": "\(.*\)",*$|\1|p' build/clang/compile_commands.json | sort -u |
-      grep -E "^$PWD/(sh|mesh|precompute|runtime|supine)[/.]" | grep -v '/sh/base/status\.c$' |
+      grep -E "^$PWD/(sh|mesh|precompute|runtime|program|packaging)/" | grep -v '/sh/base/status\.c$' |
       xargs -P "$(nproc)" -n 4 clang-tidy --quiet -p build/clang --extra-arg=-include \
         --extra-arg="$PWD/tests/analyse.h"
     clang-tidy --quiet -p build/clang sh/base/status.c
-    clang-tidy --quiet runtime/python/*.c -- -I. -Iruntime/include $(python3-config --includes)
   } 2>/dev/null | grep -E ': (warning|error): ' | sort -u |
     awk -v root="$PWD/" 'NR == FNR { known[$1]; next }
       {

@@ -2,8 +2,8 @@
 supine_test(export_glb runtime_fixture supine_commands PkgConfig::JANSSON supine_gsl)
 supine_test(export_html runtime_fixture supine_commands supine_gsl ${MESHOPT_LINK_LIBRARIES})
 
-# Exported files in other programs, against the C evaluator: needs node and npm's packages in tests/export (npm
-# install there), and Chromium for the page; skipped if they are missing.
+# Open exported files in other programs and compare with the C evaluator. Needs node, the packages of
+# tests/export/package.json (npm install in that folder), and Chromium for the page; skipped if they are missing.
 add_executable(export_positions export/positions.c)
 target_link_libraries(export_positions PRIVATE supine_build supine_runtime)
 find_program(NODE_PROGRAM NAMES node nodejs)

@@ -4,7 +4,8 @@
     python3 house.py SOURCE_FOLDER BUILD_FOLDER
 
 Each row of the table names a folder, says what it is for and lists the folders above it in the table
-that its files may include from; what those may use, it may use too. So includes form no circle."""
+that its files may include from. It may also use what those may use. So includes between folders form no circle.
+Check also the names and the cycles of files, and the sizes of functions."""
 import os
 import re
 import subprocess
@@ -24,7 +25,7 @@ PUBLIC = ("runtime/include/supine",)
 
 
 def read_table():
-    rooms = {}
+    folders = {}
     with open(os.path.join(source, "ARCHITECTURE.md"), encoding="utf-8") as readme:
         table = re.findall(r"^\| `(?:sh|mesh|precompute|runtime|program)[a-z/]*`.*$", readme.read(), re.M)
     rows = []
@@ -34,16 +35,16 @@ def read_table():
             faults.append(f"ARCHITECTURE.md: no row of three cells: {line}")
         else:
             rows.append(row.groups())
-    for room, what, uses in rows:
+    for folder, what, uses in rows:
         if not what.strip():
-            faults.append(f"ARCHITECTURE.md does not say what {room} is")
-        rooms[room] = set()
+            faults.append(f"ARCHITECTURE.md does not say what {folder} is")
+        folders[folder] = set()
         for used in re.findall(r"`([a-z/]+)`", uses):
-            if used == room or used not in rooms:
-                faults.append(f"ARCHITECTURE.md: {room} may use only rooms above it, not {used}")
+            if used == folder or used not in folders:
+                faults.append(f"ARCHITECTURE.md: {folder} may use only folders above it, not {used}")
             else:
-                rooms[room] |= {used} | rooms[used]
-    return rooms
+                folders[folder] |= {used} | folders[used]
+    return folders
 
 
 def tracked():
@@ -61,19 +62,19 @@ def included(file):
     """Return the folders that a file includes from."""
     with open(os.path.join(source, file), encoding="utf-8") as text:
         for name in re.findall(r'^#\s*include\s+[<"]([^>"]+)[>"]', text.read(), re.M):
-            for path in [name] + [f"{room[:-len('/supine')]}/{name}" for room in PUBLIC]:
+            for path in [name] + [f"{folder[:-len('/supine')]}/{name}" for folder in PUBLIC]:
                 if os.path.exists(os.path.join(source, path)):
                     yield os.path.dirname(path), name
 
 
-def check_includes(rooms, files):
-    for room in sorted({os.path.dirname(f) for f in files} - set(rooms)):
-        faults.append(f"ARCHITECTURE.md's table lacks the room {room}")
+def check_includes(folders, files):
+    for folder in sorted({os.path.dirname(f) for f in files} - set(folders)):
+        faults.append(f"ARCHITECTURE.md's table lacks the folder {folder}")
     for file in files:
-        room = os.path.dirname(file)
+        folder = os.path.dirname(file)
         for used, name in included(file):
-            if room in rooms and used != room and used not in rooms[room]:
-                faults.append(f"{file} includes {name}: {room} may not use {used}")
+            if folder in folders and used != folder and used not in folders[folder]:
+                faults.append(f"{file} includes {name}: {folder} may not use {used}")
 
 
 def check_systems(files):
@@ -114,13 +115,13 @@ def objects():
                        re.findall(r" U (\w+)$", listed, re.M))
 
 
-def check_names(rooms):
+def check_names(folders):
     """Check that external names begin with the name of their folder, and files do not use each other in circles."""
     listed = list(objects())
     home = {name: file for file, defined, _ in listed for name in defined}
     for file, defined, _ in listed:
-        room = os.path.dirname(file)
-        prefix = PREFIX.get(room, (f"supine_{os.path.basename(room)}_",))
+        folder = os.path.dirname(file)
+        prefix = PREFIX.get(folder, (f"supine_{os.path.basename(folder)}_",))
         for symbol in defined:
             if not symbol.startswith((*prefix, "__")) and symbol + "_" not in prefix:
                 faults.append(f"{file}.c defines {symbol}, which does not begin {' or '.join(prefix)}")
@@ -131,7 +132,7 @@ def check_names(rooms):
         graph = {f: out for f, out in graph.items() if f not in roots}
     if graph:
         faults.append(f"files that use each other in circles: {sorted(graph)}")
-    if len(listed) < len(rooms):
+    if len(listed) < len(folders):
         faults.append(f"only {len(listed)} objects in {build}")
 
 
@@ -156,14 +157,14 @@ def check_sizes(files):
                 faults.append(f"{file}: {name} has {lines} lines")
 
 
-rooms = read_table()
+folders = read_table()
 files = tracked()
 check_sizes(files)
-check_includes(rooms, files)
+check_includes(folders, files)
 check_systems(files)
 check_files_apart(files)
-check_names(rooms)
+check_names(folders)
 for fault in faults:
     print(fault)
-print(f"{len(rooms)} rooms, {len(files)} files, {len(faults)} faults")
+print(f"{len(folders)} folders, {len(files)} files, {len(faults)} faults")
 sys.exit(1 if faults else 0)

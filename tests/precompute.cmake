@@ -15,7 +15,7 @@ supine_test(lungs supine_precompute supine_lungs supine_mesh_io)
 supine_test(precompute supine_precompute supine_lungs supine_mesh_io umfpack)
 supine_test(program supine_sh_basis)
 target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:supine>")
-# Whole output of the commands, against golden files.
+# Compare the complete output of the commands with golden files.
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
 set_tests_properties(command_output PROPERTIES TIMEOUT 900)

@@ -72,7 +72,7 @@ if(Python3_FOUND)
     ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
 endif()
 
-# The README's program is the one that is built against the installed package.
+# README.md shows the program that the test `install` builds.
 add_test(NAME readme_example COMMAND sh -c
   "sed -n '/^```c$/,/^```$/p' README.md | sed '1d;$d' | cmp - tests/example/example.c"
   WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})

@@ -18,8 +18,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Define a test: TEST(test_name) { ... }. `state` is what the setup of the group made.
- */
+/* Define a test: TEST(test_name) { ... }. `*state` is what the setup of the group made. */
 #define TEST(name)                                                                                 \
   static void name(void **state);                                                                  \
   __attribute__((constructor)) static void name##_add(void) {                                      \

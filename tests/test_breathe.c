@@ -181,8 +181,8 @@ TEST(test_breathe_real_lungs_turning_volumes_exact_in_every_frame) {
     skip();
   }
   (void)snprintf(real, sizeof real, "%s/real", folder);
-  for (int ill = 0; ill < 2; ++ill) { /* then with the left lung collapsed */
-    left_share = ill == 1 ? 0.3 : 1.0;
+  for (int collapsed = 0; collapsed < 2; ++collapsed) {
+    left_share = collapsed == 1 ? 0.3 : 1.0;
     assert_int_equal(make_basis(&lungs, real), SUPINE_OK);
     assert_int_equal(RUN(real, "--turn", "supine:left:5s", "-o", breath), SUPINE_EXIT_OK);
     const supine_pv_breath course = supine_breath_default();

@@ -51,30 +51,30 @@ static int teardown(void **state) {
   return 0;
 }
 
-static void solve(const fixture *f, int k, const double *stiffness, double *caught) {
+static void solve(const fixture *f, int k, const double *stiffness, double *catch_) {
   assert_int_equal(supine_physics_equilibrium_set_stiffness(f->equilibrium[k], stiffness, NULL),
                    SUPINE_OK);
   assert_int_equal(
-      supine_physics_equilibrium_solve(f->equilibrium[k], 1, f->force, caught, NULL, NULL),
+      supine_physics_equilibrium_solve(f->equilibrium[k], 1, f->force, catch_, NULL, NULL),
       SUPINE_OK);
 }
 
 TEST(test_equilibrium_force_of_its_catch_recovers_it) {
   const fixture *f = *state;
   const size_t n = f->lungs.mesh.vertex_count;
-  double *caught = malloc(n * sizeof *caught);
+  double *catch_ = malloc(n * sizeof *catch_);
   double *force = malloc(n * sizeof *force);
   for (int k = 0; k < 2; ++k) {
     for (int even = 0; even < 2; ++even) {
       const double *stiffness = even == 1 ? NULL : f->stiffness;
-      solve(f, k, stiffness, caught);
-      assert_int_equal(supine_physics_equilibrium_force(f->equilibrium[k], caught, force, NULL),
+      solve(f, k, stiffness, catch_);
+      assert_int_equal(supine_physics_equilibrium_force(f->equilibrium[k], catch_, force, NULL),
                        SUPINE_OK);
-      assert_true(helper_difference(n, caught, f->force) > 0.01); /* catch and force differ */
+      assert_true(helper_difference(n, catch_, f->force) > 0.01); /* catch and force differ */
       assert_true(helper_difference(n, force, f->force) < 1e-10);
     }
   }
-  free(caught);
+  free(catch_);
   free(force);
 }
 

@@ -133,8 +133,8 @@ TEST(test_reach_equals_dense_definition) {
   double given = 0.0;
   for (size_t i = 0; i < n; ++i) {
     const double own = area[i] / mean;
-    const double caught = s[i] * own / z[i] * gsl_vector_get(x, i); /* Te[i->i] x_i */
-    assert_true(fabs(own * found[i] - caught) < 1e-10 * largest);
+    const double expected = s[i] * own / z[i] * gsl_vector_get(x, i); /* Te[i->i] x_i */
+    assert_true(fabs(own * found[i] - expected) < 1e-10 * largest);
     balance += own * found[i];
     given += own * a[i] * force[i];
   }

@@ -205,8 +205,9 @@ TEST(test_scan_parse_states_accepted_or_refused) {
   }
 }
 
-/* Milic-Emili's lines: at rest and at full inflation each lung has its share; between, all regions
- * have gone the same part of the way; below rest they keep their proportion. */
+/* Between rest and full inflation, both lungs have gained the same fraction of what they gain in
+ * total (Milic-Emili's lines); below rest, their volumes keep the proportion that they have at
+ * rest. */
 TEST(test_share_out_any_volume_follows_lines) {
   static const double left_side[3] = {1.0, 0.0, 0.0};
   static const double upright[3] = {0.0, 0.0, -1.0};
@@ -324,7 +325,7 @@ TEST(test_doubt_odd_scan_names_option) {
   static const struct {
     const char *scanned;
     double full;        /* of each lung */
-    double told;        /* given volume at rest supine, mL, or 0 */
+    double rest;        /* volume at rest supine by --resting, mL, or 0 */
     const char *doubts; /* expected doubts, or NULL */
   } known[] = {{"full", 3000.0, 0.0, NULL},
                {"full", 1700.0, 0.0, "--scanned supine:rest"},
@@ -336,7 +337,7 @@ TEST(test_doubt_odd_scan_names_option) {
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     const supine_person person = {0};
     const double full = known[i].full;
-    supine_resting told = supine_reference_resting_default();
+    supine_resting resting = supine_reference_resting_default();
     supine_reference reference = {.scan = scan_named(known[i].scanned),
                                   .lung_count = 2,
                                   .side = {1, -1},
@@ -345,8 +346,8 @@ TEST(test_doubt_odd_scan_names_option) {
     if (reference.scan.state.volume.kind == SUPINE_VOLUME_REST) {
       reference.scan_volume[0] = reference.scan_volume[1] = 1300.0 - full;
     }
-    told.ml[2] = known[i].told;
-    supine_reference_doubt(&reference, &person, &told, text, sizeof text);
+    resting.ml[2] = known[i].rest;
+    supine_reference_doubt(&reference, &person, &resting, text, sizeof text);
     if (known[i].doubts == NULL ? text[0] != '\0' : strstr(text, known[i].doubts) == NULL) {
       fail_msg("%s of %g mL: '%s'", known[i].scanned, full, text);
     }
@@ -447,15 +448,15 @@ TEST(test_basis_scan_reproduced_and_rest_right) {
     supine_basis *basis = basis_of(&lungs, &scan, &rms);
     const supine_state as_scanned = supine_basis_scan(basis);
     double *placed = positions_in(basis, &as_scanned, ml);
-    double *told = positions_in(basis, &scan.state, ml);
+    double *posed = positions_in(basis, &scan.state, ml);
     printf("%s: scan reproduced within %.4f and %.4f mm; basis errs by %.4f mm RMS\n", scans[s],
-           farthest(placed, scanned, n), farthest(told, scanned, n), rms);
+           farthest(placed, scanned, n), farthest(posed, scanned, n), rms);
     assert_true(farthest(placed, scanned, n) < promised);
     /* full inflation in the file follows the compressed field: a few mL from the true one */
-    assert_true(farthest(told, scanned, n) <
+    assert_true(farthest(posed, scanned, n) <
                 (rests && scan.state.volume.ml == 0.0 ? promised : 0.15));
     free(placed);
-    free(told);
+    free(posed);
     for (size_t axis = 0; axis < 6; ++axis) {
       supine_state rest = {.volume = {SUPINE_VOLUME_REST, 0.0}};
       rest.gravity[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A breath as ParaView's readers see it: one file over time, and a file a frame with an index, by VTK's
-own reader, held against the numbers of the same breath as safetensors. (VTK has no reader for the
-index; ParaView's is built on the same two.)
+"""Read a breath written as VTP by VTK's own reader, and compare every frame with the same breath as
+safetensors.
 
     test_series_vtk.py SUPINE
 """
@@ -44,7 +43,7 @@ def normals_of(points, triangles):
 
 
 def check_surface(surface, points, triangles, rest, lung):
-    """Every array of a frame, but for its numbers."""
+    """Check every array of a frame."""
     data = surface.GetPointData()
     found = vtk_to_numpy(surface.GetPoints().GetData())
     assert np.abs(found - points).max() <= HALF_STEP * 1.01

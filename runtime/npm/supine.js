@@ -2,7 +2,7 @@
 // Run the C library as WebAssembly, one instance for each basis. Nothing allocates after a basis is open, so that the
 // memory never grows and the arrays never move.
 
-// Bytes of the C structs, and byte offsets in supine_basis_info, which only grows at its end.
+// Bytes reserved for each C struct, and byte offsets in supine_basis_info, which only grows at its end.
 const STATE = 128, POSE = 8 * (256 + 3 * 16), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array]; // in the order of supine_dtype
@@ -23,7 +23,7 @@ class Basis {
     this.#c = instance.exports;
     this.#c._initialize();
     const size = 2 * (STATE + POSE) + VOLUMES + TEXT + ERROR;
-    this.#state = this.#allocate(size); // all parts before the text are aligned for doubles
+    this.#state = this.#allocate(size); // the sizes of all parts before the text are multiples of 8, for doubles
     this.#pose = this.#state + STATE;
     this.#nextState = this.#pose + POSE;
     this.#nextPose = this.#nextState + STATE;

@@ -1,14 +1,14 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Print what turning and breathing do to real lungs, beside what was published.
+"""Print the effects of posture and breathing on real lungs, beside published values.
 
     tests/evidence/evidence.py [--check] BUILD FOLDER[:AXES]...
 
 BUILD is the folder of the build; FOLDER holds pairs NAME_left.* and NAME_right.* of closed surfaces at full
-inflation; AXES, as RAS, goes to 'supine precompute --axes'. Every basis is made with default options. Columns
-are spread over shapes of one model, not its uncertainty. Nothing in the model was fitted to these figures but
-the bend's one number, which was chosen on ten people's quiet breaths. With --check, a value outside the range
-ends the program with exit code 1. The exit code is 77 where no pair is there.
+inflation; AXES, as RAS, goes to 'supine precompute --axes'. Every basis is made with default options. The columns
+show the spread over shapes, not the uncertainty of the model. Nothing in the model was fitted to these figures
+except the one number of the bend, which was chosen from quiet breaths of ten people. With --check, the exit code
+is 1 if a value is outside its range. The exit code is 77 if there is no pair.
 """
 import ctypes
 import glob
@@ -23,7 +23,7 @@ import numpy as np
 POSTURES = ("supine", "prone", "left", "right", "upright", "inverted")
 FULL_DENSITY = 0.12  # g/mL: 0.86 L of tissue (Denison 1986) in the 7.2 L of a full lung of usual size
 
-# What, the range that is held, its unit, and what was published.
+# Quantity, lower and upper end of its range (None: not checked), unit, published value.
 ROWS = (
     ("thirds, supine", 1.6, 1.9, "", "1.75, supine (Sa 2010, n 8)"),
     ("thirds, prone", 1.1, 1.3, "", "1.0 to 1.4"),
@@ -64,7 +64,7 @@ def take_package(build, folder):
 
 
 class Lungs:
-    """One pair, and what is measured of it."""
+    """The basis of one pair of lungs, and its measurements."""
 
     def __init__(self, supine, path):
         self.basis = supine.open(path)
@@ -74,7 +74,7 @@ class Lungs:
         self.gravity = supine.gravity
 
     def at(self, state):
-        """Positions and each lung's volume."""
+        """Return positions, mm, and the volume of each lung, mL."""
         pose = self.basis.pose(state)
         return self.basis.deform(pose), np.array(self.basis.volumes(pose))
 
@@ -83,7 +83,7 @@ class Lungs:
         return np.cross(b - a, c - a) / 2
 
     def thirds(self, posture, before, after):
-        """Volume and gain of each third of height, uppermost first, both lungs together."""
+        """Return volume and gain, mL, of each third of height, uppermost first, of both lungs together."""
         slabs = (Slab * 6)()
         g = (ctypes.c_double * 3)(*self.gravity(posture))
         pointers = [ctypes.c_void_p(np.ascontiguousarray(x).ctypes.data) for x in (before, after)]
@@ -96,7 +96,7 @@ class Lungs:
         return int((np.einsum("ij,ij->i", self.area_vectors(xyz), self.reference) < 0).sum())
 
     def straight(self, posture, total):
-        """The same volume of each lung with equal gains on all axes, as without a bend."""
+        """Return positions with equal gains on all axes, as without a bend, and the same volume of each lung."""
         pose = self.basis.pose(f"{posture}:{total:.3f}mL")
         wanted = np.array(self.basis.volumes(pose))
         gains = self.basis.gains(pose)
@@ -109,7 +109,7 @@ class Lungs:
         return self.basis.deform(pose)
 
     def measure(self):
-        """The figures of ROWS."""
+        """Return the quantities of ROWS."""
         out = {}
         full, full_ml = self.at("supine:full")
         self.reference = self.area_vectors(full)
@@ -153,7 +153,7 @@ class Lungs:
 
 
 def pairs(argument):
-    """Left and right files of a folder, and their axes."""
+    """Yield name, left file, right file and axes of each pair in FOLDER or FOLDER:AXES."""
     folder, _, axes = argument.partition(":")
     for left in sorted(glob.glob(os.path.join(folder, "*_left.*"))):
         right = left.replace("_left.", "_right.")

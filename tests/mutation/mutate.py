@@ -3,7 +3,7 @@
 """Mutation testing: change the code in one place, build it, and expect that a test fails.
 
     mutate.py named [PATTERN]          mutants of named.txt whose title matches the pattern
-    mutate.py random [COUNT] [SEED]    a random COUNT (100) of mutants of the folders in ROOMS
+    mutate.py random [COUNT] [SEED]    a random COUNT (100) of mutants of the folders in FOLDERS
 
 Works on a copy of the last commit, in build/mutation. A mutant is killed if a test fails or exceeds its
 time; one that does not compile does not count. A random mutant is run against the tests that reach its
@@ -31,7 +31,7 @@ COPY = FOLDER / "source"
 BUILD = FOLDER / "build"
 COMMIT = subprocess.run(["git", "-C", str(SOURCE), "rev-parse", "HEAD"], check=True, text=True,
                         stdout=subprocess.PIPE).stdout.strip()
-ROOMS = ("sh", "mesh", "precompute", "runtime", "program")
+FOLDERS = ("sh", "mesh", "precompute", "runtime", "program")
 QUICK, SLOW = 2.0, 320.0  # s, instrumented: about three times that of an optimised build
 ENOUGH = 240.0  # s, all tests of one mutant
 JOBS = str(len(os.sched_getaffinity(0)))  # processors available
@@ -129,8 +129,8 @@ OPERATORS = [  # pattern, and its possible replacements
 
 def places():
     found = []
-    for room in ROOMS:
-        for file in sorted((COPY / room).rglob("*.c")):
+    for folder in FOLDERS:
+        for file in sorted((COPY / folder).rglob("*.c")):
             comment = False
             for number, line in enumerate(file.read_text().splitlines()):
                 starts = line.lstrip().startswith(("/*", "//", "*", "#", "static_assert", "case "))

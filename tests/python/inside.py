@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What test_python.py runs inside the clean environment that the wheel was installed into.
+"""Test the Python package; test_python.py runs this in the environment into which the wheel was installed.
 
     inside.py REFERENCE BASIS"""
 import ctypes
@@ -33,7 +33,7 @@ lungs = supine.open(path)
 n, k = lungs.vertex_count, lungs.mode_count
 assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", "right"]
 
-# Views, without copies, that live as long as anyone looks.
+# Arrays are views without copies, and keep the basis open.
 for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
                             (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
                             (lungs.modes, (k, (lungs.band + 1) ** 2), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
@@ -52,7 +52,7 @@ kept, first = supine.open(path).vertices, lungs.vertices.copy()
 gc.collect()
 assert (kept == first).all()
 
-# Bit for bit as C, from a file, from memory, in ranges.
+# Results have the same bits as in C: from a file, from memory, in ranges.
 STATE = "prone:rest+321.5"
 pose, supine_rest = lungs.pose(STATE), lungs.pose("supine")
 assert abs(lungs.volumes(pose).sum() - lungs.volumes(lungs.pose("prone:rest")).sum() - 321.5) < 1e-6
@@ -60,7 +60,7 @@ assert lungs.weights(pose).shape == (k,) and lungs.gains(pose).shape == (2, 3)
 out = path + ".raw"
 subprocess.run([reference, path, STATE, out], check=True)
 raw = np.fromfile(out, np.float32).reshape(5, n, 3)
-assert np.ptp(raw[0] - lungs.vertices) > 1.0  # mm: something moves
+assert np.ptp(raw[0] - lungs.vertices) > 1.0  # mm
 with open(path, "rb") as file:
     in_memory = supine.open(file.read())
 for basis in (lungs, in_memory):
@@ -91,7 +91,7 @@ assert np.allclose(supine.breath([5 / 6], pv=straight, course="ramp"), 250) and 
 refused(supine.ArgumentError, "tidal volume", supine.breath, [0], tidal=9000)
 refused(ValueError, "pv must be 18 numbers", supine.breath, [0], pv=straight[0])
 
-# The C library's refusals, as Python's kinds of exception and as Supine's.
+# Errors of the C library are exceptions of Supine and of Python.
 with open(path, "rb") as file:
     whole = file.read()
 with open(path + ".cut", "wb") as file:
@@ -108,7 +108,7 @@ refused(supine.ArgumentError, "gravity", lungs.pose, (0, 0, float("nan")))
 refused(supine.NumericalError, "volume", lungs.pose, "rest-1e6")
 refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, pose)
 assert issubclass(supine.NumericalError, supine.Error) and issubclass(supine.Error, Exception)
-# Python's own.
+# Errors that the package itself raises.
 refused(ValueError, "float32", lungs.deform, pose, np.empty((n, 3)))
 refused(ValueError, "float32", lungs.deform, pose, np.empty((n - 1, 3), np.float32))
 refused(ValueError, "contiguous", lungs.deform, pose, np.empty((n, 6), np.float32)[:, ::2])
@@ -145,7 +145,7 @@ refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=Tr
 refused(ValueError, "positions", lungs.locate, [0, 1], truth[:1])
 
 # The interpreter's lock is released while vertices are visited: with a switch interval that never ends
-# a waiting thread gets the lock only where a call gives it away. `repr` keeps it.
+# a waiting thread gets the lock only if a call releases it. `repr` does not.
 def lets_others_run(call, *arguments, tries=None):
     gate, ran = threading.Lock(), []
 
@@ -175,7 +175,7 @@ for call, *arguments in ((lungs.deform, pose, points), (lungs.displace, pose, po
     assert lets_others_run(call, *arguments), f"{call} keeps the lock"
 sys.setswitchinterval(0.005)
 
-# Images: as the scan has them in its own state, elsewhere what the program writes; one basis, many states.
+# Images are unchanged in the scan's own state, and as written by the program in others; one basis, many states.
 grid = supine.open("grid.safetensors")
 low, high = lungs.vertices.min(0) - 20, lungs.vertices.max(0) + 20
 size = ((high - low) / [6, 7, 8]).astype(int)

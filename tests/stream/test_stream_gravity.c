@@ -19,12 +19,12 @@ static void expect_gravity(const double gravity[3], const char *posture) {
  * bed, x to the right of someone who stands at the foot end and looks towards the head end. */
 
 /* Directions of the body's left, back and head in that room: the columns of a tracker's matrix. */
-typedef struct lie {
+typedef struct placement {
   const char *posture;
   double left[3], back[3], head[3];
-} lie;
+} placement;
 
-static const lie lies[] = {
+static const placement placements[] = {
     /* Head at the head end (y). Face up: seen from the feet, the patient's left is on the right. */
     {"supine", {1, 0, 0}, {0, 0, -1}, {0, 1, 0}},
     /* Face down: left is on the left. */
@@ -44,9 +44,9 @@ static const lie lies[] = {
     {"inverted", {1, 0, 0}, {0, -1, 0}, {0, 0, -1}},
 };
 
-enum { LIES = sizeof lies / sizeof *lies };
+enum { PLACEMENTS = sizeof placements / sizeof *placements };
 
-static void matrix_of(const lie *l, double r[9]) {
+static void matrix_of(const placement *l, double r[9]) {
   for (int i = 0; i < 3; ++i) {
     r[3 * i] = l->left[i];
     r[3 * i + 1] = l->back[i];
@@ -68,13 +68,13 @@ static supine_stream_verdict take(const double r[9], double gravity[3]) {
 }
 
 TEST(test_gravity_tracker_matrices_give_postures) {
-  for (int i = 0; i < LIES; ++i) {
+  for (int i = 0; i < PLACEMENTS; ++i) {
     double r[9];
     double gravity[3];
-    matrix_of(&lies[i], r);
+    matrix_of(&placements[i], r);
     assert_true(fabs(determinant(r) - 1.0) < tolerance); /* the table itself */
     assert_int_equal(take(r, gravity), SUPINE_STREAM_EXACT);
-    expect_gravity(gravity, lies[i].posture);
+    expect_gravity(gravity, placements[i].posture);
   }
 }
 
@@ -134,19 +134,19 @@ static void scaled(const double r[9], double x, double y, double z, double out[9
 }
 
 TEST(test_gravity_invalid_rotations_refused) {
-  for (int i = 0; i < LIES; ++i) {
+  for (int i = 0; i < PLACEMENTS; ++i) {
     double r[9];
     double m[9];
     double gravity[3];
-    matrix_of(&lies[i], r);
+    matrix_of(&placements[i], r);
     scaled(r, 1.0001, 0.9999, 1.0, m); /* a tracker's rounding */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_EXACT);
     scaled(r, 25.4, 25.4, 25.4, m); /* inches */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REPAIRED);
-    expect_gravity(gravity, lies[i].posture);
+    expect_gravity(gravity, placements[i].posture);
     scaled(r, 1.0, 1.0, 1.05, m);
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REPAIRED);
-    expect_gravity(gravity, lies[i].posture);
+    expect_gravity(gravity, placements[i].posture);
     const double kept[3] = {gravity[0], gravity[1], gravity[2]};
     scaled(r, 1.0, 1.0, 1.5, m);
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);

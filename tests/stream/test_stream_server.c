@@ -138,7 +138,7 @@ static int dial(int port) {
 }
 
 /* Send all bytes; return false if the server has closed the connection. */
-static bool put(int s, const void *bytes, size_t size) {
+static bool send_bytes(int s, const void *bytes, size_t size) {
   for (size_t sent = 0; sent < size;) {
     const ssize_t n = send(s, (const unsigned char *)bytes + sent, size - sent, MSG_NOSIGNAL);
     if (n <= 0) {
@@ -161,7 +161,7 @@ static bool get(int s, void *bytes, size_t size) {
 }
 
 /* Read until the server closes the connection; return whether it does. */
-static bool hung_up(int s) {
+static bool closed_by_server(int s) {
   unsigned char waste[4096];
   ssize_t got = 0;
   do {
@@ -196,18 +196,18 @@ static size_t make_pose(const double down[3], uint64_t stamp, unsigned char byte
 
 static bool send_pose(int s, const double down[3], uint64_t stamp) {
   unsigned char bytes[128];
-  return put(s, bytes, make_pose(down, stamp, bytes));
+  return send_bytes(s, bytes, make_pose(down, stamp, bytes));
 }
 
 static bool say(int s, const char *device, const char *text) {
   unsigned char body[64] = {0, 3, 0, (unsigned char)strlen(text)};
   unsigned char bytes[128];
   memcpy(body + 4, text, strlen(text));
-  return put(s, bytes, make_message("STRING", device, 0, body, 4 + strlen(text), bytes));
+  return send_bytes(s, bytes, make_message("STRING", device, 0, body, 4 + strlen(text), bytes));
 }
 
 /* Receive the next message and the first 4096 bytes of its body; return false if none comes. */
-static bool hear(int s, supine_stream_header *header, unsigned char body[4096]) {
+static bool receive(int s, supine_stream_header *header, unsigned char body[4096]) {
   unsigned char raw[SUPINE_STREAM_HEADER];
   unsigned char waste[4096];
   supine_error error;
@@ -235,10 +235,10 @@ static bool hear(int s, supine_stream_header *header, unsigned char body[4096]) 
 
 /* Receive messages until the one with this stamp; return how many came before it. Fail if it does
  * not come. */
-static int hear_stamp(int s, uint64_t stamp, supine_stream_header *header,
-                      unsigned char body[4096]) {
+static int receive_stamp(int s, uint64_t stamp, supine_stream_header *header,
+                         unsigned char body[4096]) {
   for (int passed = 0; passed < 100000; ++passed) {
-    assert_true(hear(s, header, body));
+    assert_true(receive(s, header, body));
     if (header->stamp == stamp) {
       return passed;
     }
@@ -292,7 +292,7 @@ TEST(test_server_each_pose_answered_by_weights) {
   unsigned char body[4096];
   for (uint64_t i = 0; i < 40; ++i) {
     assert_true(send_pose(peer, poses[i % 4], 100 + i));
-    (void)hear_stamp(peer, 100 + i, &header, body);
+    (void)receive_stamp(peer, 100 + i, &header, body);
     assert_string_equal(header.type, "NDARRAY");
     assert_string_equal(header.device, "SUPINE");
     assert_int_equal(header.version, 1);
@@ -300,19 +300,19 @@ TEST(test_server_each_pose_answered_by_weights) {
   }
   assert_true(say(peer, "VOLUME", "rest-12"));
   assert_true(send_pose(peer, poses[1], 200));
-  (void)hear_stamp(peer, 200, &header, body);
+  (void)receive_stamp(peer, 200, &header, body);
   expect_weights(s, poses[1], -12.0, body);
   unsigned char bytes[128]; /* the last byte is sent alone, later */
   const size_t size = make_pose(poses[2], 300, bytes);
   const struct timespec later = {0, 50000000};
-  assert_true(put(peer, bytes, size - 1));
+  assert_true(send_bytes(peer, bytes, size - 1));
   (void)nanosleep(&later, NULL);
-  assert_true(put(peer, bytes + size - 1, 1));
-  (void)hear_stamp(peer, 300, &header, body);
+  assert_true(send_bytes(peer, bytes + size - 1, 1));
+  (void)receive_stamp(peer, 300, &header, body);
   expect_weights(s, poses[2], -12.0, body);
   rest(1.0); /* the age of the pose is no latency of a volume */
   assert_true(say(peer, "VOLUME", "rest-11"));
-  assert_true(hear(peer, &header, body));
+  assert_true(receive(peer, &header, body));
   expect_weights(s, poses[2], -11.0, body);
   (void)close(peer);
   const supine_stream_counts counts = stage_end(s);
@@ -338,16 +338,17 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
     memcpy(asked.gravity, poses[i], sizeof asked.gravity);
     assert_int_equal(supine_basis_pose(s->basis, &asked, &pose, &error), SUPINE_OK);
     assert_true(send_pose(peer, poses[i], 1 + i));
-    (void)hear_stamp(peer, 1 + i, &header, body);
+    (void)receive_stamp(peer, 1 + i, &header, body);
     expect_pose(&pose, body);
   }
   /* The volume as an array: 50.0 as a 64-bit float, big-endian. */
   const unsigned char array[12] = {11, 1, 0, 1, 0x40, 0x49};
   unsigned char bytes[128];
   assert_true(say(peer, "VOLUME", "rest"));
-  assert_true(put(peer, bytes, make_message("NDARRAY", "VOLUME", 0, array, sizeof array, bytes)));
+  assert_true(
+      send_bytes(peer, bytes, make_message("NDARRAY", "VOLUME", 0, array, sizeof array, bytes)));
   assert_true(send_pose(peer, poses[1], 10));
-  (void)hear_stamp(peer, 10, &header, body);
+  (void)receive_stamp(peer, 10, &header, body);
   expect_weights(s, poses[1], 50.0, body);
   (void)close(peer);
   (void)stage_end(s);
@@ -365,7 +366,7 @@ TEST(test_server_send_request_switches_content) {
   const size_t points = 40 + 12 * info->vertex_count;
   size_t whole = 0;                          /* with triangles */
   assert_true(send_pose(peer, poses[3], 1)); /* the answer to the pose before the request */
-  (void)hear_stamp(peer, 1, &header, body);
+  (void)receive_stamp(peer, 1, &header, body);
   const char *const wishes[] = {"points", "surface"};
   for (uint64_t w = 0; w < 2; ++w) {
     assert_true(say(peer, "SEND", wishes[w]));
@@ -374,7 +375,7 @@ TEST(test_server_send_request_switches_content) {
       const uint64_t stamp = 10 * (w + 1) + i;
       assert_true(send_pose(peer, poses[i], stamp));
       do { /* a request is answered with the current pose, too */
-        assert_true(hear(peer, &header, body));
+        assert_true(receive(peer, &header, body));
         whole = whole == 0 ? header.size : whole;
         assert_true(whole > points);
         assert_int_equal(header.size, w == 1 || first ? whole : points);
@@ -415,8 +416,8 @@ TEST(test_server_many_poses_newest_answered) {
     const double down[3] = {sin(angle), cos(angle), 0};
     size += make_pose(down, i + 1, burst + size);
   }
-  assert_true(put(peer, burst, size));
-  const int passed = hear_stamp(peer, BURST, &header, body);
+  assert_true(send_bytes(peer, burst, size));
+  const int passed = receive_stamp(peer, BURST, &header, body);
   assert_true(passed < BURST / 10);
   const double last[3] = {sin(0.999), cos(0.999), 0};
   expect_weights(s, last, 30.0, body);
@@ -434,7 +435,7 @@ static int keep_rate(int peer, int count, uint64_t stamp) {
   unsigned char body[4096];
   for (int i = 0; i < count; ++i) {
     assert_true(send_pose(peer, poses[i % 4], stamp + (uint64_t)i));
-    if (hear_stamp(peer, stamp + (uint64_t)i, &header, body) > 60) {
+    if (receive_stamp(peer, stamp + (uint64_t)i, &header, body) > 60) {
       return i;
     }
     rest(2e-3);
@@ -455,7 +456,7 @@ TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   const int vanished = dial(port);
   assert_true(say(vanished, "SEND", "surface"));
   const int half = dial(port);
-  assert_true(put(half, "\0\1TRANS", 7));
+  assert_true(send_bytes(half, "\0\1TRANS", 7));
   assert_int_equal(keep_rate(honest, 20, 1000), 20);
   const struct linger reset = {1, 0};
   assert_int_equal(setsockopt(vanished, SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
@@ -487,17 +488,17 @@ TEST(test_server_fifty_peers_one_more_refused) {
   for (uint64_t round = 0; round < 20; ++round) {
     assert_true(send_pose(peer[round], poses[round % 4], 500 + round));
     for (int i = 0; i < MANY; ++i) {
-      (void)hear_stamp(peer[i], 500 + round, &header, body);
+      (void)receive_stamp(peer[i], 500 + round, &header, body);
     }
   }
   const int extra = dial(port); /* one too many: the server closes the connection */
-  assert_true(hung_up(extra));
+  assert_true(closed_by_server(extra));
   (void)close(extra);
   (void)close(peer[0]);
   rest(0.2);
   peer[0] = dial(port); /* a place is free again */
   assert_true(send_pose(peer[0], poses[0], 900));
-  (void)hear_stamp(peer[0], 900, &header, body);
+  (void)receive_stamp(peer[0], 900, &header, body);
   for (int i = 0; i < MANY; ++i) {
     (void)close(peer[i]);
   }
@@ -556,18 +557,18 @@ TEST(test_server_ten_thousand_mutated_messages_survives) {
     }
     /* Use a connection for each message, so that an error of one cannot hide that of the next. */
     const int peer = dial(port);
-    (void)put(peer, bytes, size); /* fails if the header was refused */
+    (void)send_bytes(peer, bytes, size); /* fails if the header was refused */
     (void)shutdown(peer, SHUT_WR);
-    assert_true(hung_up(peer)); /* after the whole message */
+    assert_true(closed_by_server(peer)); /* after the whole message */
     (void)close(peer);
     if (i % 1000 == 0) {
       assert_true(say(honest, "VOLUME", "rest+30"));
       assert_true(send_pose(honest, poses[0], 5000 + (uint64_t)i));
-      (void)hear_stamp(honest, 5000 + (uint64_t)i, &heard, content);
+      (void)receive_stamp(honest, 5000 + (uint64_t)i, &heard, content);
     }
   }
   assert_true(send_pose(honest, poses[0], 100000));
-  (void)hear_stamp(honest, 100000, &heard, content);
+  (void)receive_stamp(honest, 100000, &heard, content);
   (void)close(honest);
   const supine_stream_counts counts = stage_end(s);
   assert_true(counts.malformed > 1000);
@@ -588,21 +589,21 @@ TEST(test_server_absurd_sizes_refused) {
   strcpy(header.device, "Patient");
   supine_stream_header_write(&header, bytes);
   int peer = dial(port);
-  assert_true(put(peer, bytes, sizeof bytes));
-  assert_true(hung_up(peer));
+  assert_true(send_bytes(peer, bytes, sizeof bytes));
+  assert_true(closed_by_server(peer));
   (void)close(peer);
   /* A transform of 8 MiB is skipped like an image, without being stored. */
   header.size = 8u << 20;
   supine_stream_header_write(&header, bytes);
   peer = dial(port);
-  assert_true(put(peer, bytes, sizeof bytes));
+  assert_true(send_bytes(peer, bytes, sizeof bytes));
   for (int i = 0; i < 2048; ++i) {
-    assert_true(put(peer, piece, sizeof piece));
+    assert_true(send_bytes(peer, piece, sizeof piece));
   }
   assert_int_equal(keep_rate(peer, 2, 1), 2);
   header.size = 0; /* without a body */
   supine_stream_header_write(&header, bytes);
-  assert_true(put(peer, bytes, sizeof bytes));
+  assert_true(send_bytes(peer, bytes, sizeof bytes));
   assert_int_equal(keep_rate(peer, 2, 11), 2);
   (void)close(peer);
   const supine_stream_counts counts = stage_end(s);
@@ -662,7 +663,7 @@ TEST(test_server_replay_recorded_poses_same) {
   unsigned char last[4096];
   int frames = 0;
   struct pollfd waiting = {peer, POLLIN, 0};
-  while (poll(&waiting, 1, 500) == 1 && hear(peer, &header, body)) {
+  while (poll(&waiting, 1, 500) == 1 && receive(peer, &header, body)) {
     memcpy(last, body, sizeof last);
     ++frames;
   }
@@ -694,13 +695,13 @@ TEST(test_server_moving_lungs_send_frames) {
   supine_stream_header header;
   unsigned char body[4096];
   assert_true(send_pose(peer, poses[0], 1));
-  (void)hear_stamp(peer, 1, &header, body);
+  (void)receive_stamp(peer, 1, &header, body);
   rest(0.05);
   assert_true(send_pose(peer, poses[2], 2));
   int frames = 0;
   struct pollfd waiting = {peer, POLLIN, 0};
   while (poll(&waiting, 1, 1000) == 1 && frames < 1000) {
-    assert_true(hear(peer, &header, body));
+    assert_true(receive(peer, &header, body));
     ++frames;
   }
   /* About 95 frames: ln(1e6 pi / 2) time constants of 0.1 s at 15 ms each; a busy machine makes
@@ -719,7 +720,7 @@ TEST(test_server_moving_lungs_send_frames) {
   float low = INFINITY;
   float high = -INFINITY;
   for (int i = 0; i < 100; ++i) { /* 1.5 breaths */
-    assert_true(hear(other, &header, body));
+    assert_true(receive(other, &header, body));
     const float gain = float_at(body + 4 + 4 * MODES);
     low = fminf(low, gain);
     high = fmaxf(high, gain);

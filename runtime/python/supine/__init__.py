@@ -149,7 +149,7 @@ def _state(state: Gravity, volume: str = "") -> Any:
 
 
 class _Owner:
-    """The open basis, closed when the last array that is a view of its memory is gone."""
+    """An open basis of the C library, closed when no view of its memory exists any more."""
 
     def __init__(self, source: Source, options: _c.Options) -> None:
         self.pointer = ctypes.c_void_p()
@@ -393,7 +393,7 @@ class Location:
     volume, volume_error   volume of all lungs and its standard deviation, mL (0 if the volume was given)
     rotation, translation  observed = rotation @ (body + correction) + translation
     distances, sigmas      [n] distance of each point from its prediction by all others, and its expected value, mm
-    outliers               [n] True for observations that do not fit and were left out
+    outliers               [n] True for observations that do not fit; the result ignores them
     log_evidence           log likelihood, to compare results that differ only in the posture
     """
 
@@ -406,7 +406,7 @@ class Location:
         seen = (_c.Observation * max(count, 1))(*((int(v), tuple(p), noise)
                                                   for v, p in zip(vertices, places, strict=True)))
         residuals = (_c.Residual * max(count, 1))()
-        self._space = np.empty(_c.locate_space(count))  # the C library's fit is in it
+        self._space = np.empty(_c.locate_space(count))  # memory that the C library's fit uses
         self._c = _c.Location()
         task = _c.LocateTask(inside._c, count, seen, state, rigid)
         _c.locate(task, residuals, self._space.ctypes.data, self._c)
