@@ -160,7 +160,7 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
     c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
     c.square_errors = calloc(c.names.count, sizeof *c.square_errors);
     if (c.step == NULL || c.moves == NULL || c.square_errors == NULL) {
-      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points", n);
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     }
   }
   if (status == SUPINE_OK) {

@@ -144,7 +144,7 @@ static const supine_option table[] = {
 /* Check that the options fit each other, then read the postures. */
 static supine_status check(const request *wanted, supine_posture_list *postures,
                            supine_error *error) {
-  const bool moving = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0; /* the other: .png */
+  const bool moving = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0; /* else .png */
   if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             wanted->turns ? "give --posture or --turn, not both"

@@ -29,7 +29,9 @@ supine_status supine_command_read_turn(const char *value, breath_turn *turn, sup
     seconds[length - 1] = '\0';
   }
   if (!supine_options_parse_number(seconds, &turn->seconds) || !(turn->seconds > 0.0)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give a time above 0 s, not '%s'", value);
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "the time of '%s' is not a number above 0: give seconds, as supine:left:5s", value);
   }
   const supine_status status = supine_options_posture(text, turn->from, error);
   return status == SUPINE_OK ? supine_options_posture(colon[0] + 1, turn->to, error) : status;
@@ -147,7 +149,7 @@ supine_status supine_command_drawing_turn(supine_command_studio *studio, supine_
   const size_t n = supine_basis_get_info(studio->basis)->vertex_count;
   if (!(frames <= FRAMES_MAX)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a turn of %g s exceeds %d frames: give a shorter one", seconds,
+                            "a turn of %g s exceeds %d frames: give a shorter time", seconds,
                             FRAMES_MAX);
   }
   turning t = {.studio = studio,

@@ -59,8 +59,8 @@ json_int_t supine_export_glb_add(glb *g, size_t lung);
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
 /** Return the extras of the file: how weights follow from gravity and volume.
- * @param largest_move  displacement at the end of the colours, mm */
-json_t *supine_export_glb_extras(const glb *g, double largest_move);
+ * @param end  displacement at the end of the colours, mm */
+json_t *supine_export_glb_extras(const glb *g, double end);
 
 /** Return the extras of a lung's mesh. */
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);

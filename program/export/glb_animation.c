@@ -28,8 +28,8 @@ static double roll_at(double seconds) {
   return pi / 2 * (stage + x * x * (3 - 2 * x));
 }
 
-/* Compute the weights of all lungs at a time. `rows` points to this frame of the first lung in an
- * array [lungs, frames, targets]. */
+/* Compute the weights of all lungs for one frame, `seconds` into the breath. `rows` points to the
+ * frame of the first lung in an array [lungs, frames, targets]. */
 static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
   const double gravity[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);

@@ -37,7 +37,7 @@ static layout layout_of(const glb *g, glb_kind kind) {
   case GLB_PLACES:
     return plain ? (layout){"VEC3", 3, 12, FLOAT, 0, VERTICES}
                  : (layout){"VEC3", 3, 8, SHORT, INT16_MAX, VERTICES};
-  default: /* normals */
+  default: /* GLB_NORMALS, GLB_CHANGES */
     return plain ? (layout){"VEC3", 3, 12, FLOAT, 0, VERTICES}
                  : (layout){"VEC3", 3, 4, BYTE, INT8_MAX, VERTICES};
   }

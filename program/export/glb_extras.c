@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the extras of a glTF file: formulas and constants from which its reader computes weights.
- */
+/* Write the extras of a glTF file: formulas and constants to compute the weights of targets. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -55,7 +54,7 @@ static json_t *target_names(const glb *g) {
   return names;
 }
 
-/* Return the metadata of the basis that the file repeats. */
+/* Return a copy of the metadata that describe how the basis was made. */
 static json_t *origin(const export_source *source) {
   static const char *const keys[] = {
       "lungs",       "made_by",          "force", "direction", "direction_constants", "stiffness",
@@ -70,10 +69,10 @@ static json_t *origin(const export_source *source) {
   return object;
 }
 
-json_t *supine_export_glb_extras(const glb *g, double largest_move) {
+json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* modes are stored in it: integers need half the text of fractions */
+  const double unit = 1e-7; /* of stored modes: integers take half the space of fractions */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();
@@ -83,12 +82,12 @@ json_t *supine_export_glb_extras(const glb *g, double largest_move) {
     }
     (void)json_array_append_new(modes, row);
   }
-  json_t *supine = json_pack(
-      "{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text, "weights",
-      weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit", unit, "bend",
-      supine_template_numbers(s->info->bend, 3), "middle",
-      supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step, "breathVolume",
-      g->options->breath, "largestMoveColoured", largest_move, "basis", origin(s));
+  json_t *supine =
+      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
+                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit",
+                unit, "bend", supine_template_numbers(s->info->bend, 3), "middle",
+                supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
+                "breathVolume", g->options->breath, "largestMoveColoured", end, "basis", origin(s));
   if (g->targets.count <= FORMS_MAX) {
     (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }

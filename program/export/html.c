@@ -341,7 +341,7 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
   json_decref(data);
   json_decref(description);
   supine_export_order_free(&p.order);
-  return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for the page");
+  return status == SUPINE_OK ? status : supine_error_set(error, status, "out of memory");
 }
 
 supine_status supine_export_html_write(const char *path, const export_source *source,

@@ -128,8 +128,8 @@ void supine_export_targets_base(const export_source *source, const export_target
   add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
 }
 
-/* Compute the normals of the surface at `weights`, [lungs], with weight j increased by `step` in
- * every lung. `xyz` is workspace, [N, 3]. */
+/* Compute the normals of the surface at the `weights` of each lung, with weight j increased by
+ * `step` in every lung. `xyz` is workspace, [N, 3]. */
 static void find_normals(const export_source *source, const export_targets *targets,
                          double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
                          float *normals) {

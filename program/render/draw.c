@@ -424,8 +424,8 @@ supine_status supine_render_draw(supine_renderer *r, const supine_scene *scene, 
   if (scene->width == 0 || scene->height == 0 || scene->width > SIDE_MAX ||
       scene->height > SIDE_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu x %zu pixels cannot be drawn: 1 to %d a side", scene->width,
-                            scene->height, SIDE_MAX);
+                            "%zu x %zu pixels cannot be drawn: give sides of 1 to %d pixels",
+                            scene->width, scene->height, SIDE_MAX);
   }
   const size_t count = OVERSAMPLE * OVERSAMPLE * scene->width * scene->height;
   canvas c = {.renderer = r,

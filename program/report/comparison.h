@@ -40,7 +40,7 @@ typedef struct supine_comparison {
   double farthest_rms;              /* RMS distance of that direction from supine, mm */
 } supine_comparison;
 
-/* Compute all members after `postures`. Call supine_report_free in the end, also after failure. */
+/* Compute all members after `postures`. Free them with supine_report_free, also after failure. */
 supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
 
 /* Free what supine_report_find allocated. */
@@ -53,7 +53,7 @@ void supine_report_volume(const supine_comparison *comparison, char *text, size_
  * the volume of the comparison. */
 double supine_report_from_supine(const supine_comparison *comparison, const double gravity[3]);
 
-/* Return whether expected errors are known. */
+/* Return whether any expected error is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
 /* Return the volume that all lungs together gain by the breath in a posture, mL. */

@@ -104,12 +104,12 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a profile for the postures 0 to `most`. */
-static void print_profile(const supine_comparison *c, size_t most, bool share, FILE *to) {
+/* Print the title of a profile: the posture's name and its number, for postures 0 to `last`. */
+static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
   (void)fputs(share ? "Share of the lower half in a breath:"
                     : "Expansion of the lowest 30 % of the height over that of the uppermost:",
               to);
-  for (size_t i = 0; i <= most; ++i) {
+  for (size_t i = 0; i <= last; ++i) {
     double gain = 0;
     for (size_t s = SUPINE_COMPARISON_SLABS / 2; s < SUPINE_COMPARISON_SLABS; ++s) {
       gain += c->posture[i].slab[s].gain;
@@ -121,12 +121,12 @@ static void print_profile(const supine_comparison *c, size_t most, bool share, F
   }
 }
 
-static void print_ratios(const supine_comparison *c, size_t most, FILE *to) {
-  print_profile(c, most, false, to);
+static void print_ratios(const supine_comparison *c, size_t last, FILE *to) {
+  print_profile(c, last, false, to);
 }
 
-static void print_shares(const supine_comparison *c, size_t most, FILE *to) {
-  print_profile(c, most, true, to);
+static void print_shares(const supine_comparison *c, size_t last, FILE *to) {
+  print_profile(c, last, true, to);
 }
 
 json_t *supine_report_profile_finding(const supine_comparison *c, bool share) {

@@ -6,8 +6,8 @@
 
 #include "program/report/comparison_parts.h"
 
-/* A slice normal to `axis` at a share of the lungs' extent. In its picture, x points to the right
- * and the axis `down`, times `sign`, downwards: it is seen from the feet or from the front. */
+/* A slice normal to `axis` at a fraction of the lungs' extent, seen from the feet or the front. In
+ * its picture, x points right, and the axis `down` points down if `sign` is 1, up if it is -1. */
 typedef struct slice {
   const char *name;
   size_t axis;
@@ -88,7 +88,7 @@ static json_t *chart(const supine_comparison *c, const slice *s, const double lo
     const char *name = supine_options_posture_label(c->postures.item[i].name);
     double area = 0;
     json_t *own = outline(c, s, at, &c->posture[i].pose, xyz, &area);
-    if (c->posture[i].displacement.max < 0.05) { /* the reference */
+    if (c->posture[i].displacement.max < 0.05) { /* this posture is the reference */
       json_decref(own);
       continue;
     }
