@@ -27,7 +27,7 @@ typedef struct supine_command_drawing {
   breath_turn turn;
 } supine_command_drawing;
 
-/* One posture, ready to be drawn. */
+/* What a picture shows of one posture. */
 typedef struct supine_command_drawn {
   supine_pose pose;
   float *value; /* [N] displacement, mm */

@@ -29,9 +29,8 @@ supine_status supine_command_read_turn(const char *value, breath_turn *turn, sup
     seconds[length - 1] = '\0';
   }
   if (!supine_options_parse_number(seconds, &turn->seconds) || !(turn->seconds > 0.0)) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "the time of '%s' is not a number above 0: give seconds, as supine:left:5s", value);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s' needs a time above 0 s, as in supine:left:5s", value);
   }
   const supine_status status = supine_options_posture(text, turn->from, error);
   return status == SUPINE_OK ? supine_options_posture(colon[0] + 1, turn->to, error) : status;

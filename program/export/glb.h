@@ -30,7 +30,7 @@ typedef struct glb {
   export_order order; /**< order in which vertices and triangles are written */
   float *xyz;         /**< [N, 3] workspace */
   float *normals;     /**< [N, 3] unit normals of the base mesh */
-  float *added;       /**< [targets, N, 3] what targets add to normals */
+  float *added;       /**< [targets, N, 3] what each target adds to the normals at weight 1 */
   uint8_t *colours;   /**< [N, 4] RGBA */
   double step;        /**< unit of GLB_PLACES, mm; 1 in plain files */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;

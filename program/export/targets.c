@@ -43,8 +43,8 @@ void supine_export_targets_weights(const export_source *source, const export_tar
   }
 }
 
-/* Find the smallest amount of each field over directions and the breath, as its offset, and the
- * range above it, as its unit. Gains are monotonic in the volume, so both ends of the breath
+/* Set the offset of each field to its smallest amount over directions and the breath, and its unit
+ * to the range of the amounts. Gains are monotonic in the volume, so both ends of the breath
  * suffice. */
 static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {

@@ -23,7 +23,7 @@ typedef struct export_weights {
 } export_weights;
 
 typedef struct export_targets {
-  size_t count;     /**< K or 2 K */
+  size_t count;     /**< number of targets of a lung: K or 2 K */
   double middle[3]; /**< centre of the box of the vertices, mm */
   double reach;     /**< half of the longest edge of the box, mm */
   export_weights lung[SUPINE_LUNGS_MAX];

@@ -18,7 +18,7 @@ typedef struct supine_compared_posture {
   supine_distance_statistics displacement; /* from the comparison's reference, mm */
   double expected_error;           /* expected error of the displacement, mm RMS; 0 if unknown */
   double volume[SUPINE_LUNGS_MAX]; /* volume of each lung, tissue included, mL */
-  double gain[SUPINE_LUNGS_MAX];   /* share of each lung in the breath, mL */
+  double gain[SUPINE_LUNGS_MAX];   /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* all lungs together, uppermost first */
 } supine_compared_posture;
 

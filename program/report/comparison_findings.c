@@ -97,7 +97,7 @@ json_t *supine_report_findings(const supine_comparison *c) {
   enum { SENTENCES = 3 };
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count && json_array_size(list) < SENTENCES; ++i) {
-    if (c->posture[i].displacement.max >= 0.05) { /* else it is the reference */
+    if (c->posture[i].displacement.max >= 0.05) { /* this posture is not the reference */
       (void)json_array_append_new(list, printed(c, i, print_finding));
     }
   }
