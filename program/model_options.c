@@ -256,9 +256,9 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
     choice->scan = supine_patient_scan(record, state, volume, &choice->resting);
     if (state == 1 && !choice->scan.known) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "this is the emptier of the two scans that were fitted, and its "
-                              "volume below TLC is unknown: name its state, as --scanned "
-                              "supine:rest, or use the fuller scan");
+                              "this scan is the emptier of the two that were fitted, and how far "
+                              "it is below full inflation is unknown: give its state, as "
+                              "--scanned supine:rest, or use the fuller scan");
     }
     supine_findings_add(&options->findings,
                         "note: assumed to be the %s of the two fitted states; --scanned changes it",

@@ -18,9 +18,9 @@ typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
   const supine_patient_record *patient; /* patient model, owned by the caller; NULL: none */
-  double *patient_arrays;               /* of the patient model: see supine_patient_model */
-  supine_source made_from;  /* the lungs as loaded, and the axes and units of their files */
-  supine_prepared prepared; /* their model */
+  double *patient_arrays;               /* used by the patient model: see supine_patient_model */
+  supine_source made_from;  /* the lungs as loaded, with the axes and units of their files */
+  supine_prepared prepared; /* the model of the lungs */
   char assumed[800];        /* sentence about the assumptions */
   supine_findings findings; /* findings about the files and the model */
 } supine_model_options;
@@ -29,7 +29,7 @@ typedef struct supine_model_options {
 void supine_command_model_options_begin(supine_model_options *options);
 
 /* Load the files, print the findings and prepare the model.
- * @param keep  the surface is the reference, whatever the options say */
+ * @param keep  true: ignore --scanned and take the surface as the reference */
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
                                         char **paths, size_t count, bool keep, supine_error *error);
 

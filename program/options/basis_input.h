@@ -57,7 +57,7 @@ supine_status supine_options_expected_find(const supine_basis *basis, const supi
                                            supine_error *error);
 void supine_options_expected_free(supine_expected *expected);
 
-/* Print their RMS and maximum in one line; nothing where they are unknown. */
+/* Print the RMS and maximum of the errors in one line, or nothing where they are unknown. */
 void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

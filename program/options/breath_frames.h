@@ -22,7 +22,7 @@ typedef struct breath_frames {
   size_t count;    /* T */
   size_t lungs;    /* G */
   double *time;    /* [T] s */
-  double *above;   /* [T] requested volume of all lungs together, mL above rest */
+  double *above;   /* [T] requested volume of all lungs together, mL above rest or the scan */
   double *gravity; /* [T, 3] */
   double *volumes; /* [T, G] gas and tissue, mL */
 } breath_frames;
@@ -34,7 +34,7 @@ supine_state supine_breath_state(const supine_basis *basis, const double gravity
 /* Compute the volumes of frames 0 to `count` - 1, `rate` per second.
  * @param basis   must outlive the frames
  * @param frames  starts zeroed; release with supine_breath_frames_free, also after a failure
- * @retval SUPINE_ERROR_NUMERICAL  a volume is out of reach; the message has the time of the frame
+ * @retval SUPINE_ERROR_NUMERICAL  a volume is out of reach; the message states the frame's time
  * Else as supine_breath_evaluate. Eight parameters: the basis, the breath, the turn, the frames. */
 supine_status supine_breath_frames_create(const supine_basis *basis, const supine_pv *pv,
                                           const supine_pv_breath *breath, const breath_turn *turn,

@@ -79,13 +79,6 @@ void supine_options_describe(int argc, char **argv, char *text, size_t size) {
   (void)supine_text_make_utf8(text);
 }
 
-/* Read the number at the start of `text`; return its end, or NULL where there is none. */
-static const char *scan_number(const char *text, double *value) {
-  char *end = NULL;
-  *value = strtod(text, &end);
-  return end == text || !isfinite(*value) ? NULL : end;
-}
-
 bool supine_options_parse_number(const char *text, double *value) {
   return supine_options_parse_numbers(text, 1, value);
 }
@@ -93,11 +86,12 @@ bool supine_options_parse_number(const char *text, double *value) {
 bool supine_options_parse_numbers(const char *text, size_t count, double *values) {
   const char *at = text;
   for (size_t i = 0; i < count; ++i) {
-    at = scan_number(at, &values[i]);
-    if (at == NULL || *at != (i + 1 < count ? ',' : '\0')) {
+    char *end = NULL;
+    values[i] = strtod(at, &end);
+    if (end == at || !isfinite(values[i]) || *end != (i + 1 < count ? ',' : '\0')) {
       return false;
     }
-    ++at;
+    at = end + 1;
   }
   return true;
 }

@@ -56,11 +56,6 @@ void supine_options_visit(const supine_option *options, size_t base, supine_opti
   }
 }
 
-static void help_text(const supine_option *option, char *text, size_t size) {
-  (void)snprintf(text, size, "%s%s%s", option->help, option->standard != NULL ? "; default " : "",
-                 option->standard != NULL ? option->standard : "");
-}
-
 typedef struct printing {
   FILE *file;
   bool all;
@@ -87,7 +82,9 @@ static void print_row(void *context, const supine_option *option, size_t base) {
                            option->argument != NULL ? option->argument : "");
   const bool beside = used + 2 <= TEXT_COLUMN;
   (void)fprintf(file, "%s%*s", beside ? "" : "\n", beside ? TEXT_COLUMN - used : TEXT_COLUMN, "");
-  help_text(option, text, sizeof text);
+  (void)snprintf(text, sizeof text, "%s%s%s", option->help,
+                 option->standard != NULL ? "; default " : "",
+                 option->standard != NULL ? option->standard : "");
   print_text(text, TEXT_COLUMN, TEXT_COLUMN, file);
 }
 

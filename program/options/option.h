@@ -72,8 +72,8 @@ typedef struct supine_option {
   double range[2];            /* range of numbers and counts; both 0: any */
   bool open;                  /* the ends of the range are excluded */
   const char *wants;          /* valid values, for messages; NULL: derived from kind and range */
-  const char *const *choices; /* ends with NULL; only for completion where there is a reader */
-  const char *rivals;         /* a group of which at most one option may be given, once */
+  const char *const *choices; /* ends with NULL; with `read`, for shell completion only */
+  const char *rivals;         /* name of a group; of its options only one may be given, and once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
@@ -95,7 +95,7 @@ typedef struct supine_option {
 #define SUPINE_SAYS_GIVEN(type, member) .given = (1 + offsetof(type, member))
 #define SUPINE_ABOVE_ZERO .range = {0.0, INFINITY}, .open = true
 
-/* Input of a command besides its request. */
+/* Operands of a command, and its command line. */
 typedef struct supine_arguments {
   char **operand; /* [count] in the order given */
   size_t count;

@@ -77,7 +77,6 @@ static const struct {
               {NULL, "affine", "affine map"},
               {NULL, "band", "highest harmonic band"},
               {NULL, "band_95_percent_holds", "points within the 95 % band, %"},
-              {NULL, "c1_to_c9", "c1 to c9"},
               {NULL, "confidence", "confidence level"},
               {NULL, "constants_percent", "constants within, %"},
               {NULL, "control", "control parameters c1 to c5"},

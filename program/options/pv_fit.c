@@ -222,8 +222,8 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
   if (count <= SUPINE_PV_UNKNOWNS) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: number of samples in a limb: %zu; give at least %d, for %d unknowns", name, count,
-        (int)SUPINE_PV_UNKNOWNS + 1, (int)SUPINE_PV_UNKNOWNS);
+        "%s: a limb has %zu sample%s, too few for %d unknowns: give at least %d", name, count,
+        count == 1 ? "" : "s", (int)SUPINE_PV_UNKNOWNS, (int)SUPINE_PV_UNKNOWNS + 1);
   }
   problem limb = {.name = name,
                   .count = count,
