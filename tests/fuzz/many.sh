@@ -4,7 +4,7 @@
 #
 #     tests/fuzz/many.sh BUILD [RUNS [SEED]]      110000 inputs for most readers by default
 #
-# Messages are quick and get five times as many; readers that start a process get a 200th. Exit with 1 if an
+# Messages are quick and get five times as many; readers that start a process (OBJ, STL) get a 200th. Exit with 1 if an
 # input crashed a reader, or took more than 0.5 s or 2 GB.
 set -u
 build=$1
