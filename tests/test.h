@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Included by every test program: cmocka after the four headers that it wants, common headers, and
- * the definition of tests. test_main.c has the main function. */
+/* Headers and macros of every test program. test_main.c has the main function. */
 #ifndef SUPINE_TEST_H
 #define SUPINE_TEST_H
 

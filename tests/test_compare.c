@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Comparison of orientations: the Gram matrices against sums over all vertices, the search, and
- * slabs by height. */
+/* Comparison of orientations: the Gram matrices against sums over all vertices, and slabs by
+ * height. */
 #include <float.h>
 
 #include "test.h"

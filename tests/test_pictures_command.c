@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The commands supine compare, report and render. */
+/* The commands supine compare and supine render. */
 #include "program_helpers.h"
 
 #include <jansson.h>

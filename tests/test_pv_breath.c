@@ -107,7 +107,6 @@ TEST(test_breath_volume_follows_scaled_limbs) {
   }
 }
 
-/* [Santhanam2008] V: 500 mL over 5 s of inhalation, in steps of 15 ms (66.66 a second): 1.5 mL. */
 /* At constant flow, pressures are found from volumes, also on a limb of two steep parts. */
 TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   enum { COUNT = 61 };
@@ -130,6 +129,7 @@ TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   }
 }
 
+/* [Santhanam2008] V: 500 mL over 5 s of inhalation, in steps of 15 ms (66.66 a second): 1.5 mL. */
 TEST(test_breath_constant_flow_has_step_of_paper) {
   const supine_pv_breath breath = {
       .tidal = 500.0, .rate = 6.0, .inhale_fraction = 0.5, .course = SUPINE_PV_CONSTANT_FLOW};

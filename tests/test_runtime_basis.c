@@ -157,7 +157,7 @@ static void expect_refused(void (*spoil)(fixture *), const char *reason) {
   supine_error error = {0};
   assert_int_equal(open_copy(bytes, size, &error), SUPINE_ERROR_FORMAT);
   if (strstr(error.message, reason) == NULL) {
-    fail_msg("'%s' in place of '%s'", error.message, reason);
+    fail_msg("'%s' does not say '%s'", error.message, reason);
   }
   free(bytes);
   fixture_destroy(f);

@@ -15,9 +15,9 @@ enum { THREADS = 4, VERTICES = 1003 };
 typedef struct job {
   const supine_basis *basis;
   size_t number;
-  float *shared;                 /* [N, 3], of which this thread writes its share */
-  float own[3 * VERTICES];       /* its own orientation, repeatedly */
-  float batch[3 * 2 * VERTICES]; /* the shared orientation and its own */
+  float *shared;                 /* [N, 3]; each thread writes its own range */
+  float own[3 * VERTICES];       /* positions in an orientation of its own */
+  float batch[3 * 2 * VERTICES]; /* positions in the shared orientation, then its own */
 } job;
 
 static void frame(const supine_basis *basis, size_t number, double *weights, double *scales) {
