@@ -24,7 +24,8 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   va_start(arguments, format);
   (void)vsnprintf(detail, sizeof detail, format, arguments);
   va_end(arguments);
-  return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s", c->name, detail);
+  return supine_error_set(c->error, SUPINE_ERROR_FORMAT,
+                          "%s: %s: make it again with 'supine precompute'", c->name, detail);
 }
 
 /* Check that all numbers are finite and below 2^30 in size. No number of a lung is larger in any
@@ -49,12 +50,12 @@ static bool finite_doubles(const double *values, size_t count) {
   return bad == 0;
 }
 
-/* The length of an axis that may have any length. */
+/* Length of an axis that may have any length. */
 #define ANY SIZE_MAX
 
-/* Find the numbers of a tensor of this type and shape, and check that they are finite; set axes of
- * `shape` that are ANY to the tensor's. Return NULL and set the error if the file has no such
- * tensor. */
+/* Return the numbers of a tensor, after a check of its type, its shape and that they are finite;
+ * replace ANY in `shape` by the length of the tensor's axis. Return NULL and set the error if the
+ * file has no such tensor. */
 static const void *want(const check *c, const char *name, supine_dtype dtype, size_t rank,
                         size_t *shape) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, name);
@@ -87,11 +88,13 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *version = supine_safetensors_metadata(c->file, "version");
   const char *kind = supine_safetensors_metadata(c->file, "kind");
   if (format == NULL || strcmp(format, "supine-basis") != 0) {
-    return refuse(c, "a safetensors file, but not a Supine basis: make one with 'supine "
-                     "precompute'");
+    return supine_error_set(c->error, SUPINE_ERROR_FORMAT,
+                            "%s: a safetensors file, but not a Supine basis: make one with 'supine "
+                            "precompute'",
+                            c->name);
   }
   if (version == NULL || strlen(version) != 1 || strchr("123", version[0]) == NULL) {
-    return refuse(c, "basis version %.16s; this program reads versions 1 to 3",
+    return refuse(c, "version %.16s of the basis format, where this program reads versions 1 to 3",
                   version == NULL ? "unknown" : version);
   }
   info->volume_axes = version[0] == '3' ? 3 : 1;

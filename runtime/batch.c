@@ -30,7 +30,7 @@ static void batch_tiles(const supine_basis *basis, size_t count, block *scratch,
     basis->kernels->widen(&basis->tiles, first + t, here, wide);
     for (size_t j = 0; j < count; ++j) {
       const supine_target target = {.xyz = positions + j * apart + t * TILE_NUMBERS,
-                                    .rest = true,
+                                    .add_reference = true,
                                     .stream = stream,
                                     .held = scratch->held[j],
                                     .continues = t > 0,
@@ -83,6 +83,6 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const supine_p
   supine_stream_fence(stream);
   for (size_t j = 0; j < count && basis->rigid_count > 0; ++j) {
     supine_deform_rigid(basis, &poses[j], begin, end,
-                        &(supine_target){.xyz = xyz + j * apart, .rest = true});
+                        &(supine_target){.xyz = xyz + j * apart, .add_reference = true});
   }
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute volume, compliance and pressure along a limb, and a breath: the course of pressure, and
- * the volume that the limbs give it. */
+/* Compute volume, compliance and pressure along a limb of the P-V loop, and the pressure and volume
+ * of a breath over time. */
 #include <math.h>
 #include <stdbool.h>
 
@@ -193,19 +193,22 @@ supine_pv_breath supine_breath_default(void) {
 
 static supine_status breath_check(const supine_pv_breath *breath, supine_error *error) {
   if (!(breath->tidal > 0.0) || !isfinite(breath->tidal)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "tidal volume %g mL is not positive",
-                            breath->tidal);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the tidal volume is %g mL: give one above 0", breath->tidal);
   }
   if (!(breath->rate > 0.0) || !isfinite(breath->rate)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "rate %g is not a positive number of breaths a minute", breath->rate);
+                            "the rate is %g breaths a minute: give one above 0", breath->rate);
   }
   if (!(breath->inhale_fraction > 0.0 && breath->inhale_fraction < 1.0)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "inhale fraction %g is not between 0 and 1", breath->inhale_fraction);
+                            "the inhale fraction is %g: give one between 0 and 1",
+                            breath->inhale_fraction);
   }
   if ((int)breath->course < 0 || breath->course >= SUPINE_PV_COURSE_COUNT) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "unknown pressure course");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "unknown pressure course %d: see supine_pv_course",
+                            (int)breath->course);
   }
   return SUPINE_OK;
 }
@@ -278,9 +281,10 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
     cycle->gain[limb] = limb_volume(&cycle->limbs[limb], cycle->peak, NULL) - cycle->volume[limb];
     if (!(cycle->gain[limb] > 0.0)) {
-      status = supine_error_set(
-          error, SUPINE_ERROR_NUMERICAL, "the %s limb is too flat between %g and %g cmH2O",
-          supine_breath_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
+      status =
+          supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                           "the %s limb is too flat between %g and %g cmH2O: check the relation",
+                           supine_breath_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
     }
   }
   return status;

@@ -26,7 +26,7 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
-  const supine_target whole = {.xyz = aside, .rest = target->rest};
+  const supine_target whole = {.xyz = aside, .add_reference = target->add_reference};
   kernel(tiles, folded, begin / TILE, 1, &whole);
   memcpy(target->xyz, aside + 3 * (begin % TILE), 3 * (end - begin) * sizeof *aside);
 }
@@ -49,7 +49,8 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
   }
 }
 
-enum { RIGID_BLOCK = 256 }; /* number of vertices evaluated at once */
+/* Number of vertices of a rigid part that are evaluated at once. */
+enum { RIGID_BLOCK = 256 };
 
 void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
@@ -69,7 +70,7 @@ void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
     for (size_t at = first; at < last; at += RIGID_BLOCK) {
       float x[3 * RIGID_BLOCK];
       const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
-      const supine_target block = {.xyz = x, .rest = true};
+      const supine_target block = {.xyz = x, .add_reference = true};
       supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, at, next, &block);
       supine_rigid_add(&m, basis->info.vertices + 3 * at, x, next - at);
     }
@@ -77,7 +78,8 @@ void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
     for (size_t i = first > begin ? first : begin; i < last && i < end; ++i) {
       const float *p = basis->info.vertices + 3 * i;
       for (size_t a = 0; a < 3; ++a) {
-        const double value = supine_rigid_move(&m, p, a) - (target->rest ? 0 : (double)p[a]);
+        const double value =
+            supine_rigid_move(&m, p, a) - (target->add_reference ? 0 : (double)p[a]);
         target->xyz[3 * (i - begin) + a] = (float)value;
       }
     }
@@ -104,7 +106,7 @@ static void deform_lungs(const supine_basis *basis, const supine_pose *pose, siz
 
 void supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, float *xyz) {
-  deform_lungs(basis, pose, begin, end, (supine_target){.xyz = xyz, .rest = true});
+  deform_lungs(basis, pose, begin, end, (supine_target){.xyz = xyz, .add_reference = true});
 }
 
 void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz) {

@@ -20,8 +20,8 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   /* Packing, folding and the sum over modes round the displacement K + 8 times; the last addition
    * rounds each coordinate of the position once. */
   const double rounding =
-      ((double)modes + 8) * unit * scale * moved + unit * (basis->rest_size + scale * moved);
-  return 1.001 * (scale * stored + basis->rest_error + rounding);
+      ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
+  return 1.001 * (scale * stored + basis->reference_error + rounding);
 }
 
 /* Find the largest displacement of a pose, mm. */

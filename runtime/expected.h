@@ -32,8 +32,8 @@ extern const double supine_expected_shift;
 double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
                            const supine_pose *from);
 
-/** Compute the pose of a state with 1 % of the reference volume added, in equal parts to lungs that
- * the state names.
+/** Compute the pose of a state with 1 % of the reference volume added; if the state names lungs,
+ * each gets an equal part.
  * @retval those of supine_basis_pose */
 supine_status supine_expected_shifted(const supine_basis *basis, const supine_state *state,
                                       supine_pose *pose, supine_error *error);

@@ -27,27 +27,27 @@ struct supine_basis {
   const char *name_of[SUPINE_LUNGS_MAX];
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
-  supine_tiles lit;   /**< modes of the normals; bytes is NULL if there are none */
+  supine_tiles lit;   /**< modes of the normals; lit.bytes is NULL if there are none */
   supine_tiles tiles; /**< coefficients, directions and reference positions, see tiles.h */
   const supine_kernels *kernels;
   bool stream; /**< write positions with stores that bypass the caches, see STREAM_BYTES */
   supine_prefetch prefetch;
   /** Value of one unit of mode k's packed coefficients times one unit of the packed directions. */
   double mode_scale[SUPINE_MODES_MAX];
-  /** Bounds on the packing error and on the displacement of mode k, mm at weight and gain 1. */
+  /** Bounds on the packing error and on the displacement of mode k, mm, at weight 1 and gain 1. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< mL; info.reference_volume points here */
   const double *resting; /**< harmonics of the volume at rest, mL beyond the reference: [G, 9], or
                             [9] for all lungs together; or NULL */
   bool rest_by_lung;     /**< `resting` is [G, 9]; else all lungs have one gain */
-  double upright_gain;   /**< volume at full inflation upright less that supine, as a fraction of
-                            the reference volume */
-  double scan_volume;    /**< volume of the scan less that of the reference surface, mL */
+  double upright_gain;   /**< increase of the volume at full inflation from supine to upright, as a
+                            fraction of the reference volume */
+  double scan_volume;    /**< volume of all lungs in the scan less the reference volume, mL */
   double scan_gravity[3];
   const uint32_t *rigid; /**< [rigid_count, 2], see rigid.h */
   size_t rigid_count;
-  double rest_error; /**< largest packing error of a reference position, mm */
-  double rest_size;  /**< bound on the distance of a reference position from the origin, mm */
+  double reference_error; /**< largest packing error of a reference position, mm */
+  double reference_size;  /**< bound on the distance of a reference position from the origin, mm */
 };
 
 /** Pack the tensors into tiles of a storage, not AUTO; free tiles packed before.
@@ -69,7 +69,7 @@ static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
 }
 
-/** Evaluate vertices begin <= i < end, all of one lung, into a target for them. */
+/** Evaluate vertices begin <= i < end, all of one lung, into a target for vertex `begin` on. */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
 

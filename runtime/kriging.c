@@ -82,15 +82,15 @@ static void whiten(supine_kriging *fit) {
   }
   for (size_t j = 0; j < n; ++j) {
     const supine_kriging_point *p = &fit->points[j];
-    fit->white[ONE * n + j] = 1;
+    fit->whitened[ONE * n + j] = 1;
     for (size_t i = 0; i < 3; ++i) {
-      fit->white[(VOLUME + i) * n + j] = p->volume[i];
-      fit->white[(PLACE + i) * n + j] = p->position[i] - fit->centre[i];
-      fit->white[(VALUE + i) * n + j] = p->residual[i];
+      fit->whitened[(VOLUME + i) * n + j] = p->volume[i];
+      fit->whitened[(PLACE + i) * n + j] = p->position[i] - fit->centre[i];
+      fit->whitened[(VALUE + i) * n + j] = p->residual[i];
     }
   }
   for (size_t c = 0; c < SUPINE_KRIGING_COLUMNS; ++c) {
-    forward(n, fit->factor, fit->white + c * n);
+    forward(n, fit->factor, fit->whitened + c * n);
   }
 }
 
@@ -119,11 +119,11 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
     a[k * TERMS + k] = prior || absent(options, k) ? 1 : 0;
     for (size_t axis = 0; axis < 3 && !absent(options, k); ++axis) {
       double sign = 0;
-      const double *x = fit->white + (size_t)column_of(k, axis, &sign) * n;
-      right[k] += sign * dot(n, x, fit->white + (VALUE + axis) * n);
+      const double *x = fit->whitened + (size_t)column_of(k, axis, &sign) * n;
+      right[k] += sign * dot(n, x, fit->whitened + (VALUE + axis) * n);
       for (size_t l = 0; l <= k; ++l) {
         double other = 0;
-        const double *z = fit->white + (size_t)column_of(l, axis, &other) * n;
+        const double *z = fit->whitened + (size_t)column_of(l, axis, &other) * n;
         a[k * TERMS + l] += absent(options, l) ? 0 : sign * other * dot(n, x, z);
       }
     }
@@ -173,10 +173,10 @@ static void find_weights(supine_kriging *fit) {
   const size_t n = fit->count;
   for (size_t axis = 0; axis < 3; ++axis) {
     double *weights = fit->weights + axis * n;
-    memcpy(weights, fit->white + (VALUE + axis) * n, n * sizeof *weights);
+    memcpy(weights, fit->whitened + (VALUE + axis) * n, n * sizeof *weights);
     for (size_t k = 0; k < TERMS; ++k) {
       double sign = 0;
-      const double *x = fit->white + (size_t)column_of(k, axis, &sign) * n;
+      const double *x = fit->whitened + (size_t)column_of(k, axis, &sign) * n;
       for (size_t j = 0; j < n; ++j) {
         weights[j] -= sign * fit->terms[k] * x[j];
       }
@@ -189,8 +189,8 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
                                  supine_kriging *fit, supine_error *error) {
   *fit =
       (supine_kriging){.model = options->model, .points = points, .count = count, .factor = space};
-  fit->white = space + count * count;
-  fit->weights = fit->white + SUPINE_KRIGING_COLUMNS * count;
+  fit->whitened = space + count * count;
+  fit->weights = fit->whitened + SUPINE_KRIGING_COLUMNS * count;
   for (size_t i = 0; i < count; ++i) {
     for (size_t j = 0; j <= i; ++j) {
       fit->factor[i * count + j] =
@@ -224,7 +224,7 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
     sum += 2 * log(factor[k * TERMS + k]);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
-    const double *y = fit->white + (VALUE + axis) * count;
+    const double *y = fit->whitened + (VALUE + axis) * count;
     sum += dot(count, y, y);
   }
   fit->log_likelihood = -0.5 * sum;
@@ -238,7 +238,7 @@ static void leave_out_block(const supine_kriging *fit, const double *row, double
   const size_t n = fit->count;
   double column[VALUE]; /* row j of K^-1 X, by column */
   for (size_t c = 0; c < VALUE; ++c) {
-    column[c] = dot(n, row, fit->white + c * n);
+    column[c] = dot(n, row, fit->whitened + c * n);
   }
   for (size_t a = 0; a < 3; ++a) {
     for (size_t b = 0; b < 3; ++b) {

@@ -6,13 +6,13 @@
  *     cov g(p_i), g(p_j) = (s / 3) sqrt(|u_i| |u_j|) q (1 + a) exp(-a)      per axis, mm^2
  *     a = sqrt(3) |p_i - p_j| / length;  q = 1 within a lung, `across` between two
  *
- * with y the observed position less the law's, t a free translation, b an unknown volume in prior
- * standard deviations (its prior has variance 1), r a free small rotation about the centre c. One
- * n x n matrix serves x, y and z. No function allocates; any number of threads may predict from one
- * fit.
+ * y is the observed position less the law's, t a free translation, b an unknown change of volume in
+ * prior standard deviations (its prior has variance 1), and r a free small rotation about the
+ * centre c. All three axes share one n x n covariance matrix. No function allocates; any number of
+ * threads may predict from one fit.
  *
- * The covariance is Matern's of order 3/2 [Rasmussen & Williams, Gaussian Processes for Machine
- * Learning, 2006, (4.17)], the free terms are universal kriging [there, 2.7]. */
+ * The covariance is Matern's of order 3/2 (Rasmussen & Williams, Gaussian Processes for Machine
+ * Learning, 2006, equation 4.17); free terms are those of universal kriging (section 2.7). */
 #ifndef SUPINE_KRIGING_H
 #define SUPINE_KRIGING_H
 
@@ -24,7 +24,7 @@
 enum {
   SUPINE_KRIGING_POINTS_MAX = 300,
   SUPINE_KRIGING_TERMS = 7,   /**< unknowns: translation 0 to 2, volume 3, rotation 4 to 6 */
-  SUPINE_KRIGING_COLUMNS = 10 /**< numbers of each point: 1, v (3), p - c (3), y (3) */
+  SUPINE_KRIGING_COLUMNS = 10 /**< number of columns, a row for each point: 1, v, p - c, y */
 };
 
 typedef struct supine_kriging_model {
@@ -58,15 +58,16 @@ typedef struct supine_kriging {
   const supine_kriging_point *points; /**< [n] owned by the caller */
   size_t count;                       /**< n */
   double centre[3];                   /**< c, mean position of the points, mm */
-  double *factor;  /**< [n, n] lower triangle L; the covariance of the points is L L' */
-  double *white;   /**< [COLUMNS, n] L^-1 times each column */
-  double *weights; /**< [3, n] L^-1 times the residuals y less the fitted terms */
+  double *factor;   /**< [n, n] lower triangle L; the covariance of the points is L L' */
+  double *whitened; /**< [COLUMNS, n] L^-1 times each column */
+  double *weights;  /**< [3, n] L^-1 times the residuals y less the fitted terms */
   double terms[SUPINE_KRIGING_TERMS]; /**< fitted t, b and r; 0 for terms that are not unknown */
   /** Covariance of the terms; 0 for terms that are not unknown. */
   double covariance[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
-  /** Covariance of the factors of the columns 1, v and p - c, summed over the three axes. */
+  /** Covariance of the fitted terms, by the columns 1, v and p - c that they multiply, summed over
+   * the three axes: m' spread m is the variance that the terms add where the columns are m. */
   double spread[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
-  double log_likelihood; /**< restricted; constants that do not depend on the law are left out */
+  double log_likelihood; /**< restricted log likelihood, without constant terms */
 } supine_kriging;
 
 /** Compute cov g(p_i), g(p_j) of one axis, mm^2, without noise. */

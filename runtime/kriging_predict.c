@@ -105,7 +105,7 @@ static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], floa
     if (fit->spread[c][c] == 0) {
       continue;
     }
-    project(fit->count, w, fit->white + c * fit->count, column[c]);
+    project(fit->count, w, fit->whitened + c * fit->count, column[c]);
     for (size_t v = 0; v < RUN; ++v) {
       const float here = c == 0 ? 1 : c < 4 ? in->volume[c - 1][v] : in->place[c - 4][v];
       column[c][v] = here - column[c][v];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Find a state, a motion and a correction from observed points. */
+/* Find a state, a rigid motion and a correction from observed points. */
 #include <math.h>
 #include <string.h>
 
@@ -23,7 +23,7 @@ static const double sill_of_error = 4.0 / 3;
 enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
 /* Inputs, outputs and work space of one call. */
-typedef struct study {
+typedef struct workspace {
   const supine_locate_task *task;
   supine_location *found;
   supine_locate_fit *fit;
@@ -31,7 +31,7 @@ typedef struct study {
   double *law;                  /* [n, 3] the law's positions in the state, mm */
   double *kriging;              /* [supine_kriging_space(n)] */
   double *scratch;              /* [n] */
-} study;
+} workspace;
 
 static size_t doubles_of(size_t bytes) {
   return (bytes + sizeof(double) - 1) / sizeof(double);
@@ -42,7 +42,7 @@ size_t supine_locate_space(size_t count) {
          4 * count + supine_kriging_space(count);
 }
 
-static void place_in(double *space, size_t count, study *s) {
+static void place_in(double *space, size_t count, workspace *s) {
   s->fit = (supine_locate_fit *)space;
   space += doubles_of(sizeof *s->fit);
   s->points = (supine_kriging_point *)space;
@@ -66,10 +66,11 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
     const supine_observation *o = &task->observed[j];
     const double sum = o->position[0] + o->position[1] + o->position[2];
     if (o->vertex >= n || !isfinite(sum) || !(o->noise > 0) || !isfinite(o->noise)) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "observation %zu: vertex %zu of %zu vertices is out of range, or its "
-                              "position or noise is not finite or not positive",
-                              j + 1, o->vertex, n);
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT,
+          "observation %zu: give a vertex below %zu (not %zu), a finite position "
+          "and a noise above 0",
+          j + 1, n, o->vertex);
     }
   }
   return SUPINE_OK;
@@ -86,7 +87,7 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
 
 /* Set the members that do not depend on the state: scan positions, lungs, noise and the fit's
  * options. */
-static supine_status begin(study *s, supine_error *error) {
+static supine_status initialise(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -115,15 +116,15 @@ static supine_status begin(study *s, supine_error *error) {
   return status;
 }
 
-static void turn(const double rotation[9], const double x[3], double turned[3]) {
+static void rotate(const double rotation[9], const double x[3], double rotated[3]) {
   for (size_t i = 0; i < 3; ++i) {
-    turned[i] = rotation[3 * i] * x[0] + rotation[3 * i + 1] * x[1] + rotation[3 * i + 2] * x[2];
+    rotated[i] = rotation[3 * i] * x[0] + rotation[3 * i + 1] * x[1] + rotation[3 * i + 2] * x[2];
   }
 }
 
 /* Compute the law's positions in the state, and their change by one prior standard deviation of the
  * volume. */
-static supine_status evaluate(study *s, supine_error *error) {
+static supine_status evaluate(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
   supine_pose pose;
@@ -153,7 +154,7 @@ static supine_status evaluate(study *s, supine_error *error) {
 
 /* Compute the translation that takes the mean of the law's points to the mean of the observed, and
  * the residuals in the body's axes. */
-static void find_residuals(study *s) {
+static void find_residuals(workspace *s) {
   const size_t n = s->task->count;
   supine_location *found = s->found;
   double mean[3] = {0};
@@ -164,7 +165,7 @@ static void find_residuals(study *s) {
       observed[i] += s->task->observed[j].position[i] / (double)n;
     }
   }
-  turn(found->rotation, mean, s->fit->origin);
+  rotate(found->rotation, mean, s->fit->origin);
   for (size_t i = 0; i < 3; ++i) {
     s->fit->origin[i] = observed[i] - s->fit->origin[i];
   }
@@ -181,7 +182,7 @@ static void find_residuals(study *s) {
 }
 
 /* Set the rotation to the one that fits the law's points best, as a start of the search. */
-static void rotate_roughly(study *s) {
+static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
   const double *c = s->fit->origin; /* difference of the means, as the rotation is the identity */
@@ -229,7 +230,7 @@ static void rotate_further(double rotation[9], const double r[3]) {
 
 /* Change the volume by `ml`, at most by half its prior standard deviation; halve the change while
  * no pose has the new volume. */
-static supine_status change_volume(study *s, double ml, supine_error *error) {
+static supine_status change_volume(workspace *s, double ml, supine_error *error) {
   const double most = 0.5 * s->fit->deviation;
   const double before = s->found->state.volume.ml;
   ml = fmax(-most, fmin(most, ml));
@@ -246,7 +247,7 @@ static supine_status change_volume(study *s, double ml, supine_error *error) {
 }
 
 /* Find volume and rotation by Gauss-Newton steps. */
-static supine_status settle(study *s, supine_error *error) {
+static supine_status iterate(workspace *s, supine_error *error) {
   supine_locate_fit *fit = s->fit;
   const double deviation = fit->deviation;
   for (int step = 0;; ++step) {
@@ -274,8 +275,9 @@ static supine_status settle(study *s, supine_error *error) {
 }
 
 /* Compare each point with its prediction from the others.
- * @return the point with the largest residual above the limit, or `count` */
-static size_t judge(study *s, supine_locate_residual *residuals) {
+ * @return the point with the largest ratio of residual to sigma above the limit; if none is above
+ *         it, the number of points */
+static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   const size_t n = s->task->count;
   size_t worst = n;
   double largest = outlier_limit;
@@ -303,9 +305,9 @@ static size_t judge(study *s, supine_locate_residual *residuals) {
   return worst;
 }
 
-static supine_status locate(study *s, supine_locate_residual *residuals, supine_error *error) {
+static supine_status locate(workspace *s, supine_locate_residual *residuals, supine_error *error) {
   const size_t n = s->task->count;
-  supine_status status = begin(s, error);
+  supine_status status = initialise(s, error);
   if (status == SUPINE_OK) {
     status = evaluate(s, error);
   }
@@ -313,11 +315,11 @@ static supine_status locate(study *s, supine_locate_residual *residuals, supine_
     rotate_roughly(s);
   }
   while (status == SUPINE_OK) {
-    status = settle(s, error);
+    status = iterate(s, error);
     if (status != SUPINE_OK) {
       break;
     }
-    const size_t worst = judge(s, residuals);
+    const size_t worst = find_worst(s, residuals);
     if (worst == n || 5 * (s->found->outlier_count + 1) > n) {
       break;
     }
@@ -335,7 +337,7 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
     return status;
   }
   const supine_basis_info *info = supine_basis_get_info(task->inside);
-  study s = {.task = task, .found = found};
+  workspace s = {.task = task, .found = found};
   place_in(space, task->count, &s);
   memset(residuals, 0, task->count * sizeof *residuals);
   status = locate(&s, residuals, error);
@@ -356,7 +358,7 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
     found->volume_prior_error = s.fit->deviation;
     found->state.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, found->volume};
   }
-  turn(found->rotation, s.fit->kriging.terms, found->translation);
+  rotate(found->rotation, s.fit->kriging.terms, found->translation);
   for (size_t i = 0; i < 3; ++i) {
     found->translation[i] += s.fit->origin[i];
   }

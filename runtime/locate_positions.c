@@ -5,11 +5,12 @@
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
-/* The poses that positions are computed from. */
+/* Poses from which positions are computed, and constants of their expected errors. */
 typedef struct poses {
   supine_pose at, scan, fuller;
   double constant; /* min(c, RMS of u), mm */
-  double per_step; /* prior standard deviation of the volume over the volume that `fuller` adds */
+  double per_step; /* prior standard deviation of the volume, divided by the volume that `fuller`
+                      adds to `at` */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,
@@ -33,7 +34,7 @@ static supine_status find_poses(const supine_location *found, const supine_basis
   return status;
 }
 
-/* Positions of a block of vertices, and the input and output of its prediction. */
+/* Input and output of the prediction at a block of vertices. */
 typedef struct block {
   float law[3 * LOCATE_BLOCK], scan[3 * LOCATE_BLOCK], volume[3 * LOCATE_BLOCK];
   float size[LOCATE_BLOCK];

@@ -19,16 +19,16 @@ enum {
 typedef struct source {
   float coefficients[3 * SUPINE_MODES_MAX * TILE];
   float direction[TILE_NUMBERS];
-  float rest[TILE_NUMBERS];
+  float reference[TILE_NUMBERS];
 } source;
 
-/* Values of one packed unit, and the largest squared errors so far. */
+/* Values of one packed unit, and the largest squared packing errors so far. */
 typedef struct work {
   double mode[SUPINE_MODES_MAX]; /* unit of a coefficient of each mode, mm */
   double direction;              /* unit of a direction */
-  double rest;                   /* unit of a reference position, mm, a power of two */
+  double reference;              /* unit of a reference position, mm, a power of two */
   float direction_square;        /* largest squared error of a direction */
-  float rest_square;             /* largest squared error of a reference position, mm^2 */
+  float reference_square;        /* largest squared error of a reference position, mm^2 */
   source source;
 } work;
 
@@ -37,9 +37,9 @@ static float flush(float value) {
   return fabsf(value) < 1e-30F ? 0 : value;
 }
 
-/* Compute the length of a vertex's direction: compact storages divide the direction by it and
- * multiply the coefficients, so that one unit suits all vertices. 1 for a direction of 0 or a
- * vector field. */
+/* Compute the length of a vertex's direction; 1 for a direction of 0 or a vector field. Compact
+ * storages divide the direction by this length and multiply the coefficients by it, so that one
+ * unit suits all vertices. */
 static double direction_length(const supine_basis *basis, size_t i) {
   double square = 0;
   for (size_t axis = 0; axis < 3 && basis->info.direction != NULL; ++axis) {
@@ -59,7 +59,7 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   for (size_t v = 0; v < TILE; ++v) {
     const size_t i = begin + (v < left ? v : left - 1);
     length[v] = compact ? direction_length(basis, i) : 1;
-    memcpy(from->rest + 3 * v, basis->info.vertices + 3 * i, 3 * sizeof *from->rest);
+    memcpy(from->reference + 3 * v, basis->info.vertices + 3 * i, 3 * sizeof *from->reference);
     if (basis->info.direction != NULL) {
       memcpy(from->direction + 3 * v, basis->info.direction + 3 * i, 3 * sizeof *from->direction);
     }
@@ -92,9 +92,9 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
   }
 }
 
-/* Return the power of two of which `top` is 2^30 to 2^31 times, so that adding its exponent stays
- * within the exponents of a float. */
-static double rest_unit(float top) {
+/* Return the power of two u for which top / u is 2^30 to 2^31, limited so that a product with u is
+ * a normal float. */
+static double reference_unit(float top) {
   const int exponent = flush(top) > 0 ? ilogbf(top) - 30 : -130;
   return ldexp(1, exponent < 96 ? exponent : 96);
 }
@@ -109,18 +109,19 @@ static int word_bits(const supine_tiles *tiles, size_t k) {
  * coefficient is half its lowest bit, and the rounding of its word to a float. */
 static void choose_units(supine_basis *basis, work *w) {
   const bool compact = supine_tiles_compact(basis->tiles.storage);
-  const double axes =
-      sqrt((double)basis->tiles.axes); /* bound on the length of a vector of components up to 1 */
+  /* Largest length of a vector whose components are at most 1. */
+  const double axes = sqrt((double)basis->tiles.axes);
   float top[SUPINE_MODES_MAX];
   float farthest = 0;
   for (size_t i = 0; i < 6 * basis->info.lung_count; ++i) {
     farthest = fmaxf(farthest, fabsf(basis->info.bounds[i]));
   }
   largest_coefficients(basis, top);
-  basis->rest_size = sqrt(3) * (double)farthest;
-  w->rest = compact ? rest_unit(farthest) : 1;
-  w->direction = compact && basis->info.direction != NULL ? 1.0 / FIXED_TOP : 1; /* of length 1 */
-  basis->tiles.rest_unit = (uint32_t)ilogb(w->rest) << FLOAT_FRACTION_BITS;
+  basis->reference_size = sqrt(3) * (double)farthest;
+  w->reference = compact ? reference_unit(farthest) : 1;
+  /* Components of directions, which are divided by their lengths, are at most 1. */
+  w->direction = compact && basis->info.direction != NULL ? 1.0 / FIXED_TOP : 1;
+  basis->tiles.reference_unit = (uint32_t)ilogb(w->reference) << FLOAT_FRACTION_BITS;
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     const int bits = word_bits(&basis->tiles, k);
     w->mode[k] = 1;
@@ -205,7 +206,8 @@ SUPINE_CLONES __attribute__((flatten)) static void pack(const supine_basis *basi
       pack_numbers(tiles, w->direction, from->direction, tile + tiles->direction_begin,
                    &w->direction_square);
     }
-    pack_numbers(tiles, w->rest, from->rest, tile + tiles->rest_begin, &w->rest_square);
+    pack_numbers(tiles, w->reference, from->reference, tile + tiles->reference_begin,
+                 &w->reference_square);
   }
 }
 
@@ -225,7 +227,7 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage) {
   for (size_t k = 0; k < tiles->modes; ++k) {
     basis->mode_error[k] += basis->mode_size[k] * sqrt((double)w->direction_square);
   }
-  basis->rest_error = sqrt((double)w->rest_square);
+  basis->reference_error = sqrt((double)w->reference_square);
   basis->info.storage = storage;
   basis->info.packed = tiles->bytes;
   basis->info.bytes_per_vertex = (double)tiles->stride / TILE;

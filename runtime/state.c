@@ -79,7 +79,8 @@ static supine_status read_lungs(const char *text, supine_state *state, supine_er
                               "'%s': give volumes by lung as left=VOLUME,right=VOLUME", text);
     }
     if (read.lung_count == SUPINE_STATE_LUNGS_MAX) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "'%s' names more than %d lungs", text,
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "'%s' names more than %d lungs: name each once", text,
                               SUPINE_STATE_LUNGS_MAX);
     }
     char piece[PIECE];
@@ -183,7 +184,8 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   }
   char posture[PIECE];
   if ((size_t)(colon - text) >= sizeof posture) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no posture '%.64s...'", text);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "no posture '%.64s...': give one such as supine", text);
   }
   (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
   status = supine_state_parse_posture(posture, &read, error);
@@ -281,7 +283,7 @@ size_t supine_state_describe(const supine_state *state, char *text, size_t size)
     describe_volume(&out, &state->volume);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
-    add(&out, "%s%s lung ", i == 0 ? ", " : ", ", state->lungs[i].name);
+    add(&out, ", %s lung ", state->lungs[i].name);
     describe_volume(&out, &state->lungs[i].volume);
   }
   return out.length;

@@ -6,7 +6,7 @@
 //     n = sum over j of v_j n_j           v: Q numbers of each lung, n_j: Q vectors a vertex
 //
 // Attributes come from supine_gl_pack and supine_gl_pack_normals, the uniforms from supine_gl_weights
-// and supine_gl_normal_weights (supine/runtime.h). rest.w is the index of the lung and selects its gains, so
+// and supine_gl_normal_weights (supine/runtime.h). reference.w is the index of the lung and selects its gains, so
 // that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions, a normal 3 Q
 // of each more.
 
@@ -24,37 +24,37 @@ uniform vec4 supine_weights[SUPINE_VECTORS];
 uniform vec3 supine_gains[SUPINE_LUNGS];
 uniform vec3 supine_normal_weights[SUPINE_LUNGS * SUPINE_WORDS];
 
-vec3 supine_place(vec4 rest, vec3 direction, float amount) {
-  return rest.xyz + supine_gains[int(rest.w)] * amount * direction;
+vec3 supine_place(vec4 reference, vec3 direction, float amount) {
+  return reference.xyz + supine_gains[int(reference.w)] * amount * direction;
 }
 
-vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0) {
-  return supine_place(rest, direction, dot(supine_weights[0], c0));
+vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0) {
+  return supine_place(reference, direction, dot(supine_weights[0], c0));
 }
 
 #if SUPINE_VECTORS > 1
-vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0, vec4 c1) {
-  return supine_place(rest, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1));
+vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1) {
+  return supine_place(reference, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1));
 }
 #endif
 
 #if SUPINE_VECTORS > 2
-vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0, vec4 c1, vec4 c2) {
-  return supine_place(rest, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
+vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2) {
+  return supine_place(reference, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
                                         dot(supine_weights[2], c2));
 }
 #endif
 
 #if SUPINE_VECTORS > 3
-vec3 supine_displace(vec4 rest, vec3 direction, vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
-  return supine_place(rest, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
+vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
+  return supine_place(reference, direction, dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
                                         (dot(supine_weights[2], c2) + dot(supine_weights[3], c3)));
 }
 #endif
 
 // Compute the contribution of word `part` of the modes to the normal. The sum over all parts points along
 // the normal, but its length is not 1. The three modes of a word have 13, 10 and 9 bits.
-vec3 supine_normal(vec4 rest, int part, uvec3 words) {
-  vec3 v = supine_normal_weights[int(rest.w) * SUPINE_WORDS + part];
+vec3 supine_normal(vec4 reference, int part, uvec3 words) {
+  vec3 v = supine_normal_weights[int(reference.w) * SUPINE_WORDS + part];
   return v.x * vec3(ivec3(words)) + v.y * vec3(ivec3(words << 13)) + v.z * vec3(ivec3(words << 23));
 }

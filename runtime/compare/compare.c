@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the Gram matrices of a basis, and from them distances, gains and energies; compute the
+/* Compute the Gram matrices of a basis, and from them RMS distances and energies; compute the
  * distance of every vertex, and statistics of distances. */
 #include <math.h>
 #include <stdint.h>

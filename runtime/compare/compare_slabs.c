@@ -24,11 +24,12 @@ typedef struct polygon {
   corner corner[6];
 } polygon;
 
-/* Sums over the outline of a cut, whose edges p to q are in the order of the part above it. */
+/* Sums over the edges of a cut's outline, which run from p to q as in the polygons above the cut.
+ */
 typedef struct outline {
-  double length;           /* before the breath, mm */
-  double middle[TIMES][3]; /* edges' middles times lengths, mm^2 */
-  double area[TIMES][3];   /* p x q, mm^2 */
+  double length;           /* length before the breath, mm */
+  double middle[TIMES][3]; /* sum of the edges' middles times their lengths, mm^2 */
+  double area[TIMES][3];   /* sum of p x q, mm^2 */
 } outline;
 
 /* The slabs, and the cuts of one lung at the levels between them. */
@@ -92,7 +93,7 @@ static void add_edge(const corner *p, const corner *q, outline *cut) {
 /* Split a polygon at a level between its corners, and add the cut edge to `cut`.
  * @param below  written; may not be `p` */
 static void split(const polygon *p, double level, polygon *above, polygon *below, outline *cut) {
-  corner end[2] = {{.level = level}, {.level = level}}; /* where the outline goes down, and up */
+  corner end[2] = {{.level = level}, {.level = level}}; /* where the polygon's edge goes down, up */
   above->count = below->count = 0;
   for (size_t i = 0; i < p->count; ++i) {
     const corner *a = &p->corner[i];
@@ -170,10 +171,13 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
                                    const float *from, const float *xyz, size_t count,
                                    supine_slab *slabs, supine_error *error) {
   cutter c = {.from = from != NULL ? from : basis->info.vertices, .count = count};
-  if (count == 0 || count > SUPINE_SLABS_MAX || !supine_normalise(gravity, c.down)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu slabs: give 1 to %d; or gravity has no direction", count,
+  if (count == 0 || count > SUPINE_SLABS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu slabs: give 1 to %d", count,
                             (int)SUPINE_SLABS_MAX);
+  }
+  if (!supine_normalise(gravity, c.down)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "gravity is 0 or not finite: give a direction");
   }
   if (!basis->info.has_volume) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,

@@ -42,35 +42,37 @@ static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** Pack three numbers likewise: into 11, 11 and 10 bits, from the uppermost. */
+/** Pack three numbers between -2^31 and 2^31 into a word: into 11, 11 and 10 bits, from the
+ * uppermost. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 22) >> 22;
   const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;
   return word_nearest(first, lower, 21);
 }
 
-/** Pack three modes of a normal likewise: into 13, 10 and 9 bits, as the first modes are the
- * largest. */
+/** Pack three modes of a normal, between -2^31 and 2^31, into a word: into 13, 10 and 9 bits, as
+ * the first modes are the largest. */
 static inline uint32_t normal_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 23) >> 23;
   const uint32_t lower = word_nearest(second, low << 13, 22) >> 13;
   return word_nearest(first, lower, 19);
 }
 
-/** Return the unit of such a word in counts of the file's 16 bits: the largest count, 32767,
- * becomes the largest value of the 9 upper bits of a word, 255 x 2^23. */
+/** Return the value of 1 in normal_narrow, in counts of the file's 16 bits: the largest count,
+ * 32767, becomes the largest value of the 9 upper bits of a word, 255 x 2^23. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }
 
-/** Return number 0, 1 or 2 of such a word. */
+/** Return number 0, 1 or 2 of a word of normal_narrow. */
 static inline float normal_number(uint32_t word, size_t number) {
   return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
 }
 
 /** Pack three numbers between -2^31 and 2^31 into two words: the first and second into the upper 21
- * bits of a word each, the third into the 22 bits that are left. Replace 0 by the smallest positive
- * number: the kernels multiply by a power of two by adding to the exponent bits (rest_unit). */
+ * bits of a word each, the third into the remaining 22 bits. Replace 0 by the smallest positive
+ * number: the kernels multiply by a power of two by adding to the exponent bits (reference_unit).
+ */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;

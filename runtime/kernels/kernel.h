@@ -138,10 +138,11 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
 }
 
 /* Load the reference positions of a tile, mm. */
-INLINE triples rest_positions(const supine_tiles *tiles, const unsigned char *tile, bool compact) {
-  triples p = numbers(tile + tiles->rest_begin, compact);
+INLINE triples reference_positions(const supine_tiles *tiles, const unsigned char *tile,
+                                   bool compact) {
+  triples p = numbers(tile + tiles->reference_begin, compact);
   for (size_t j = 0; j < PIECES && compact; ++j) {
-    p.v[j] = (vf)((vu)p.v[j] + tiles->rest_unit);
+    p.v[j] = (vf)((vu)p.v[j] + tiles->reference_unit);
   }
   return p;
 }
@@ -206,7 +207,7 @@ INLINE void put_tile(writer *out, const triples *t) {
 }
 
 INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile, const weights *w,
-                           const vf *gain, bool with_rest, form f) {
+                           const vf *gain, bool add_reference, form f) {
   const bool compact = supine_tiles_compact(f.storage);
   const row x = dot(tiles, tile, w, f);
   triples amount;
@@ -219,17 +220,19 @@ INLINE triples deform_tile(const supine_tiles *tiles, const unsigned char *tile,
     amount = spread(&x);
     factor = numbers(tile + tiles->direction_begin, compact);
   }
-  const triples rest = with_rest ? rest_positions(tiles, tile, compact) : (triples){{{0}}};
+  const triples reference =
+      add_reference ? reference_positions(tiles, tile, compact) : (triples){{{0}}};
   for (size_t j = 0; j < PIECES; ++j) {
     factor.v[j] = f.vector ? gain[j % 3] : factor.v[j] * gain[j % 3];
-    amount.v[j] = with_rest ? FMA(amount.v[j], factor.v[j], rest.v[j]) : amount.v[j] * factor.v[j];
+    amount.v[j] =
+        add_reference ? FMA(amount.v[j], factor.v[j], reference.v[j]) : amount.v[j] * factor.v[j];
   }
   return amount;
 }
 
 INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t first, size_t count,
                          const supine_target *target, form f) {
-  const bool rest = f.modes > 0 || target->rest;
+  const bool add_reference = f.modes > 0 || target->add_reference;
   supine_tiles tiles = *any;
   if (f.modes > 0) {
     supine_tiles_layout(&tiles, f.storage, f.modes, f.vector, any->count);
@@ -245,7 +248,7 @@ INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t fi
   }
   for (size_t t = 0; t < count; ++t, tile += tiles.stride) {
     supine_prefetch_tile(tile, tiles.stride, target->prefetch);
-    const triples xyz = deform_tile(&tiles, tile, &w, gain, rest, f);
+    const triples xyz = deform_tile(&tiles, tile, &w, gain, add_reference, f);
     put_tile(&out, &xyz);
   }
   if (count > 0) {
@@ -277,7 +280,7 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_
 
 static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
                    const supine_target *target) {
-  const bool registers = LANES == 16 && target->rest;
+  const bool registers = LANES == 16 && target->add_reference;
   if (registers && tiles->modes == 4) { /* as bases of the default law have */
     deform_storage(tiles, folded, first, count, target, 4);
   } else if (registers && tiles->modes == KNOWN_MODES) {
@@ -370,7 +373,7 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
       *(triples *)(void *)(wide + to->direction_begin) =
           numbers(tile + tiles->direction_begin, true);
     }
-    *(triples *)(void *)(wide + to->rest_begin) = rest_positions(tiles, tile, true);
+    *(triples *)(void *)(wide + to->reference_begin) = reference_positions(tiles, tile, true);
   }
 }
 

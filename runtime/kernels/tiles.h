@@ -7,7 +7,7 @@
  *                      INT16  16 words of 32 bits for every two modes, see compact.h
  *                      MIXED  the same, but 16 words for every three of the last modes
  *     direction      48 numbers x y z x y z ...; none for vector fields
- *     rest           48 numbers x y z x y z ..., reference positions
+ *     reference      48 numbers x y z x y z ..., reference positions
  *
  * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. Directions and
  * reference positions are floats (EXACT) or fixed-point numbers, three in two words (compact.h), in
@@ -30,11 +30,11 @@ typedef struct supine_tiles {
   size_t axes;            /**< 1, or 3 for vector fields */
   size_t axis_bytes;      /**< bytes of the coefficients of one axis in one tile */
   size_t direction_begin; /**< byte offset of the directions in a tile */
-  size_t rest_begin;      /**< byte offset of the reference positions in a tile */
+  size_t reference_begin; /**< byte offset of the reference positions in a tile */
   size_t stride;          /**< bytes from tile to tile */
   size_t count;           /**< number of tiles */
-  uint32_t
-      rest_unit; /**< exponent of the unit of compact positions, in the exponent bits of a float */
+  /** Exponent of the unit of compact reference positions, in the exponent bits of a float. */
+  uint32_t reference_unit;
   unsigned char *bytes; /**< [count, stride] */
 } supine_tiles;
 
@@ -49,8 +49,8 @@ static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
 
-/** Return the number of modes before those, which have two coefficients to a word in a compact
- * storage. */
+/** Return the number of modes before those of supine_tiles_thirds. In a compact storage, two of
+ * their coefficients share a word. */
 static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
@@ -60,7 +60,7 @@ static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
   return 64 * (k < paired ? k / 2 : (paired + 1) / 2 + (k - paired) / 3);
 }
 
-/** Fill in everything but `bytes` and `rest_unit` for a storage, never AUTO. The function is
+/** Fill in everything but `bytes` and `reference_unit` for a storage, never AUTO. The function is
  * inline, so that the layout is a constant if the number of modes is. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
@@ -74,8 +74,8 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   tiles->axes = vector ? 3 : 1;
   tiles->axis_bytes = line * (compact ? (paired + 1) / 2 + thirds : modes);
   tiles->direction_begin = tiles->axes * tiles->axis_bytes;
-  tiles->rest_begin = tiles->direction_begin + (vector ? 0 : numbers);
-  tiles->stride = tiles->rest_begin + numbers;
+  tiles->reference_begin = tiles->direction_begin + (vector ? 0 : numbers);
+  tiles->stride = tiles->reference_begin + numbers;
   tiles->count = count;
 }
 
@@ -95,7 +95,7 @@ static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, si
 
 /** How to prefetch tiles. */
 typedef enum supine_prefetch {
-  SUPINE_PREFETCH_NONE, /**< they are in the cache */
+  SUPINE_PREFETCH_NONE, /**< not at all, as the tiles are in the cache */
   SUPINE_PREFETCH_NEAR, /**< every other line, 640 bytes ahead, to the second-level cache */
   SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
@@ -117,9 +117,9 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
 
 /** Where and how a kernel writes. */
 typedef struct supine_target {
-  float *xyz;  /**< [16 tiles, 3] */
-  bool rest;   /**< write positions; false: displacements */
-  bool stream; /**< use stores that bypass the caches */
+  float *xyz;         /**< [16 tiles, 3] */
+  bool add_reference; /**< write positions; false: displacements */
+  bool stream;        /**< use stores that bypass the caches */
   supine_prefetch prefetch;
   /** [16] or NULL. If several calls write one array: the last numbers of one call, which the next
    * call stores, as both share a cache line. */

@@ -105,8 +105,8 @@ supine_status supine_safetensors_verify(const supine_safetensors *file, supine_e
   const char *stated = supine_safetensors_metadata(file, "checksum");
   if (stated == NULL) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: no checksum, so that Supine has not written it: write it again "
-                            "with Supine",
+                            "%s: no checksum, so it was not written by Supine: write it again with "
+                            "Supine",
                             file->name);
   }
   char found[CHECKSUM_SIZE];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Parse the header of a safetensors file: strict JSON (RFC 8259). Every number in it is checked.
- * Look up element types. */
+/* Parse the header of a safetensors file, strict JSON (RFC 8259), and check every number in it;
+ * look up element types. */
 #include <inttypes.h>
 #include <limits.h>
 #include <stdarg.h>
@@ -42,7 +42,7 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
 }
 
 /* The header being parsed, which ends with a NUL. After the first failure, take() accepts no
- * character and the first error is kept. */
+ * character, and later failures do not change the error. */
 typedef struct parser {
   supine_safetensors *file;
   char *at, *end;
@@ -315,7 +315,7 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
     at += size_of(&file->tensors[i]);
   }
   if (at != data_size) {
-    fail(p, "%s: the tensors need %zu bytes, the file has %zu",
+    fail(p, "%s: the tensors need %zu bytes, the file has %zu: copy or write it again",
          at > data_size ? "truncated" : "trailing bytes", at, data_size);
     return p->status;
   }

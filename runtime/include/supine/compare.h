@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Comparisons of orientations: distances between deformed lungs, and ventilation by height.
+ * Comparisons of states: distances between deformed lungs, and ventilation by height.
  *
  * Averages are over the area of the reference surface: the weight a_i of vertex i is a third of the
- * area of its triangles, divided by the area of all. A deformed state is a supine_pose. */
+ * area of its triangles, divided by the area of all triangles. A deformed state is a supine_pose.
+ */
 #ifndef SUPINE_COMPARE_H
 #define SUPINE_COMPARE_H
 

@@ -8,7 +8,8 @@
  * displacement from another state, V_full the volume of the reference surface, and c a constant,
  * 4.5 mm (95 % interval 3.7 to 5.7). Half of all points lie within 0.9 sigma of the truth, 95 %
  * within 1.8 sigma. c was measured on full breaths of 15 people in one posture; for a change of
- * posture it is an extrapolation. The second term applies only if the volume at rest is assumed.
+ * posture it is an extrapolation. The second term applies only to a state whose volume counts from
+ * an assumed volume at rest.
  *
  * With observed points, kriging corrects the positions. Expected errors shrink near the points.
  * With three points or more and no unknown rotation, they never exceed those above; fewer points do
@@ -68,22 +69,23 @@ typedef struct supine_location {
   supine_state state;        /**< the task's; if the volume was unknown, the one found, absolute */
   double volume;             /**< volume of all lungs, gas and tissue, mL; 0 without volumes */
   double volume_error;       /**< standard deviation of `volume`, mL; 0 if the volume was given */
-  double volume_prior_error; /**< the same without observations, mL */
+  double volume_prior_error; /**< standard deviation of `volume` without observations, mL; 0 if the
+                                  volume was given */
   double rotation[9];        /**< by rows: observed = rotation (body + correction) + translation */
   double translation[3];     /**< mm */
   double residual_rms;  /**< RMS distance of each point from its prediction by all other points, mm,
                              without outliers; 0 with one point */
   double log_evidence;  /**< log likelihood, to compare tasks that differ only in the posture */
   size_t outlier_count; /**< number of observations that do not fit and were left out */
-  const void *fit;      /**< the fit, stored in the workspace `space` */
+  const void *fit;      /**< the fit, in the `space` that was given to supine_locate */
 } supine_location;
 
-/** How well an observed point fits. */
+/** Residual of an observed point. */
 typedef struct supine_locate_residual {
-  double distance; /**< distance from its prediction by all other points, mm; 0 if they do not
-                        determine it */
+  double distance; /**< distance of the observed position from its prediction by all other points,
+                        mm; 0 if they do not determine it */
   double sigma;    /**< expected 3-D standard deviation of `distance`, mm */
-  bool outlier;    /**< does not fit, and was left out */
+  bool outlier;    /**< the observation does not fit and was left out */
 } supine_locate_residual;
 
 /** Return the number of doubles that supine_locate needs for `count` points. */
@@ -93,8 +95,8 @@ SUPINE_API size_t supine_locate_space(size_t count);
  *
  * The prior of an unknown volume has its mean at rest (at the scan if the basis has no rest) and a
  * standard deviation of 0.17 of the reference volume. A point farther than 3 sigma from its
- * prediction by the others is left out, the worst first, as long as at least four fifths of the
- * points remain.
+ * prediction by all other points is left out, the worst first, as long as at least four fifths of
+ * the points remain.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)]; keep it as long as `found` is used
  * @retval SUPINE_ERROR_ARGUMENT   a count, vertex, position or noise is out of range; for a

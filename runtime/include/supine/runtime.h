@@ -64,13 +64,13 @@ typedef enum supine_simd {
   SUPINE_SIMD_COUNT
 } supine_simd;
 
-/** Options of opening a basis; zeros after the size are the defaults. */
+/** Options for opening a basis; zeros after `size` are the defaults. */
 typedef struct supine_basis_options {
   size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
-  bool without_normals; /**< ignore the file's normals: saves 12 bytes a vertex for every 3 of their
-                             modes */
+  bool without_normals; /**< ignore the file's normals, to save 12 bytes a vertex for every 3 modes
+                             of the normals */
 } supine_basis_options;
 
 /** The content of an open basis. The basis owns the struct and all arrays. */
@@ -107,14 +107,15 @@ typedef struct supine_basis_info {
    * only to measure memory traffic, as the layout changes between versions. */
   const void *packed;
   size_t normal_count;            /**< Q, modes of the normals (supine_deform_lit); 0: none */
-  const int16_t *normals;         /**< [N, 3, Q] n */
-  const double *normal_weights;   /**< [G, Q, 3, T] V, T = 1 + 2 K + K (K + 1) / 2; in files of
-                                       versions 1 and 2 [G, Q, (K + 1)(K + 2) / 2] */
+  const int16_t *normals;         /**< [N, 3, Q] n, see supine_deform_lit */
+  const double *normal_weights;   /**< [G, Q, 3, T] V, T = 1 + 2 K + K (K + 1) / 2, see
+                                       supine_basis_normal_weights; in files of versions 1 and 2
+                                       [G, Q, (K + 1)(K + 2) / 2] */
   const double *reference_volume; /**< [G] volume of each lung of the reference surface, gas and
                                        tissue, mL; 0 without volumes */
   bool has_rest;                  /**< the file has the volume at rest for every posture */
   bool has_full;                  /**< the reference surface is at full inflation */
-  bool is_fields;     /**< made from another simulator's fields; gain 1 gives these fields */
+  bool is_fields;     /**< the file was made from another simulator's fields; gain 1 gives them */
   size_t volume_axes; /**< A: 3; 1 in files of versions 1 and 2, whose gains are equal on
                            all axes */
   double bend[3];     /**< bend of the path between full inflation and rest on each axis, see
@@ -133,7 +134,7 @@ typedef struct supine_pose {
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT       it is truncated, corrupted or not a basis file
- * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or the options lack their size
+ * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or `size` is not set
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instructions asked for
  * @retval SUPINE_ERROR_MEMORY
  * Cost: a few passes over the file. Memory: bytes_per_vertex for each vertex, 12 bytes for each
@@ -203,12 +204,13 @@ SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supi
                                            supine_pose *pose, supine_error *error);
 
 /** Compute the gains of a state for the weights that `pose` already has, for example during a
- * breath in one posture. Statuses as supine_basis_pose. */
+ * breath in one posture. The weights must be those of the state's gravity. Statuses as
+ * supine_basis_pose. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
-/** Return the volume that SUPINE_VOLUME_DEFAULT means for this basis (see supine_basis_pose). If
- * the basis was made from fields and has no rest, the kind of the result is SUPINE_VOLUME_DEFAULT:
+/** Return the volume that SUPINE_VOLUME_DEFAULT means for this basis (see supine_basis_pose); for
+ * a basis that was made from fields and has no rest, SUPINE_VOLUME_DEFAULT itself, which means
  * gain 1. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
@@ -254,7 +256,8 @@ SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
                                     const supine_pose *poses, size_t begin, size_t end, float *xyz);
 
 /** Compute the displacements A_j (w . c_i) d_ij of vertices begin <= i < end, in mm, without the
- * reference positions. They are linear in the gains: supine_step adds those of one step. */
+ * reference positions. They are linear in the gains, except in rigid parts: the displacements for
+ * the difference between the gains of two poses lead from one to the other (supine_step). */
 SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
                                       size_t begin, size_t end, float *xyz);
 
@@ -266,12 +269,14 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_po
  * @param step   [count, 3] displacements of one step, from supine_displace_range with the
  *               differences of the gains; their negatives give the step back
  * @param xyz    [count, 3] positions before and after; must not overlap `step`
- * Rounding errors add up, by at most 2^-24 of the coordinate a step. Begin each breath from
- * supine_deform. */
+ * Each step rounds a coordinate by at most 2^-24 of it, and these errors add up: begin each breath
+ * from supine_deform.
+ *
+ * [Santhanam2008]  see supine/breath.h */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
 /** Compute the weights v of the normals' modes for each lung. Component c of a normal is quadratic
- * in the weights w and in the gains a and b of the two axes after c (cyclically), so that
+ * in the weights w, and linear in each of the gains a and b of the two axes after c (cyclically):
  *
  *     v_j = sum over c of V_jc . (1, a w_k, b w_k, a b w_k w_l (k <= l))
  *
@@ -311,17 +316,17 @@ SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, cons
  * Cost: one pass over the triangles, in the caller's thread. */
 SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, float *normals);
 
-/** Largest number of modes of supine.glsl, and number of floats before the coefficients in the
- * attributes of a vertex. */
+/** Largest number of modes that supine.glsl evaluates, and number of floats before the
+ * coefficients in the attributes of a vertex. */
 enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 
 /** Fill a vertex buffer for supine.glsl with vertices begin <= i < end, each of which has
  *
- *     rest          vec4 at byte 0: reference position, mm, and the index of the lung as w
+ *     reference     vec4 at byte 0: reference position, mm, and the index of the lung as w
  *     direction     vec3 at byte 16, mm
  *     coefficients  (K + 3) / 4 vec4s from byte 28; the last may have fewer than four numbers
  *
- * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes a vertex of 4 modes
+ * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes a vertex if K is 4
  * @retval SUPINE_ERROR_UNSUPPORTED  more than SUPINE_GL_MODES modes, or a vector field */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
@@ -336,8 +341,8 @@ SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supi
 
 /** Pack the normals' modes of vertices begin <= i < end for supine.glsl: three modes to a word, in
  * SUPINE_WORDS W = (Q + 2) / 3 attributes of type uvec3.
- * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes a vertex of 6
- * modes
+ * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes a vertex if Q is
+ *               6
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis has no normals, or was opened without_normals */
 SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
                                                 uint32_t *words);

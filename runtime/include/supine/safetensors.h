@@ -95,8 +95,7 @@ SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_s
                                                                   size_t *count);
 
 /** Check the content against the metadata "checksum". Cost: one pass at about the speed of memory.
- * @retval SUPINE_ERROR_FORMAT  the file states no checksum, or one that differs from its content's:
- *                              it is corrupted */
+ * @retval SUPINE_ERROR_FORMAT  the file states no checksum, or it is corrupted and has another */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
 

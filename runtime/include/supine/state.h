@@ -32,7 +32,7 @@ typedef enum supine_volume_kind {
   SUPINE_VOLUME_REST,        /**< the end of a quiet expiration in the posture */
   SUPINE_VOLUME_FULL,        /**< full inflation */
   SUPINE_VOLUME_SCAN,        /**< the volume scanned */
-  SUPINE_VOLUME_ABSOLUTE,    /**< zero: `ml` is the volume of gas and tissue, as measured in a CT */
+  SUPINE_VOLUME_ABSOLUTE,    /**< 0 mL: `ml` is the volume of gas and tissue, as measured in a CT */
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;
 

@@ -30,7 +30,7 @@ typedef struct supine_volume_form {
  *     of[6]     += sum_klm T_klm w_k w_l w_m
  *
  * @param count      K
- * @param axes       3; or 1 with one gain for all axes, whose forms go to x, yz and xyz
+ * @param axes       3; or 1 if all axes have one gain: the sums are then added for x, yz and xyz
  * @param linear     L [axes, K], mL
  * @param quadratic  Q [axes, K, K], mL
  * @param third      T [K, K, K], mL
@@ -42,7 +42,7 @@ SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *
 /** Compute V - F, mL, at three gains. */
 SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
 
-/** Compute V - F for gains of s times `ratio`, as a cubic: c[0] s + c[1] s^2 + c[2] s^3. */
+/** Compute the coefficients of V - F = c[0] s + c[1] s^2 + c[2] s^3 for the gains s `ratio`. */
 SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
                                          double cubic[3]);
 
@@ -66,8 +66,8 @@ SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ra
 
 /** Find the gains on the path of supine_volume_bend at which a lung holds a volume.
  * @param bend    [3] bend of the path
- * @param rest    volume at rest, mL above the reference; unused if the bend is 0
- * @param volume  wanted volume, mL above the reference
+ * @param rest    volume at rest less F, mL; unused if the bend is 0
+ * @param volume  volume to hold less F, mL
  * @param gains   [3], written
  * @retval SUPINE_ERROR_NUMERICAL  there are none: the surface folds before, or the volume does not
  *                                 change with the gains */
