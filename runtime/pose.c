@@ -181,7 +181,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  supine_error *error) {
   if (state->lung_count != v->lungs) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the state names %zu lung%s, and the basis has %zu: give each a volume",
+                            "the state names %zu lung%s, and the basis has %zu: name them all",
                             state->lung_count, state->lung_count == 1 ? "" : "s", v->lungs);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
