@@ -97,7 +97,7 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   }
 }
 
-/* Add a number for each lung, separated by commas. */
+/* Add metadata with a number for each lung, separated by commas. */
 static void add_by_lung(entries *list, const char *key, size_t count, const double values[2]) {
   if (count == 2) {
     add(list, key, "%.9g,%.9g", values[0], values[1]);
@@ -179,7 +179,7 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Find the normals' modes of the surface and field as they are written to the file. */
+/* Find the modes of the normals for the surface and field that are written to the file. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {
@@ -229,7 +229,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   float *directions = NULL;
   double *rest = malloc(3 * n * sizeof *rest);
   unsigned char *lung = malloc(n);
-  if (rest != NULL) { /* holds the surface with collapsed lungs, then its directions */
+  if (rest != NULL) { /* first for the positions of collapsed lungs, then for their directions */
     supine_tissue_rest(lungs, share, rest);
     vertices = to_float(rest, 3 * n);
   }

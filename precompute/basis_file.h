@@ -11,12 +11,12 @@
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
   const supine_precompute_options *options; /**< with `fit`: modes, findings and made_by */
-  const supine_fit_report *fit; /**< of another simulator's fields; NULL: the field of a model */
+  const supine_fit_report *fit; /**< fit of another simulator's fields; NULL: a model's field */
   const double *directions;     /**< [N, 3]; NULL: a vector field */
   const supine_compression *compression;
-  const supine_volume_forms *forms; /**< of the coefficients; NULL: open surface */
+  const supine_volume_forms *forms; /**< forms of the coefficients; NULL: open surface */
   const supine_accuracy *accuracy;
-  const supine_reference *reference; /**< at full inflation; NULL: the scan is the reference */
+  const supine_reference *reference; /**< volumes of the lungs; NULL: rest and full are unknown */
   const double *resting;             /**< [G, 9] harmonics of the volumes at rest, mL beyond the
                                           reference surface; NULL without `reference` */
   const double *turned_over;         /**< share of triangles, see supine_accuracy_turned_over;

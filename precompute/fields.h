@@ -5,8 +5,8 @@
  *
  *     minimise over C:  sum over directions j of |u(g_j) - C Y(g_j)|^2
  *
- * The default band is the one with the smallest leave-one-out error of those that the directions
- * determine. */
+ * By default, of the bands that the directions determine, a higher one is chosen if it reduces the
+ * leave-one-out error by more than 1 %. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
@@ -28,9 +28,9 @@ typedef struct supine_fields {
  * @param options  axes and unit of the displacements
  * @param fields   release with supine_fields_free
  * @retval SUPINE_ERROR_READ    the file is missing
- * @retval SUPINE_ERROR_FORMAT  malformed; fewer than two directions, one that is zero or not
- * finite, or two equal ones; a displacement that is not finite
- * @retval SUPINE_ERROR_MESH    displacements of another number of vertices
+ * @retval SUPINE_ERROR_FORMAT  malformed; fewer than two directions, a direction that is zero or
+ * not finite, two equal directions, or a displacement that is not finite
+ * @retval SUPINE_ERROR_MESH    the number of vertices differs from that of the lungs
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  const supine_mesh_load_options *options, supine_fields *fields,
@@ -44,7 +44,7 @@ typedef struct supine_fit_report {
   size_t band_highest; /**< highest band that the directions determine */
   size_t band;         /**< chosen band */
   double condition;    /**< condition number of the band's harmonics at the directions */
-  size_t mode_count;   /**< of the basis; set by supine_precompute_fields */
+  size_t mode_count;   /**< number of modes of the basis; set by supine_precompute_fields */
   double error[SUPINE_FIT_BAND_MAX + 1]; /**< leave-one-out error of each band up to band_highest,
                                           * relative RMS */
   supine_accuracy accuracy; /**< leave-one-out error of the basis; errors in mm are those at the
@@ -53,8 +53,8 @@ typedef struct supine_fit_report {
 
 /** Options of the fit. */
 typedef struct supine_fit_options {
-  int band;             /**< negative: by leave-one-out error */
-  size_t modes;         /**< largest number of modes; 0: the harmonics */
+  int band;             /**< negative: chosen by the leave-one-out error */
+  size_t modes;         /**< largest number of modes; 0: the harmonics themselves */
   const char *findings; /**< notes on the surface for the basis, one a line; optional */
   const char *made_by;  /**< for the basis's metadata; optional */
 } supine_fit_options;

@@ -17,8 +17,8 @@
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
-/* A higher band is chosen only if its error is below this share of the chosen lower band's, and
- * only while the latter exceeds the rounding error of single-precision coefficients. */
+/* A higher band is chosen only if its error is below `worthwhile` times the error of the band
+ * chosen so far, and if that error exceeds the rounding error of single-precision coefficients. */
 static const double worthwhile = 0.99;
 static const double exact = 1e-6; /* relative RMS */
 
@@ -34,7 +34,7 @@ typedef struct fit {
 typedef struct prediction {
   double *analysis; /* [P, M] A without the direction */
   double *part;     /* [P, M] work space */
-  double *gram;     /* [P, P] of the coefficients */
+  double *gram;     /* [P, P] scalar products of the coefficients, mm^2 */
   double *values;   /* [P] eigenvalues */
   double *vectors;  /* [P, P] eigenvectors */
   double *seen;     /* [P] harmonics at the direction, projected on the modes */
@@ -187,8 +187,8 @@ static double leave_one_out(const fitting *w, const fit *f) {
   return sqrt(sum / square_sum(w));
 }
 
-/* Try the bands that the directions determine; keep the wanted one, or if that is negative, the one
- * with the smallest error. */
+/* Try the bands that the directions determine; keep band `wanted` or, if that is negative, the one
+ * with the smallest worthwhile error. */
 static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
                                  supine_error *error) {
   const size_t m = w->fields->direction_count;

@@ -12,19 +12,18 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/projection.h"
 
-/* Bounds of the default number of held-out directions, and the number of vertices times directions
- * that sets it between them. A hundred directions give the error to about 5 %, a thousand to 1 or 2
- * %. */
+/* Bounds on the default number of held-out directions, which is HELD_OUT_WORK over the number of
+ * vertices. A hundred directions give the error to about 5 %, a thousand to 1 or 2 %. */
 enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 
-/* Volume, mL, at which errors in mm are stated if rest is unknown. */
+/* Volume above the reference at which errors in mm are stated if rest is unknown, mL. */
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
 /* Modes are dropped while the error stays below this multiple of the error with all modes. */
 static const double same_error = 1.01;
 
-/* Everything that the steps of supine_precompute pass on. */
+/* Input and results of the steps of supine_precompute. */
 typedef struct pipeline {
   const supine_lungs *given;
   const supine_lungs *lungs; /* `given` or `anchored` */
@@ -43,8 +42,8 @@ typedef struct pipeline {
   supine_accuracy accuracy;
   double turned_over;
   double resting[2][9]; /* harmonics of each lung's volume at rest, mL beyond the reference */
-  double
-      volume[9]; /* harmonics of the volume at which errors in mm are stated: rest, or a breath */
+  /* Harmonics of the volume beyond the reference at which errors in mm are stated, mL. */
+  double volume[9];
   supine_error_table table;
 } pipeline;
 

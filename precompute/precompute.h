@@ -16,10 +16,10 @@ typedef bool supine_progress_function(void *context, double fraction);
 /** Options of a basis. */
 typedef struct supine_precompute_options {
   supine_model model;
-  const supine_reference *reference; /**< of the lungs; NULL: their surface is the reference */
+  const supine_reference *reference; /**< volumes of the lungs; NULL: rest and full are unknown */
   size_t band;                       /**< L */
   size_t modes;          /**< largest number of modes; 0: the (band + 1)^2 harmonics themselves */
-  size_t held_out;       /**< directions at which the error is measured; 0: 100 to 1000 */
+  size_t held_out;       /**< number of directions at which the error is measured; 0: 100 to 1000 */
   double expected_error; /**< c of supine/locate.h, mm, if below its default; 0: the default */
   supine_scan_frame frame;
   supine_progress_function *progress; /**< optional */
@@ -38,8 +38,8 @@ typedef struct supine_precompute_report {
   size_t mode_count;
   size_t solve_count; /**< number of directions solved for */
   supine_accuracy accuracy;
-  double turned_over; /**< at the accuracy's state, see supine_accuracy_turned_over; 0 if the
-                       * surface is open */
+  double turned_over; /**< share of triangles, see supine_accuracy_turned_over; 0 if the surface is
+                       * open */
 } supine_precompute_report;
 
 /** Project, compress, measure, and write the basis file, whole or not at all.

@@ -25,7 +25,7 @@ static supine_model choose_law(const supine_model_choice *choice) {
                                                     ? (supine_law)choice->law
                                                     : (none ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP));
   supine_model model = choice->model;
-  if (choice->own != NULL) {
+  if (choice->patient_law != NULL) {
     return model;
   }
   model.law = law.law;
@@ -150,7 +150,8 @@ static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   char state[160];
   double ml[2];
   supine_text_add(p->summary, size, "%s law; scan ",
-                  choice->own != NULL ? choice->own : supine_physics_law_names[p->model.law]);
+                  choice->patient_law != NULL ? choice->patient_law
+                                              : supine_physics_law_names[p->model.law]);
   if (!reference->known) {
     supine_text_add(p->summary, size, "taken as the reference of every posture");
     return;

@@ -15,10 +15,10 @@ enum { SUPINE_LESIONS_MAX = 64 };
 /** The user's choices for the model and the scan. */
 typedef struct supine_model_choice {
   int law; /**< a supine_law; SUPINE_LAW_COUNT: `paper` if the scan is none, else `deep` */
-  supine_model model; /**< constants; NAN: those of the law */
-  const char *own;    /**< name of a patient's law, if `model` has all its constants; else NULL */
-  const double *stiffness; /**< [N] E of a patient's law, or NULL */
-  bool has_scan;           /**< false: `scan` is unset: full, or none with the paper's law */
+  supine_model model;      /**< constants; NAN: those of the law */
+  const char *patient_law; /**< name of a patient's law, whose constants `model` has; else NULL */
+  const double *stiffness; /**< [N] stiffness E of a patient's law, or NULL */
+  bool has_scan; /**< `scan` was given; else the scan is full, or none with the paper's law */
   supine_scan scan;
   supine_resting resting;
   supine_person person;
@@ -26,7 +26,8 @@ typedef struct supine_model_choice {
   supine_expandability_law expandability_law;
   size_t lesion_count;
   supine_lesion lesions[SUPINE_LESIONS_MAX];
-  double share[2]; /**< shares of a collapsed left and right lung; 0: healthy */
+  double share[2]; /**< share of its healthy volume that the collapsed left or right lung has; 0:
+                      the lung is healthy */
 } supine_model_choice;
 
 /** Return the default choices. */

@@ -38,8 +38,8 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-static void find_in_mesh(const char *path, const supine_mesh_report *report,
-                         supine_findings *findings) {
+static void note_mesh(const char *path, const supine_mesh_report *report,
+                      supine_findings *findings) {
   if (report->degenerate_faces > 0 || report->unreferenced_vertices > 0) {
     supine_findings_add(
         findings, "%s: note: dropped %zu degenerate face%s and %zu unreferenced vert%s", path,
@@ -54,17 +54,19 @@ static supine_status load_meshes(reading *r, supine_findings *findings, supine_e
     if (r->errors[i].status != SUPINE_OK) {
       return supine_error_set(error, r->errors[i].status, "%s", r->errors[i].message);
     }
-    find_in_mesh(r->paths[i], &r->reports[i], findings);
+    note_mesh(r->paths[i], &r->reports[i], findings);
   }
   r->axes = r->reports[0].axes;
   return SUPINE_OK;
 }
 
-static void find_in_map(const char *path, const supine_labels_report *report,
-                        supine_findings *findings) {
+static void note_map(const char *path, const supine_labels_report *report,
+                     supine_findings *findings) {
   if (report->frames_differ) {
     supine_findings_add(findings,
-                        "%s: warning: its qform and sform do not agree; the sform was used", path);
+                        "%s: warning: its qform and sform do not agree; the sform was used: check "
+                        "the positions",
+                        path);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
@@ -162,7 +164,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
     r->midline = source->report.lung[0].side > 0 ? low[0] : high[0];
     r->has_midline = true;
   }
-  find_in_map(r->paths[0], &source->report, findings);
+  note_map(r->paths[0], &source->report, findings);
   return SUPINE_OK;
 }
 

@@ -15,8 +15,8 @@ typedef struct supine_source_options {
   supine_mesh_load_options load;
   supine_labels_options labels; /**< of label maps; the axes of `load` replace its own */
   const char *surfaces_out;     /**< path for the joined surfaces of a label map, or NULL */
-  bool has_midline;             /**< false: found */
-  double midline;               /**< mm */
+  bool has_midline;             /**< `midline` was given; else it is found */
+  double midline;               /**< x between the lungs, mm */
 } supine_source_options;
 
 /** Result of loading. */
@@ -32,8 +32,7 @@ typedef struct supine_source {
 /** Read surfaces (all at once) or label maps, check them and join them into lungs.
  * @param source    zeroed; release with supine_precompute_source_free
  * @param findings  notes and warnings are added, also after a failure
- * @retval SUPINE_ERROR_ARGUMENT  maps beside surfaces; options of the one kind with files of the
- * other
+ * @retval SUPINE_ERROR_ARGUMENT  both label maps and surfaces, or an option for the other kind
  * Other statuses as supine_mesh_load, supine_labels_surfaces and supine_lungs_gate */
 supine_status supine_precompute_source_load(const supine_source_options *options, char **paths,
                                             size_t count, supine_source *source,

@@ -247,7 +247,7 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
   if (status != SUPINE_OK) {
     return status;
   }
-  choice->own = "the patient's own";
+  choice->patient_law = "the patient's own";
   choice->model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_patient_resting(record, &choice->resting);
   if (!choice->has_scan) {

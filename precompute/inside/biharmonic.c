@@ -14,7 +14,8 @@
 
 #include "precompute/inside/biharmonic.h"
 
-/* Affine terms; columns of the matrix eliminated together; points and centres in a tile of sums. */
+/* Number of affine terms, of columns of the matrix that are eliminated together, and of points and
+ * centres in a tile of sums. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
 static inline double apart(const double a[3], const double b[3]) {
@@ -40,8 +41,8 @@ static void frame(size_t count, const double *points, supine_inside_biharmonic *
   fit->unit = square > 0.0 ? sqrt(square) : 1.0;
 }
 
-/* Choose as first centre the point farthest from the middle, as each next one the point farthest
- * from all earlier ones. */
+/* Choose the centres: first the point farthest from the middle, then always the point farthest from
+ * all earlier centres. */
 SUPINE_CLONES static supine_status choose(size_t count, const double *points, size_t centre_max,
                                           supine_inside_biharmonic *fit) {
   double *distance = malloc(count * sizeof *distance);

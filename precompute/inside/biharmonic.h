@@ -19,7 +19,7 @@ typedef struct supine_inside_biharmonic {
   size_t columns;   /**< number of values per point, R */
   size_t *chosen;   /**< [M] indices of the centres among the points, in order of choice */
   double *centres;  /**< [M, 3] in units of `unit` about `middle` */
-  double *weights;  /**< [R, M + 4]: those of the centres, then of 1, x, y, z */
+  double *weights;  /**< [R, M + 4] weights of the centres, then of 1, x, y, z */
   double middle[3]; /**< centre of the points' box, mm */
   double unit;      /**< half the diagonal of the points' box, mm */
   double spacing;   /**< largest distance of a point from the nearest centre, mm */
@@ -32,7 +32,7 @@ typedef struct supine_inside_biharmonic {
  * @param values  [count, columns]
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY
- * Cost: count M distances to choose; M^3 / 6 multiplications for one factorisation in 8 M^2
+ * Cost: count M distances to choose; M^3 / 6 multiplications to factorise one matrix of 8 M^2
  * bytes, of which half are touched. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
                                            const double *values, size_t centre_max,

@@ -44,8 +44,8 @@ supine_status supine_inside_content_surface(const char *name, const supine_mesh 
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);
 
-/** Make a grid of the nodes inside the lungs and those outside within a cell's diagonal, so that
- * every point inside lies between nodes.
+/** Make a grid of the nodes inside the lungs and of the nodes at most a cell's diagonal outside, so
+ * that every point inside lies between nodes.
  *
  * @param like     gives the axes: nodes are every n-th node of it, within its box. NULL:
  *                 along x, y, z
@@ -59,7 +59,6 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          const supine_image *like, double spacing, double margin,
                                          supine_inside_content *content, supine_error *error);
 
-/** Free content. */
 void supine_inside_content_free(supine_inside_content *content);
 
 #endif

@@ -136,8 +136,8 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          supine_inside_content *content, supine_error *error) {
   supine_image grid = {0};
   if (!(spacing > 0.0) || !isfinite(spacing)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "give a grid a positive spacing, not %g mm", spacing);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a grid of %g mm: give a spacing above 0",
+                            spacing);
   }
   supine_status status = make_grid(shells, like, spacing, margin, &grid, error);
   if (status != SUPINE_OK) {

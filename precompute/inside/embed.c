@@ -14,22 +14,22 @@
 
 enum { BLOCK = 1024 };
 
-/* The content sorted by lung, and its motion. */
+/* The content sorted by lung, and its displacements. */
 typedef struct embedding {
   const supine_inside_shells *shells;
   const supine_inside_content *content;
   const supine_inside_options *options;
   size_t columns;             /* values per point, 3 K */
   supine_inside_place *place; /* [N] in the content's order */
-  unsigned char *lung;        /* [N] likewise */
+  unsigned char *lung;        /* [N] in the content's order */
   size_t *order;              /* [N] indices of the content's points, lung by lung */
-  float *vertices;            /* [N, 3] mm at full inflation, in that order, as all below */
-  float *coefficients;        /* [N, 3, K] */
-  float *depth;               /* [N] mm below the surface */
-  uint32_t *part;             /* [N] */
-  unsigned char *group;       /* [N] lung */
-  uint32_t *triangles;        /* [M, 3] */
-  uint32_t *rigid; /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
+  float *vertices;      /* [N, 3] mm at full inflation; this and all arrays below are in `order` */
+  float *coefficients;  /* [N, 3, K] */
+  float *depth;         /* [N] mm below the surface */
+  uint32_t *part;       /* [N] */
+  unsigned char *group; /* [N] lung */
+  uint32_t *triangles;  /* [M, 3] */
+  uint32_t *rigid;      /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
   size_t rigid_count;
 } embedding;
 
@@ -109,7 +109,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
   return SUPINE_OK;
 }
 
-/* Find the motion of the surface at a place, linear in its triangle. */
+/* Interpolate the displacements of the surface, mode by mode, in the triangle of a place. */
 static void surface_motion(const embedding *e, const supine_inside_shell *shell,
                            const double *displacement, const supine_inside_place *place,
                            double *motion) {
@@ -123,7 +123,8 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
 }
 
 /* Move the points [begin, end) from the scan to full inflation. */
-static void take_back(embedding *e, size_t lung, size_t begin, size_t end, const double *values) {
+static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
+                           const double *values) {
   const size_t modes = e->columns / 3;
   for (size_t i = begin; i < end; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -178,7 +179,7 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
   for (size_t i = 0; i < count * e->columns; ++i) {
     e->coefficients[begin * e->columns + i] = (float)values[i];
   }
-  take_back(e, (size_t)(shell - e->shells->shell), begin, end, values);
+  points_to_full(e, (size_t)(shell - e->shells->shell), begin, end, values);
 }
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
@@ -214,7 +215,7 @@ cleanup:
 /* Find a rigid part at full inflation: its given shape, rotated and shifted so that the field at
  * the scan's weights returns it to the scan. The rotation is iterated, as the field acts on the
  * vertices at full inflation. */
-static void take_back_rigid(embedding *e, size_t begin, size_t end) {
+static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
   double given[3] = {0.0};
@@ -247,7 +248,7 @@ static void take_back_rigid(embedding *e, size_t begin, size_t end) {
 }
 
 /* Report whether a surface's metadata does not apply to content. */
-static bool dropped(const char *key) {
+static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
@@ -270,7 +271,7 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   }
   size_t count = 0;
   for (size_t i = 0; i < given; ++i) {
-    if (!dropped(from[i].key)) {
+    if (!is_of_surface(from[i].key)) {
       metadata[count++] = from[i];
     }
   }
@@ -385,7 +386,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
     begin = end;
   }
   for (size_t i = 0; i < e.rigid_count && status == SUPINE_OK; ++i) {
-    take_back_rigid(&e, e.rigid[2 * i], e.rigid[2 * i + 1]);
+    rigid_to_full(&e, e.rigid[2 * i], e.rigid[2 * i + 1]);
   }
   if (status == SUPINE_OK) {
     status = write_content(&e, path, error);

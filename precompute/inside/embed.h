@@ -22,14 +22,14 @@
 #include "precompute/inside/content.h"
 #include "precompute/inside/shells.h"
 
-/** Most centres of one lung, chosen from its vertices. On two lungs of 20,000 vertices with a
- * spreading length of 10 mm the error is 0.2 % of the motion at the other vertices and 0.05 %
- * inside; it takes a few seconds. */
+/** Default of the largest number of centres of one lung, which are chosen from its vertices. On two
+ * lungs of 20,000 vertices with a spreading length of 10 mm (--reach), the error is 0.2 % of the
+ * displacement at the other vertices and 0.05 % inside; this takes a few seconds. */
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 
 typedef struct supine_inside_options {
   bool clamp;          /**< points outside move as the nearest point of the surface */
-  size_t centres;      /**< most centres of one lung; 0: SUPINE_INSIDE_CENTRES */
+  size_t centres;      /**< largest number of centres of one lung; 0: SUPINE_INSIDE_CENTRES */
   const char *made_by; /**< for the file's metadata; optional */
 } supine_inside_options;
 
@@ -46,11 +46,12 @@ typedef struct supine_inside_report {
 /** Embed content in the lungs of an open basis, and write its basis file, with these additional
  * tensors
  *
- *     part   U32 [N]  index of the point's name; for a grid, its node
- *     depth  F32 [N]  mm below the surface in the scan, negative outside
- *     names  U8 [.]   the parts' names, separated by newlines (not of a grid)
- *     rigid  U32 [R, 2] vertices begin <= i < end of each rigid part (where there is one)
- *     grid   F64 [4, 3] origin and the three steps, mm; grid_size U32 [3] (of a grid)
+ *     part       U32 [N]     index of the point's name; for a grid, of its node
+ *     depth      F32 [N]     mm below the surface in the scan, negative outside
+ *     names      U8 [.]      names of the parts, separated by newlines (not for a grid)
+ *     rigid      U32 [R, 2]  vertices begin <= i < end of each rigid part (if there are any)
+ *     grid       F64 [4, 3]  origin and the three steps, mm (for a grid)
+ *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)
  *
  * and the metadata "content": "points", "mesh" or "grid".
  * @param content  not changed

@@ -29,8 +29,8 @@ typedef struct supine_inside_shells {
 
 /** Extract each lung's surface, in its state in the scan.
  * @param shells  written; supine_inside_shells_free releases it
- * @retval SUPINE_ERROR_MESH    a lung without a triangle
- * @retval SUPINE_ERROR_FORMAT  the basis is itself content of lungs, not their surface
+ * @retval SUPINE_ERROR_MESH       a lung has no triangle, or a triangle joins two lungs
+ * @retval SUPINE_ERROR_FORMAT     the basis is itself content of lungs, not their surface
  * @retval SUPINE_ERROR_NUMERICAL  the basis cannot reach the scan's volume
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,
@@ -51,8 +51,8 @@ typedef struct supine_inside_walk {
 
 /** Find the lung that a point is in, or the nearest lung; walk->place[lung] is its place there.
  * @param walk  zeroed for the first point
- * @param far   mm: if the surface is farther, the place may be an earlier point's on the same
- *   side; INFINITY: never */
+ * @param far   distance in mm: if the surface is farther, the place may be that of an earlier point
+ *              on the same side; INFINITY: never */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk);
 

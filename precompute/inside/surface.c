@@ -261,11 +261,11 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   }
   const double ww = supine_dot(w, w);
   const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu}; /* squared edges */
-  /* bound on the squared distance within the plane */
-  const double rest = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
+  /* Bound on the squared distance within the plane of the triangle. */
+  const double limit = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
-    farther |= b[k] < 0.0 && b[k] * b[k] * determinant > rest * opposite[k];
+    farther |= b[k] < 0.0 && b[k] * b[k] * determinant > limit * opposite[k];
   }
   if (farther && determinant > slender * uu * vv) {
     return false;
@@ -413,7 +413,7 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
                                                   const supine_inside_place *near) {
   supine_inside_place place = {.point = {point[0], point[1], point[2]}};
   double best = INFINITY;
-  if (near != NULL) { /* bound: the distance from `near` plus the way to it */
+  if (near != NULL) { /* bound: the distance to `near` plus its depth */
     const double limit =
         (fabs(near->depth) + supine_distance(point, near->point)) * (1.0 + 1e-9) + 1e-9;
     best = limit * limit;

@@ -13,7 +13,7 @@ typedef struct supine_inside_surface supine_inside_surface;
 /** The place of a point relative to a surface. */
 typedef struct supine_inside_place {
   double point[3];       /**< the point, mm */
-  double depth;          /**< mm to the surface; positive inside, negative outside */
+  double depth;          /**< distance to the surface, mm; positive inside, negative outside */
   double nearest[3];     /**< the surface's nearest point, mm */
   size_t triangle;       /**< triangle of the nearest point */
   double barycentric[3]; /**< barycentric coordinates of the nearest point in it */
@@ -46,8 +46,9 @@ void supine_inside_surface_distances(const supine_inside_surface *surface, size_
  *     (1 / 4 pi) sum over triangles of their solid angle seen from the point > 1/2
  *
  * Boxes farther than twice their radius are approximated by a dipole. Thread-safe.
- * @param near  as above, from this function
- * Source: [Jacobson2013]; dipoles [Barill2018]. */
+ * @param near  the place of a nearby point, as found by this function, to save work; NULL: none
+ * Sources: Jacobson, Kavan, Sorkine-Hornung, ACM Trans. Graph. 32(4), 2013; for the dipoles Barill,
+ * Dickson, Schmidt, Levin, Jacobson, ACM Trans. Graph. 37(4), 2018. */
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
                                                const double point[3],
                                                const supine_inside_place *near);

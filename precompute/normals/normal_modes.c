@@ -14,13 +14,14 @@
 #include "sh/base/lapack.h"
 #include "sh/base/parallel.h"
 
-/* ROWS: most vertices of a lung that modes are found from, or measured on. STATES and HELD_OUT:
- * states that modes are found from, and measured on. With twice as many of each the errors change
- * in the second digit. STEP: modes that are added at a time. */
+/* ROWS: largest number of vertices of a lung from which modes are found, or at which they are
+ * measured. STATES, HELD_OUT: number of states from which modes are found, and at which they are
+ * measured; with twice as many of each, the errors change in the second digit. STEP: number of
+ * modes that are added at a time. */
 enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
 
 /* Modes are weighted sums of the normals in at most SNAPSHOTS states. LANES states are computed at
- * a time; the very first is the reference surface, which is no snapshot. */
+ * a time; the first lane of all is the reference surface, which is not a snapshot. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
 /* Largest mean and 99.9th percentile of the angle, degrees: a fifth below 0.1 and 1, as the error
@@ -29,19 +30,19 @@ static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees = 57.29577951308232; /* per radian */
 
-/* Smallest squared residual, relative to a state's normals, at which it becomes another snapshot.
- */
+/* Smallest squared residual, relative to a state's squared normals, at which the state becomes
+ * another snapshot. */
 static const double least_new = 1e-7;
 
 /* One lung's modes before they are rounded; A, n and V as in normals.h. */
 typedef struct fit {
   size_t count;                     /* number of modes, at most MOST */
   size_t snapshots;                 /* R */
-  size_t state[SNAPSHOTS];          /* [R] their indices */
+  size_t state[SNAPSHOTS];          /* [R] indices of their states */
   float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share[1 + r][j] N(state_r) */
   double *weights;                  /* [MOST, 3, terms] V */
   supine_normals_rows rows;         /* of held-out vertices */
-  float *modes;                     /* [rows, 3, MOST] n of these */
+  float *modes;                     /* [rows, 3, MOST] n of the held-out vertices */
 } fit;
 
 typedef struct normals_work {
@@ -290,8 +291,8 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   }
 }
 
-/* Measure the error of `count` modes: those of `made`, or if it has none yet, those of the fits,
- * rounded. Set mean and p999. */
+/* Measure the error of `count` modes and set mean and p999. The modes are those of `made` or, if it
+ * has none yet, the rounded modes of the fits. */
 static supine_status measure_all(const normals_work *work, size_t count,
                                  supine_normals_modes *made) {
   const size_t all = 3 * work->terms;

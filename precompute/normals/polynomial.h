@@ -30,8 +30,8 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface,
                                          supine_normals_fans *fans);
 void supine_normals_fans_free(supine_normals_fans *fans);
 
-/* Read the other two vertices of the triangle that index `corner` of `triangles` belongs to, in the
- * triangle's order. */
+/* Read the other two vertices of the triangle to which index `corner` of `triangles` belongs, in
+ * the triangle's order. */
 static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t corner,
                                              uint32_t others[2]) {
   const uint32_t v = corner % 3;
@@ -59,7 +59,7 @@ typedef struct supine_normals_states {
   size_t count;    /* S, states that are reached */
   size_t room;     /* states that were requested */
   double *phi;     /* [G, room, 3, terms] */
-  double range[2]; /* as in supine_normals_modes */
+  double range[2]; /* see supine_normals_modes */
 } supine_normals_states;
 
 /* Spread up to `count` states over the sphere and over the volumes from rest to the reference

@@ -76,9 +76,8 @@ static bool common_gain(const supine_normals_surface *s, const double *w, double
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states) {
-  static const double volume_share =
-      0.4142135623730950488; /* step from state to state: sqrt 2 - 1, not commensurable with the
-                                spiral's angle */
+  /* Step of the volume from state to state, not commensurable with the spiral's angle. */
+  static const double volume_share = 0.4142135623730950488; /* sqrt 2 - 1 */
   const size_t terms = 3 * supine_normals_terms(surface->field->mode_count);
   double low[9];
   double w[SUPINE_MODES_MAX];

@@ -16,11 +16,11 @@
 #include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 
-/* Vertices are summed in PARTS, BLOCK at a time; the number of parts is fixed, so that the sum does
- * not depend on the number of threads. */
+/* Number of vertices in a block, number of parts into which sums are divided (fixed, so that sums
+ * do not depend on the number of threads), and largest number of halvings of a volume. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
-/* Sums over one part of the vertices. */
+/* Sums over one of the PARTS. */
 typedef struct tally {
   double field2;         /* sum of the squared displacements at gain 1, mm^2 */
   supine_tally error;    /* at gain 1, mm */
@@ -120,9 +120,9 @@ static double volume_along(const double harmonics[9], const double g[3]) {
   return volume;
 }
 
-/* Find the gains at which the full solve and the compression each reach the volumes [D], or else
- * half of them, a quarter, ...: the largest part reached in every direction. Return that part; 0 if
- * there is none. */
+/* Find the gains at which the full solve and the compression each reach the volumes [D] times the
+ * largest part, 1, 1/2, 1/4, ..., that is reached in every direction. Return that part; 0 if there
+ * is none. */
 static double find_part(const accuracy_work *work, const supine_volume_forms *forms,
                         const double *volumes, double *scales) {
   double part = 1.0;

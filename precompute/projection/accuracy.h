@@ -15,8 +15,9 @@
 typedef struct supine_accuracy {
   size_t direction_count;
   double relative_rms, relative_p95, relative_max; /**< at equal gains, over the RMS displacement */
-  /** The part, 0 to 1, of the volume asked for at which the errors in mm hold; supine_precompute
-   * states it in mL if rest is unknown. 0: the surface is open, and there are no errors in mm. */
+  /** Fraction, 0 to 1, of the requested volume at which the errors in mm were measured;
+   * supine_precompute states it in mL if rest is unknown. 0: the surface is open, and there are no
+   * errors in mm. */
   double volume;
   double rms_mm, p95_mm, max_mm; /**< at equal volumes */
 } supine_accuracy;
@@ -48,9 +49,9 @@ void supine_accuracy_held_out_directions(size_t count, double *directions);
 
 /** Measure the error. The 95th percentiles come from a histogram whose bins are at most 0.4 % wide.
  * @param directions  [N, 3] d, mm
- * @param forms       of the compression's coefficients; NULL: open surface
- * @param volume      [9] harmonics of the volume for the errors in mm, mL beyond the reference;
- * halved until the field reaches it in every direction
+ * @param forms       volume forms of the compression; NULL: open surface
+ * @param volume      [9] harmonics of the volume for the errors in mm, mL beyond the reference; it
+ * is halved until the field reaches it in every direction
  * @retval SUPINE_ERROR_NUMERICAL  not even a thousandth of the volume is reached
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
@@ -59,18 +60,20 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error);
 
-/** Find the share, 0 to 1, of the triangles whose normal turns by more than a right angle on the
- * way to a state: the largest of the six postures with gravity along an axis that reach it, over up
- * to 50,000 evenly chosen triangles. Above a few in a thousand the surface looks torn.
+/** Find the share, 0 to 1, of the triangles whose normal turns by more than a right angle from the
+ * reference surface to a volume: the largest over the postures with gravity along an axis in which
+ * the field reaches that volume. Up to 50,000 evenly chosen triangles are examined. Above a few in
+ * a thousand the surface looks torn.
  * @param directions  [N, 3] d, mm
- * @param forms       of the compression's coefficients; the surface must be closed
+ * @param forms       volume forms of the compression; the surface must be closed
+ * @param volume      [9] harmonics of the state's volume, mL beyond the reference
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
                                           double *share);
 
-/** Relative RMS errors on the held-out directions, over at most 4096 evenly chosen vertices. */
+/** Relative RMS errors at the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
   size_t band_count;                        /**< L + 1 */
   double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [L + 1] error with the first (l + 1)^2 harmonics */
@@ -78,8 +81,7 @@ typedef struct supine_error_table {
   double modes[SUPINE_MODES_MADE_MAX];      /**< [K] error with the first k + 1 modes */
 } supine_error_table;
 
-/** Tabulate the error by the number of functions, from which a user can choose it. Release the
- * table with supine_accuracy_error_table_free.
+/** Tabulate the error by the number of harmonics and by the number of modes.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,
                                                  const supine_projection *projection,

@@ -13,8 +13,8 @@
 
 enum { VERTICES_MAX = 4096 };
 
-/* Compute gram [R, R], the sum of |d|^2 times the products of the columns over some of the
- * vertices: w' gram w is the squared size of the columns' sum with coefficients w. */
+/* Compute gram [R, R], the scalar products of the columns with weights |d|^2 over evenly chosen
+ * vertices: w' gram w is the squared displacement, summed over them, of the field columns x w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
@@ -27,7 +27,7 @@ static void find_gram(const supine_truth *truth, size_t vertex_count, const doub
   }
 }
 
-/* Compute the squared size of the columns' sum with these coefficients. */
+/* Compute w' gram w for the coefficients w. */
 static double square_of(const double *gram, size_t rank, const double *coefficients) {
   double image[SUPINE_SPAN_MAX];
   cblas_dsymv(CblasRowMajor, CblasLower, (int)rank, 1.0, gram, (int)rank, coefficients, 1, 0.0,
@@ -35,11 +35,11 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
   return cblas_ddot((int)rank, coefficients, 1, image, 1);
 }
 
-/* Compute left -= part weights; part [rank, count] has rows of `stride`. */
-static void take_off(const double *part, size_t stride, size_t count, const double *weights,
-                     size_t rank, double *left) {
+/* Compute residual -= part x weights; the rows of part [rank, count] are `stride` numbers apart. */
+static void subtract(const double *part, size_t stride, size_t count, const double *weights,
+                     size_t rank, double *residual) {
   cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, (int)count, -1.0, part, (int)stride, weights,
-              1, 1.0, left, 1);
+              1, 1.0, residual, 1);
 }
 
 supine_status supine_accuracy_error_table_create(const supine_truth *truth,
@@ -53,7 +53,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   const size_t modes = compression->mode_count;
   double weights[SUPINE_MODES_MADE_MAX];
   double y[(SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1)];
-  double left[SUPINE_SPAN_MAX];
+  double residual[SUPINE_SPAN_MAX];
   double all = 0.0;
   double *gram = malloc(rank * rank * sizeof *gram);
   *table = (supine_error_table){.band_count = bands, .mode_count = modes};
@@ -66,15 +66,15 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
     (void)supine_sh_evaluate(projection->band, truth->directions + 3 * d, y); /* a unit vector */
     supine_projection_compression_weights(compression, truth->directions + 3 * d, weights);
     all += square_of(gram, rank, functions);
-    memcpy(left, functions, rank * sizeof *left);
+    memcpy(residual, functions, rank * sizeof *residual);
     for (size_t l = 0; l < bands; ++l) {
-      take_off(projection->functions + l * l, terms, 2 * l + 1, y + l * l, rank, left);
-      table->harmonics[l] += square_of(gram, rank, left);
+      subtract(projection->functions + l * l, terms, 2 * l + 1, y + l * l, rank, residual);
+      table->harmonics[l] += square_of(gram, rank, residual);
     }
-    memcpy(left, functions, rank * sizeof *left);
+    memcpy(residual, functions, rank * sizeof *residual);
     for (size_t k = 0; k < modes; ++k) {
-      take_off(compression->mix + k, modes, 1, weights + k, rank, left);
-      table->modes[k] += square_of(gram, rank, left);
+      subtract(compression->mix + k, modes, 1, weights + k, rank, residual);
+      table->modes[k] += square_of(gram, rank, residual);
     }
   }
   for (size_t l = 0; l < bands; ++l) {

@@ -89,8 +89,8 @@ static supine_status find_modes(const supine_projection *projection, double *gra
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  for (size_t k = 0; k < rank;
-       ++k) { /* H: rows are eigenvectors times the roots of their eigenvalues */
+  /* The rows of H are eigenvectors times the roots of their eigenvalues. */
+  for (size_t k = 0; k < rank; ++k) {
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
   }
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)rank, (int)terms, (int)rank, 1.0,

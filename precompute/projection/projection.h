@@ -4,9 +4,9 @@
  *
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
- * kept as C = columns x functions. The transfer does not depend on gravity, so it commutes with the
- * projection: the force at any direction is a sum of the forces at a few (span.h), the transfer is
- * applied to these alone, and only the weights of the sum are transformed. */
+ * stored as C = columns x functions. The force for any direction is a weighted sum of the forces
+ * for a few directions (span.h). As the transfer from force to field is linear and does not depend
+ * on gravity, it is applied to these few forces alone, and only the weights are projected. */
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
@@ -18,10 +18,10 @@
 typedef struct supine_projection {
   size_t vertex_count;
   size_t band;
-  supine_span *span; /**< directions of the columns; NULL: a field of another simulator */
+  supine_span *span; /**< directions of the columns; NULL: another simulator's field */
   size_t rank;       /**< R, number of columns */
-  double *columns;   /**< [N, R] */
-  double *functions; /**< [R, (band + 1)^2] */
+  double *columns;   /**< [N, R] fields for R directions of gravity */
+  double *functions; /**< [R, (band + 1)^2] harmonics of the weights of the columns */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);
@@ -61,7 +61,7 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
  *
  * @param weight     [N] weight of each vertex's square, such as |d_i|^2; NULL: 1
  * @param mode_max   largest number of modes, 1 to SUPINE_MODES_MADE_MAX; there are fewer if the
- * matrix has lower rank
+ *                   matrix has lower rank
  * @param singular   [mode_max] singular values of the modes found, falling, then 0; optional
  * @param total      sum of the squares of all singular values; optional
  * @retval SUPINE_ERROR_ARGUMENT   `mode_max` is out of range
@@ -86,9 +86,9 @@ supine_status supine_projection_compression_create(const supine_projection *proj
 void supine_projection_compression_mix(const supine_projection *projection,
                                        supine_compression *made);
 
-/** Find the `count` leading eigenpairs of a symmetric matrix [n, n]: values [n], of which the first
- * `count` are written, falling, and vectors [count, n]. The matrix is overwritten; only its lower
- * triangle in column-major order is read.
+/** Find the `count` leading eigenpairs of a symmetric matrix [n, n], largest eigenvalue first: the
+ * first `count` of values [n], which is also work space, and vectors [count, n]. The matrix is
+ * overwritten; only its lower triangle in column-major order is read.
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, size_t count,
                                                    double *values, double *vectors);

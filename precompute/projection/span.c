@@ -9,17 +9,18 @@
 #include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 
-/* Numbers of vertices, at most, and of directions that the cross approximation chooses from. */
+/* Largest number of vertices, and number of directions, that the cross approximation examines. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest residual force, relative to the largest force. The RMS residual is then 6e-5
- * of the RMS force, a hundredth of the error of 16 modes. */
-static const double left_out = 3e-4;
-static const double rounding = 1e-12; /* the same without softening, where the sum is exact */
+/* Largest residual force relative to the largest force: with softening, where the RMS residual is
+ * then 6e-5 of the RMS force, a hundredth of the error of 16 modes; and without, where only
+ * rounding errors remain. */
+static const double tolerance = 3e-4;
+static const double rounding = 1e-12;
 
 /* Subtract from force [vertices, DIRECTIONS] the product of the row and the column through entry
  * `at`, divided by that entry: a step of elimination with full pivoting. */
-static void take_cross(double *force, size_t vertices, size_t at) {
+static void eliminate(double *force, size_t vertices, size_t at) {
   const double *column = force + at % DIRECTIONS;
   double row[DIRECTIONS];
   memcpy(row, force + at / DIRECTIONS * DIRECTIONS, sizeof row);
@@ -61,7 +62,7 @@ static bool choose(double *force, size_t count, double share, size_t *rank,
   while (fabs(force[at]) > least && *rank < SUPINE_SPAN_MAX) {
     of[*rank] = at / DIRECTIONS;
     from[(*rank)++] = at % DIRECTIONS;
-    take_cross(force, count, at);
+    eliminate(force, count, at);
     at = largest_of(force, count * DIRECTIONS);
   }
   return fabs(force[at]) <= least;
@@ -78,12 +79,12 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   size_t from[SUPINE_SPAN_MAX];
   size_t of[SUPINE_SPAN_MAX];
   double *force = malloc(values * sizeof *force);
-  double *left = malloc(values * sizeof *left);
+  double *residual = malloc(values * sizeof *residual);
   supine_status status = SUPINE_OK;
   for (size_t d = 0; d < DIRECTIONS; ++d) {
     supine_spiral((double)d, DIRECTIONS, 0.0, directions + 3 * d);
   }
-  if (force == NULL || left == NULL ||
+  if (force == NULL || residual == NULL ||
       supine_physics_height_range(lungs, law->pair, DIRECTIONS, directions, range,
                                   range + DIRECTIONS) != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force");
@@ -94,8 +95,8 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   }
   const supine_gravities gravities = {DIRECTIONS, directions, range, range + DIRECTIONS};
   supine_physics_force(lungs, law, &gravities, count, vertices, force);
-  memcpy(left, force, values * sizeof *left);
-  if (!choose(left, count, law->soften == 0.0 ? rounding : left_out, &span->rank, of, from)) {
+  memcpy(residual, force, values * sizeof *residual);
+  if (!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank, of, from)) {
     status =
         supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                          "--soften %g takes more than %d functions of gravity: give at most 12",
@@ -118,7 +119,7 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   }
 cleanup:
   free(force);
-  free(left);
+  free(residual);
   return status;
 }
 

@@ -17,6 +17,7 @@ typedef struct supine_tally {
   uint32_t bins[SUPINE_TALLY_BINS];
 } supine_tally;
 
+/* Add `count` values, none of which is negative. */
 void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *values);
 
 /* Add `other` to `tally`. */
