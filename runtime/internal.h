@@ -39,7 +39,8 @@ struct supine_basis {
   double reference_volume[SUPINE_LUNGS_MAX]; /**< mL; info.reference_volume points here */
   const double *resting; /**< harmonics of the volume at rest, mL beyond the reference: [G, 9], or
                             [9] for all lungs together; or NULL */
-  bool rest_by_lung;     /**< `resting` is [G, 9]; else all lungs have one gain */
+  bool rest_by_lung;     /**< `resting` is [G, 9] and each lung has gains of its own; else one gain
+                            is common to all lungs */
   double upright_gain;   /**< increase of the volume at full inflation from supine to upright, as a
                             fraction of the reference volume */
   double scan_volume;    /**< volume of all lungs in the scan less the reference volume, mL */

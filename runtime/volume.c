@@ -100,7 +100,8 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
   }
   if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2]) || c[0] == 0) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "a volume of %g mL cannot be reached: here no scale changes it",
+                            "a change of the reference surface's volume by %g mL cannot be "
+                            "reached: here no gain changes it",
                             volume);
   }
   const double side = volume / c[0] > 0 ? 1 : -1;
@@ -109,7 +110,8 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     const double reach = cubic_at(c, far);
     if (fabs(reach) < fabs(volume)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a volume of %g mL is out of reach: the surface folds beyond %g mL",
+                              "a change of the reference surface's volume by %g mL is out of "
+                              "reach: the surface folds beyond %g mL",
                               volume, reach);
     }
   } else {
@@ -120,7 +122,8 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     far *= 2;
     if (!isfinite(far)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a volume of %g mL cannot be reached: here no scale changes it",
+                              "a change of the reference surface's volume by %g mL cannot be "
+                              "reached: here no gain changes it",
                               volume);
     }
   }
@@ -179,7 +182,8 @@ static supine_status follow_path(const supine_volume_form *form, const double be
     held = volume_on_path(form, bend, scale, far, gains);
     if (!(side * held > side * before)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a volume of %g mL is out of reach: the surface folds beyond %g mL",
+                              "a change of the reference surface's volume by %g mL is out of "
+                              "reach: the surface folds beyond %g mL",
                               volume, before);
     }
   }

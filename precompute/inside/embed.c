@@ -247,7 +247,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Report whether a surface's metadata does not apply to content. */
+/* Report whether metadata describes the surface alone, and not its content. */
 static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};

@@ -15,7 +15,7 @@ typedef struct supine_inside_place {
   double point[3];       /**< the point, mm */
   double depth;          /**< distance to the surface, mm; positive inside, negative outside */
   double nearest[3];     /**< the surface's nearest point, mm */
-  size_t triangle;       /**< triangle of the nearest point */
+  size_t triangle;       /**< index of the triangle of the nearest point */
   double barycentric[3]; /**< barycentric coordinates of the nearest point in it */
 } supine_inside_place;
 
