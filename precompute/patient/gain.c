@@ -13,9 +13,9 @@
 static const double gain_least = 0.01, gain_most = 2.0; /* beyond, a gain is undetermined */
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
 static const double matched_least = 0.3; /* least share of a surface's vertices that must match */
-static const double settled = 1e-4;      /* change of a scale between rounds at which they end */
+static const double settled = 1e-4;      /* change of s and s gain that ends the rounds */
 static const double force_least = 0.2;   /* least fitted force, of a mean of 1 */
-enum { ROUNDS = 20, VERTICES_MAX = 2000, EIGHTHS = 8, UNKNOWNS = 5 };
+enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, UNKNOWNS = 5 };
 
 /* A further state as rows, axis . ((s + s gain turned) u + t) = value. */
 typedef struct work {
@@ -161,10 +161,10 @@ static supine_status settle(work *w, supine_patient_told *told, supine_error *er
   double sum = 0.0;
   double square = 0.0;
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
-    const double before = w->x[0];
+    const double before[2] = {w->x[0], w->x[1]};
     status = w->surface == NULL ? SUPINE_OK : match_surface(w, error);
     told->left = fit(w, told->turns, EIGHTHS);
-    change = fabs(w->x[0] - before);
+    change = fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]);
   }
   told->scale = w->x[0];
   told->gain = w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0;
