@@ -255,8 +255,8 @@ static supine_status fit_further(const request *wanted, const evidence *of, size
   const bool landmarks = supine_text_ends_in(path, ".csv");
   supine_patient_pairs pairs = {0};
   supine_lungs lungs = {0};
-  supine_patient_told *told = &record->told[record->told_count++];
-  *told = (supine_patient_told){.state = wanted->further[which]};
+  supine_patient_further *further = &record->further[record->further_count++];
+  *further = (supine_patient_further){.state = wanted->further[which]};
   supine_status status =
       landmarks ? load_pairs(wanted, path, &pairs, error)
                 : supine_command_load_lungs(name, path, &wanted->source, &lungs, error);
@@ -265,7 +265,7 @@ static supine_status fit_further(const request *wanted, const evidence *of, size
   }
   if (status == SUPINE_OK) {
     status = supine_patient_gain_fit(record, from, landmarks ? &pairs : NULL,
-                                     landmarks ? NULL : &lungs.mesh, moved, told, error);
+                                     landmarks ? NULL : &lungs.mesh, moved, further, error);
   }
   supine_patient_pairs_free(&pairs);
   supine_lungs_free(&lungs);
@@ -311,10 +311,10 @@ static void keep_states(const request *wanted, const evidence *of, supine_patien
   record->state[of->swapped ? 1 : 0] = wanted->rest;
   record->state[of->swapped ? 0 : 1] = wanted->state;
   for (size_t k = 0; k < 2; ++k) {
-    const supine_volume *told = &record->state[k].volume;
+    const supine_volume *volume = &record->state[k].volume;
     record->volume[k] = volume_of(&of->lungs[k]);
-    if (record->volume[k] == 0.0 && told->kind == SUPINE_VOLUME_ABSOLUTE) {
-      record->volume[k] = told->ml;
+    if (record->volume[k] == 0.0 && volume->kind == SUPINE_VOLUME_ABSOLUTE) {
+      record->volume[k] = volume->ml;
     }
   }
   complete_state(record, 0);

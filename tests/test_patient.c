@@ -126,7 +126,8 @@ TEST(test_fit_public_pairs_below_quadratic_law) {
            "%.2f, band %.1f %%, explained %.0f %%\n",
            cases[c / 2].name, exhaled ? "exhaled" : "inhaled",
            held[SUPINE_PATIENT_SCORE_TRANSLATION], held[SUPINE_PATIENT_SCORE_AFFINE],
-           held[SUPINE_PATIENT_SCORE_LAW], kept, report.expected, report.band, report.explained);
+           held[SUPINE_PATIENT_SCORE_LAW], kept, report.expected_point, report.band,
+           report.explained);
     assert_true(kept < cases[c / 2].quadratic[exhaled]);
     assert_true(kept < held[SUPINE_PATIENT_SCORE_LAW] && kept < held[SUPINE_PATIENT_SCORE_AFFINE]);
     /* Held-out errors are never below fitted ones. */
@@ -307,16 +308,16 @@ TEST(test_pairs_check_impossible_pairs_refused) {
   assert_int_equal(check(&pairs, false, message), SUPINE_OK);
 
   pairs.count = 11;
-  refused(&pairs, false, "11 pairs of points determine no law");
+  refused(&pairs, false, "pairs of points: 11, where a law needs at least 12");
   pairs.count = n;
   for (size_t i = 0; i < n; ++i) { /* one axis reversed in one of the two */
     pairs.to[3 * i] *= -1.0;
   }
-  refused(&pairs, false, "mirror image");
+  refused(&pairs, false, "differ by a reflection");
   for (size_t i = 0; i < n; ++i) { /* one file in RAS, the other in LPS */
     pairs.to[3 * i + 1] *= -1.0;
   }
-  refused(&pairs, true, "turned by 1");
+  refused(&pairs, true, "by a rotation of 1");
   move(&pairs, &truth, 0.3, 1);
   for (size_t i = 0; i < 3 * n; ++i) {
     pairs.to[i] += 150.0;
@@ -552,9 +553,9 @@ TEST(test_gain_third_scan_recovers_it) {
   const supine_patient patient = known(&pairs);
   supine_patient_record record = record_of(&patient);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  supine_patient_told *other = record.told;
+  supine_patient_further *other = record.further;
   supine_error error;
-  record.told_count = 1;
+  record.further_count = 1;
   gsl_rng_set(random, 19);
   for (size_t c = 0; c < 4; ++c) {
     const double *g = postures[c % 2];
@@ -581,12 +582,14 @@ TEST(test_gain_third_scan_recovers_it) {
                      SUPINE_OK);
     supine_patient_gain_take(&record);
     printf("gain %.2f found %.3f +- %.3f, scale %.3f, left %.2f mm, %.2f without\n", gain,
-           record.force.gain, record.gain_error, other->scale, other->left, other->left_without);
+           record.force.gain, record.gain_error, other->scale, other->residual,
+           other->residual_without_gain);
     assert_false(record.gain_open);
     assert_true(fabs(record.force.gain - gain) <= 3.0 * record.gain_error);
     assert_true(record.gain_error < 0.1);
     assert_true(fabs(other->scale - scale) < 0.03);
-    assert_true(other->left < 0.3 * sqrt(3.0) * 1.1 && other->left < other->left_without);
+    assert_true(other->residual < 0.3 * sqrt(3.0) * 1.1 &&
+                other->residual < other->residual_without_gain);
   }
   gsl_rng_free(random);
   /* A scan in the fitted posture: the gain stays. */
@@ -594,7 +597,7 @@ TEST(test_gain_third_scan_recovers_it) {
   memcpy(other->state.gravity, record.state[1].gravity, sizeof other->state.gravity);
   assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, false, other, &error),
                    SUPINE_OK);
-  assert_false(other->turns);
+  assert_false(other->fits_gain);
   supine_patient_gain_take(&record);
   assert_true(record.force.gain == kept);
   supine_patient_pairs_free(&pairs);

@@ -40,18 +40,18 @@ changed() { # WHAT AWK: good.csv with each row changed
   awk -F, -v OFS=, "NR == 1 { print; next } { $2; print }" good.csv >"$1.csv"
 }
 changed apart '$4 += 150; $5 += 150; $6 += 150'
-refused 2 'mm apart: different frames? --translation' --landmarks apart.csv
+refused 2 'mm apart: give both in one frame, or fit the motion between the scans with --translation' --landmarks apart.csv
 "$supine" fit --landmarks apart.csv --translation >/dev/null || fail "--translation does not help"
 changed beyond '$6 += 5000'
-refused 2 'mm apart: different frames?' --landmarks beyond.csv
+refused 2 'mm apart: give both in one frame' --landmarks beyond.csv
 changed centimetres '$4 /= 10; $5 /= 10; $6 /= 10'
-refused 2 'as if in cm; give landmarks in mm' --landmarks centimetres.csv
+refused 2 'as if in cm: give landmarks in mm' --landmarks centimetres.csv
 changed both '$1 /= 10; $2 /= 10; $3 /= 10; $4 /= 10; $5 /= 10; $6 /= 10'
-refused 2 'as if in cm; give landmarks in mm' --landmarks both.csv
+refused 2 'as if in cm: give landmarks in mm' --landmarks both.csv
 changed sides '$4 = -$4'
-refused 2 'mirror image of the other' --landmarks sides.csv
+refused 2 'differ by a reflection' --landmarks sides.csv
 changed ras '$4 = -$4; $5 = -$5'
-refused 2 'they are in different axes' --landmarks ras.csv --translation
+refused 2 'give both in LPS axes' --landmarks ras.csv --translation
 changed same '$4 = $1; $5 = $2; $6 = $3'
 refused 2 'the same as rest' --landmarks same.csv
 changed shifted '$4 = $1; $5 = $2; $6 = $3 + 5'
@@ -66,8 +66,8 @@ refused 2 'nan.csv:20: to_z "nan" is not a finite number' --landmarks nan.csv
 sed '30s/.*/1,2,3,4,5/' good.csv >short.csv
 refused 2 'short.csv:30' --landmarks short.csv
 head -12 good.csv >eleven.csv
-refused 2 '11 pairs of points determine no law: give at least 12' --landmarks eleven.csv
-refused 2 '11 pairs of points determine no law' --landmarks good.csv --state prone:rest:eleven.csv
+refused 2 'pairs of points: 11, where a law needs at least 12' --landmarks eleven.csv
+refused 2 'pairs of points: 11' --landmarks good.csv --state prone:rest:eleven.csv
 head -15 good.csv >few.csv
 refused 2 '14 points are fewer than the 15 unknowns of the paper law' --landmarks few.csv --law paper --rigid
 refused 1 'takes deep or paper' --landmarks good.csv --law quadratic
@@ -120,6 +120,6 @@ refused 2 'No such file' rest.obj absent.obj
 refused 2 'give each lung once' rest.obj,rest.obj state.obj
 refused 1 'more than two lungs' rest.obj,other.obj,state.obj state.obj
 refused 1 'nothing to fit to' --state prone:state.obj
-refused 2 'find a further state' rest.obj state.obj --state prone:far.obj
+refused 2 'faces the same way on the surface of the other state' rest.obj state.obj --state prone:far.obj
 refused 2 'mm apart' --landmarks apart.csv rest.obj state.obj
 echo passed

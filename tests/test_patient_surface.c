@@ -88,13 +88,13 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   printf("force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f, "
          "%.0f blocks\n",
          applied->correlation, applied->slopes[0], applied->slopes[1], applied->slopes[2],
-         applied->spread, applied->left, applied->blocks);
+         applied->spread, applied->residual, applied->blocks);
   assert_true(applied->correlation > 0.9);
   static const double slopes[3] = {0.0, -0.6, 0.0};
   for (size_t k = 0; k < 3; ++k) {
     assert_true(fabs(applied->slopes[k] - slopes[k]) < 0.15);
   }
-  assert_true(applied->left < 0.3 * applied->spread);
+  assert_true(applied->residual < 0.3 * applied->spread);
   assert_true(fit.surface.matched > 0.95 && applied->blocks > 20);
   supine_physics_solution_free(&solution);
   free(directions);
@@ -166,8 +166,8 @@ TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
     found[k] = fit.applied.correlation;
     printf("correlation %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f\n",
            fit.applied.correlation, fit.applied.slopes[0], fit.applied.slopes[1],
-           fit.applied.slopes[2], fit.applied.spread, fit.applied.left);
-    assert_true(fit.applied.left < 0.1 * fit.applied.spread);
+           fit.applied.slopes[2], fit.applied.spread, fit.applied.residual);
+    assert_true(fit.applied.residual < 0.1 * fit.applied.spread);
     assert_true(fabs(fit.applied.slopes[0] - (k == 0 ? 0.9 : 0.0)) < 0.05);
     assert_true(fabs(fit.applied.slopes[1] - (k == 0 ? 0.0 : -0.8)) < 0.05);
     free(moved.vertices);
@@ -187,17 +187,17 @@ TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
   static const double sigma = 0.37;
   static const double look[LOOK] = {1.5, -3.0, 4.5, -4.9}; /* standard deviations */
   supine_patient_matching m = {.count = COUNT};
-  double rms = 0.0;
   m.rows = calloc(COUNT, sizeof *m.rows);
-  m.distance = malloc(COUNT * sizeof *m.distance);
+  m.match = malloc(COUNT * sizeof *m.match);
   m.space = malloc(COUNT * sizeof *m.space);
   for (size_t i = 0; i < COUNT; ++i) {
     m.rows[i].weight = 1.0;
-    m.distance[i] = i < NORMAL          ? sigma * gsl_cdf_ugaussian_Pinv(((double)i + 0.5) / NORMAL)
-                    : i < NORMAL + LOOK ? sigma * look[i - NORMAL]
-                                        : 40.0 + 0.1 * (double)i;
+    m.match[i].distance = i < NORMAL ? sigma * gsl_cdf_ugaussian_Pinv(((double)i + 0.5) / NORMAL)
+                          : i < NORMAL + LOOK ? sigma * look[i - NORMAL]
+                                              : 40.0 + 0.1 * (double)i;
   }
-  assert_true(supine_patient_matching_weigh(&m, 0.0, &rms) == 1.0);
+  assert_int_equal(supine_patient_matching_weigh(&m, 0.0, NULL), SUPINE_OK);
+  assert_true(m.matched == 1.0);
   for (size_t k = 0; k < LOOK; ++k) {
     const double t = look[k] / 4.685;
     const double expected = fabs(t) < 1.0 ? pow(1.0 - t * t, 2.0) : 0.0;
@@ -207,9 +207,9 @@ TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
   }
   assert_true(m.rows[NORMAL + 2].weight > 0.0 && m.rows[NORMAL + 3].weight < 0.01);
   assert_true(m.rows[COUNT - 1].weight == 0.0);
-  assert_true(rms > 0.8 * sigma && rms < sigma);
+  assert_true(m.rms > 0.8 * sigma && m.rms < sigma);
   free(m.rows);
-  free(m.distance);
+  free(m.match);
   free(m.space);
 }
 
@@ -257,7 +257,7 @@ TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
     moved.vertices[i] = 1.05 * rest.mesh.vertices[i];
   }
   moved.triangles = inwards;
-  refused(&rest, &moved, "facing the same way");
+  refused(&rest, &moved, "faces the same way");
   free(inwards);
   free(moved.vertices);
   supine_mesh_free(&lump);

@@ -33,9 +33,9 @@ static void find_catch(supine_patient_matching *m, const supine_patient *patient
   for (size_t v = 0; v < m->count; ++v) {
     const supine_patient_row *row = &m->rows[v];
     supine_patient_direction(&law.power, &row->place, 1.0, d);
-    caught[v] =
-        supine_patient_force_at(&law.power, &row->place) +
-        row->weight * m->distance[v] * supine_dot(row->axis, d) / (supine_dot(d, d) + softener);
+    caught[v] = supine_patient_force_at(&law.power, &row->place) +
+                row->weight * m->match[v].distance * supine_dot(row->axis, d) /
+                    (supine_dot(d, d) + softener);
   }
 }
 
@@ -78,13 +78,13 @@ static bool conclude(const double products[ALL * ALL], supine_patient_applied *a
     return false;
   }
   const double variance = covariance(products, FORCE, FORCE);
-  double left = products[FORCE * ALL + FORCE];
+  double squares = products[FORCE * ALL + FORCE];
   for (size_t i = 0; i < COLUMNS; ++i) {
-    left -= k[i] * products[i * ALL + FORCE];
+    squares -= k[i] * products[i * ALL + FORCE];
   }
   memcpy(applied->slopes, k + 1, sizeof applied->slopes);
   cblas_dscal(3, 1.0 / k[0], applied->slopes, 1);
-  applied->left = sqrt(fmax(0.0, left) / products[0]) / fabs(k[0]);
+  applied->residual = sqrt(fmax(0.0, squares) / products[0]) / fabs(k[0]);
   applied->spread = sqrt(variance) / fabs(k[0]);
   applied->correlation =
       covariance(products, HEIGHT, FORCE) / sqrt(covariance(products, HEIGHT, HEIGHT) * variance);
@@ -102,8 +102,9 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
   supine_status status =
       caught == NULL || means == NULL
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
-          : supine_patient_matching_choose(m, n, 0, error);
+          : SUPINE_OK;
   if (status == SUPINE_OK) {
+    supine_patient_matching_choose(m, n);
     find_catch(m, patient, caught);
     status = supine_physics_equilibrium_force(m->equilibrium, caught, caught + n, error);
   }

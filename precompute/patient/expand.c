@@ -122,7 +122,7 @@ static supine_status find_responses(const supine_patient_matching *m,
     }
     status = supine_physics_equilibrium_solve(m->equilibrium, lanes, alone, caught, NULL, error);
     for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-      memcpy(response + i * regions->count + first, caught + m->vertex[i] * lanes,
+      memcpy(response + i * regions->count + first, caught + m->match[i].vertex * lanes,
              lanes * sizeof *caught);
     }
   }
@@ -153,12 +153,10 @@ static supine_status settle(supine_patient_matching *m, const double *response,
                             supine_patient_stiffness *regions, supine_error *error) {
   supine_patient_krige krige = {0};
   double share[SUPINE_PATIENT_MODES];
-  double rms;
-  supine_status status = SUPINE_OK;
   supine_patient_matching_find(m);
-  (void)supine_patient_matching_weigh(m, INFINITY, &rms);
+  supine_status status = supine_patient_matching_weigh(m, INFINITY, error);
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
-    options->noise = sqrt(together) * fmax(noise_least, rms) / m->rows[0].noise;
+    options->noise = sqrt(together) * fmax(noise_least, m->rms) / m->rows[0].noise;
     set_forces(m, regions->count, response, NULL);
     status = supine_patient_krige_fit(options, m->rows, m->count, &krige, error);
     if (status == SUPINE_OK) {
@@ -171,7 +169,7 @@ static supine_status settle(supine_patient_matching *m, const double *response,
       set_forces(m, regions->count, response, krige.region);
       (void)supine_patient_matching_place(m, patient);
       supine_patient_matching_find(m);
-      (void)supine_patient_matching_weigh(m, INFINITY, &rms);
+      status = supine_patient_matching_weigh(m, INFINITY, error);
     }
     supine_patient_krige_free(&krige);
   }

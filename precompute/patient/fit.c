@@ -53,17 +53,17 @@ static void add_rows(const study *s, const supine_patient_row *rows, size_t coun
       const supine_patient_row *row = &rows[j];
       double variance;
       double x[SUPINE_PATIENT_TERMS];
-      const double left[SCORES] = {row->value, supine_patient_affine_residual(map[0], row),
-                                   supine_patient_affine_residual(map[1], row),
-                                   supine_patient_power_design(&krige->alone, row, x),
-                                   supine_patient_krige_predict(krige, row, &variance) -
-                                       row->value};
+      const double residual[SCORES] = {row->value, supine_patient_affine_residual(map[0], row),
+                                       supine_patient_affine_residual(map[1], row),
+                                       supine_patient_power_design(&krige->alone, row, x),
+                                       supine_patient_krige_predict(krige, row, &variance) -
+                                           row->value};
       for (size_t k = 0; k < SCORES; ++k) {
-        to->of[k] += row->weight * left[k] * left[k];
+        to->of[k] += row->weight * residual[k] * residual[k];
       }
       variance += pow(krige->noise * row->noise, 2.0);
       to->expected += row->weight * variance;
-      square += pow(left[SUPINE_PATIENT_SCORE_CORRECTED], 2.0);
+      square += pow(residual[SUPINE_PATIENT_SCORE_CORRECTED], 2.0);
       expected += variance;
       weight += row->weight;
     }
@@ -81,7 +81,6 @@ static supine_status hold_out(const study *s, const size_t *fold, size_t which, 
   size_t kept = 0;
   size_t count = 0;
   for (int held = 0; held < 2 && status == SUPINE_OK; ++held) {
-    kept = held ? kept : 0;
     for (size_t i = 0; i < n; ++i) {
       if ((fold[i] == which) == (held == 1)) {
         rows[count++] = s->rows[i];
@@ -185,9 +184,8 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
     (void)conclude(s, &fitted, report->fitted);
     report->explained = conclude(s, &held, report->held_out);
     report->baseline = report->held_out[baseline_of(s)];
-    report->expected = sqrt(held.expected * (double)s->components / held.weight);
     if (s->components == 3) {
-      report->expected_point = report->expected;
+      report->expected_point = sqrt(held.expected * 3.0 / held.weight);
     }
     report->expected_constant = moved > 0.0 ? pow(report->expected_point, 2.0) / moved : 0.0;
     report->band = held.points > 0.0 ? 100.0 * held.within / held.points : 0.0;
@@ -210,8 +208,7 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
              .components = single > 0 ? 1 : 3,
              .fold = malloc(SUPINE_PATIENT_SEEDS * count * sizeof(size_t))};
   supine_status status = SUPINE_OK;
-  *report = (supine_patient_fit_report){.points = (double)(single > 0 ? count : triples),
-                                        .components = s.components};
+  *report = (supine_patient_fit_report){.points = (double)(single > 0 ? count : triples)};
   patient->law = options->law;
   if (single + triples < needed) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT,

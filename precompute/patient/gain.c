@@ -12,10 +12,15 @@
 
 static const double gain_least = 0.01, gain_most = 2.0; /* beyond, a gain is undetermined */
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
-static const double matched_least = 0.3; /* least share of a surface's vertices that must match */
 static const double settled = 1e-4;      /* change of s and s gain that ends the rounds */
 static const double force_least = 0.2;   /* least fitted force, of a mean of 1 */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, UNKNOWNS = 5 };
+
+/* The fitted displacement at a row. */
+typedef struct field {
+  double u[3];   /* from full inflation to rest in the fitted posture, mm */
+  double turned; /* relative change of the force by the further state's posture, at a gain of 1 */
+} field;
 
 /* A further state as rows, axis . ((s + s gain turned) u + t) = value. */
 typedef struct work {
@@ -24,30 +29,28 @@ typedef struct work {
   bool moved;                       /* fit t */
   double gains[2][3];               /* part of the way from full inflation to rest of the fuller and
                                      * the emptier state, by axis */
-  supine_patient_matching matching; /* of a state given as a surface */
-  size_t count;
-  supine_patient_row *rows; /* [count]; block: the eighth of the lungs */
-  double *u;                /* [count, 3] from full inflation to rest in the fitted posture, mm */
-  double *turned;     /* [count] relative change of the force by this posture, at a gain of 1 */
-  double x[UNKNOWNS]; /* s, s gain, t */
+  supine_patient_matching matching; /* rows of the state; their block is the eighth of the lungs.
+                                     * Of points it has nothing else */
+  field *field;                     /* [rows] */
+  double x[UNKNOWNS];               /* s, s gain, t */
 } work;
 
 /* Fit the unknowns by linear least squares without one eighth of the lungs (EIGHTHS: with all);
  * return the RMS residual, mm. */
-static double fit(work *w, bool turns, size_t without) {
+static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
   double squares = 0.0;
   double weights = 0.0;
-  for (size_t i = 0; i < w->count; ++i) {
-    const supine_patient_row *row = &w->rows[i];
+  for (size_t i = 0; i < w->matching.count; ++i) {
+    const supine_patient_row *row = &w->matching.rows[i];
     const double weight = row->block == without ? 0.0 : row->weight;
-    const double along = supine_dot(row->axis, w->u + 3 * i);
-    double x[UNKNOWNS] = {along, turns ? w->turned[i] * along : 0.0};
+    const double along = supine_dot(row->axis, w->field[i].u);
+    double x[UNKNOWNS] = {along, fits_gain ? w->field[i].turned * along : 0.0};
     double value = row->value; /* from full inflation */
     for (size_t a = 0; a < 3; ++a) {
       x[2 + a] = w->moved ? row->axis[a] : 0.0;
-      value += w->gains[0][a] * row->axis[a] * w->u[3 * i + a];
+      value += w->gains[0][a] * row->axis[a] * w->field[i].u[a];
     }
     cblas_dsyr(CblasColMajor, CblasUpper, UNKNOWNS, weight, x, 1, matrix, UNKNOWNS);
     cblas_daxpy(UNKNOWNS, weight * value, x, 1, right, 1);
@@ -89,20 +92,17 @@ static supine_status take_rows(work *w, const supine_lungs *rest, const supine_p
                                supine_error *error) {
   supine_status status = SUPINE_OK;
   if (pairs != NULL) {
-    w->count = 3 * pairs->count;
-    w->rows = malloc(w->count * sizeof *w->rows);
+    w->matching.count = 3 * pairs->count;
+    w->matching.rows = malloc(w->matching.count * sizeof *w->matching.rows);
   } else {
     status = supine_patient_matching_create(rest, w->surface, &w->record->stiffness, VERTICES_MAX,
                                             0, &w->matching, error);
-    w->count = w->matching.count;
-    w->rows = w->matching.rows;
   }
-  w->u = malloc(3 * w->count * sizeof *w->u);
-  w->turned = malloc(w->count * sizeof *w->turned);
-  if (status == SUPINE_OK && (w->rows == NULL || w->u == NULL || w->turned == NULL)) {
+  w->field = malloc(w->matching.count * sizeof *w->field);
+  if (status == SUPINE_OK && (w->matching.rows == NULL || w->field == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a further state");
   } else if (status == SUPINE_OK && pairs != NULL) {
-    supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, w->rows);
+    supine_patient_rows_of_pairs(&w->record->patient.frame, pairs, w->matching.rows);
   }
   return status;
 }
@@ -112,22 +112,22 @@ static void find_motion(work *w, const supine_lungs *rest, const double gravity[
   const supine_patient *patient = &w->record->patient;
   const double *g = w->record->state[1].gravity;
   const supine_patient_frame *frame = w->surface != NULL ? &w->matching.frame : &patient->frame;
-  for (size_t i = 0; i < w->count; ++i) {
-    supine_patient_place place = w->rows[i].place;
+  for (size_t i = 0; i < w->matching.count; ++i) {
+    supine_patient_place place = w->matching.rows[i].place;
     const double *columns = place.force;
     const double then = 0.5 * columns[0] - g[1] * columns[2] - g[2] * columns[3];
-    w->turned[i] = (height_at(frame, &place, gravity) - then) /
-                   fmax(force_least, supine_patient_force_at(&patient->power, &place));
-    w->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
-                       (place.box[2] > 0.5 ? 1U : 0U);
+    w->field[i].turned = (height_at(frame, &place, gravity) - then) /
+                         fmax(force_least, supine_patient_force_at(&patient->power, &place));
+    w->matching.rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
+                                (place.box[2] > 0.5 ? 1U : 0U);
     if (w->surface != NULL && !w->record->from_surface) {
       /* the landmarks' box is wider than the surface's */
-      place = supine_patient_find(&patient->frame, rest->mesh.vertices + 3 * w->matching.vertex[i],
-                                  place.side);
+      place = supine_patient_find(
+          &patient->frame, rest->mesh.vertices + 3 * w->matching.match[i].vertex, place.side);
     }
-    supine_patient_displacement(patient, &place, 1.0, w->u + 3 * i);
+    supine_patient_displacement(patient, &place, 1.0, w->field[i].u);
     for (size_t k = 0; k < 3; ++k) { /* scale to the way from full inflation to rest */
-      w->u[3 * i + k] /= w->gains[1][k] - w->gains[0][k];
+      w->field[i].u[k] /= w->gains[1][k] - w->gains[0][k];
     }
   }
 }
@@ -135,27 +135,19 @@ static void find_motion(work *w, const supine_lungs *rest, const double gravity[
 /* Find the nearest points of the surface, with vertices moved by the unknowns. */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
-  double rms;
   for (size_t i = 0; i < m->count; ++i) {
-    const double scale = w->x[0] + w->x[1] * w->turned[i];
+    const double scale = w->x[0] + w->x[1] * w->field[i].turned;
     for (size_t k = 0; k < 3; ++k) {
-      m->moved[3 * i + k] = m->rest->mesh.vertices[3 * m->vertex[i] + k] +
-                            (scale - w->gains[0][k]) * w->u[3 * i + k] + w->x[2 + k];
+      m->match[i].moved[k] = m->rest->mesh.vertices[3 * m->match[i].vertex + k] +
+                             (scale - w->gains[0][k]) * w->field[i].u[k] + w->x[2 + k];
     }
   }
   supine_patient_matching_find(m);
-  const double matched = supine_patient_matching_weigh(m, 0.0, &rms);
-  return matched >= matched_least
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "only %.0f %% of the vertices find a further state's surface "
-                                "facing the same way: check that axes and person are the same, "
-                                "and that no triangles face inwards",
-                                100.0 * matched);
+  return supine_patient_matching_weigh(m, 0.0, error);
 }
 
 /* Alternate between finding the nearest points and the fit, then measure the gain's error. */
-static supine_status settle(work *w, supine_patient_told *told, supine_error *error) {
+static supine_status settle(work *w, supine_patient_further *further, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;
   double sum = 0.0;
@@ -163,49 +155,47 @@ static supine_status settle(work *w, supine_patient_told *told, supine_error *er
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
     const double before[2] = {w->x[0], w->x[1]};
     status = w->surface == NULL ? SUPINE_OK : match_surface(w, error);
-    told->left = fit(w, told->turns, EIGHTHS);
+    further->residual = fit(w, further->fits_gain, EIGHTHS);
     change = fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]);
   }
-  told->scale = w->x[0];
-  told->gain = w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0;
-  told->left_without = fit(w, false, EIGHTHS);
-  for (size_t without = 0; without < EIGHTHS && told->turns; ++without) {
+  further->scale = w->x[0];
+  further->gain = w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0;
+  further->residual_without_gain = fit(w, false, EIGHTHS);
+  for (size_t without = 0; without < EIGHTHS && further->fits_gain; ++without) {
     (void)fit(w, true, without);
-    const double off = (w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0) - told->gain;
+    const double off = (w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0) - further->gain;
     sum += off;
     square += off * off;
   }
-  told->gain_error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
+  further->gain_error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
   return status;
 }
 
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
                                       const supine_patient_pairs *pairs, const supine_mesh *surface,
-                                      bool moved, supine_patient_told *told, supine_error *error) {
+                                      bool moved, supine_patient_further *further,
+                                      supine_error *error) {
   work w = {.record = record, .surface = surface, .moved = moved, .x = {1.0}};
-  told->turns = supine_distance(told->state.gravity, record->state[1].gravity) >= same_posture;
+  further->fits_gain =
+      supine_distance(further->state.gravity, record->state[1].gravity) >= same_posture;
   supine_patient_path(record, w.gains);
   supine_status status = take_rows(&w, rest, pairs, error);
   if (status == SUPINE_OK) {
-    find_motion(&w, rest, told->state.gravity);
-    status = settle(&w, told, error);
-  }
-  if (surface == NULL) {
-    free(w.rows);
+    find_motion(&w, rest, further->state.gravity);
+    status = settle(&w, further, error);
   }
   supine_patient_matching_free(&w.matching);
-  free(w.u);
-  free(w.turned);
+  free(w.field);
   return status;
 }
 
 void supine_patient_gain_take(supine_patient_record *record) {
   double gain = 0.0;
   double precision = 0.0;
-  for (size_t k = 0; k < record->told_count; ++k) {
-    const supine_patient_told *told = &record->told[k];
-    const double weight = told->turns ? pow(fmax(1e-6, told->gain_error), -2.0) : 0.0;
-    gain += weight * told->gain;
+  for (size_t k = 0; k < record->further_count; ++k) {
+    const supine_patient_further *further = &record->further[k];
+    const double weight = further->fits_gain ? pow(fmax(1e-6, further->gain_error), -2.0) : 0.0;
+    gain += weight * further->gain;
     precision += weight;
   }
   if (precision > 0.0) {

@@ -46,7 +46,7 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
 
 /* Return whether the law keeps its known shape. */
 static bool keeps_shape(const supine_patient_krige *k) {
-  return k->size_only || (k->kind == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
+  return k->options.size_only || (k->options.law == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
 /* Find the prior standard deviation of a term of the law: 0 known, INFINITY free. */
@@ -54,12 +54,12 @@ static double spread_of(const supine_patient_krige *k, size_t term) {
   static const size_t motion[] = {0, 3, 6};
   const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
   const bool kept = keeps_shape(k);
-  return term == SCALE                   ? (k->size_only ? INFINITY
-                                            : kept       ? scale_spread
-                                                         : 0.0)
-         : term < LAW                    ? (kept ? 0.0 : spread[k->kind][term / 3] * unit)
-         : term - LAW < motion[k->moved] ? INFINITY
-                                         : 0.0;
+  return term == SCALE ? (k->options.size_only ? INFINITY
+                          : kept               ? scale_spread
+                                               : 0.0)
+         : term < LAW  ? (kept ? 0.0 : spread[k->options.law][term / 3] * unit)
+         : term - LAW < motion[k->options.moved] ? INFINITY
+                                                 : 0.0;
 }
 
 static double offset_of(const supine_patient_krige *k, size_t term) {
@@ -88,16 +88,16 @@ static supine_patient_power moved_by(const supine_patient_power *law, const doub
 
 /* Compute the derivative of a row by each term; return the law's value less the row's, mm. */
 static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
-  if (k->region_count == 0) {
+  if (k->options.region_count == 0) {
     return supine_patient_power_design(&k->law, row, x);
   }
   supine_patient_row with = *row;
-  with.place.force[0] = cblas_ddot((int)k->region_count, row->response, 1, k->region, 1);
-  const double left = supine_patient_power_design(&k->law, &with, x);
+  with.place.force[0] = cblas_ddot((int)k->options.region_count, row->response, 1, k->region, 1);
+  const double difference = supine_patient_power_design(&k->law, &with, x);
   for (size_t t = TERMS; t < k->terms; ++t) {
     x[t] = x[SCALE] / with.place.force[0] * row->response[t - TERMS];
   }
-  return left;
+  return difference;
 }
 
 static double noise_of(const supine_patient_krige *k, const supine_patient_row *row) {
@@ -151,7 +151,7 @@ static void add_prior(supine_patient_krige *k) {
     }
   }
   for (size_t t = TERMS; t < terms; ++t) {
-    const double *precision = k->precision + (t - TERMS) * k->region_count;
+    const double *precision = k->options.precision + (t - TERMS) * k->options.region_count;
     double gradient = 0.0;
     for (size_t s = TERMS; s < terms; ++s) {
       gradient += precision[s - TERMS] * (k->region[s - TERMS] - 1.0);
@@ -284,13 +284,13 @@ static void choose(supine_patient_krige *k, const supine_patient_fit_options *op
 static bool fit_alone(supine_patient_krige *k, bool size_only) {
   k->sill = 0.0;
   k->noise = 1.0;
-  k->size_only = size_only;
+  k->options.size_only = size_only;
   k->law = k->mean;
   k->terms = TERMS;
   (void)factor(k);
   const bool right = descend(k);
-  k->size_only = false;
-  k->terms = TERMS + k->region_count;
+  k->options.size_only = false;
+  k->terms = TERMS + k->options.region_count;
   k->alone = k->law;
   return right;
 }
@@ -301,10 +301,7 @@ static supine_status open(supine_patient_krige *k, const supine_patient_fit_opti
   const size_t terms = TERMS + options->region_count;
   *k = (supine_patient_krige){.rows = rows,
                               .count = count,
-                              .kind = options->law,
-                              .moved = options->moved,
-                              .region_count = options->region_count,
-                              .precision = options->precision,
+                              .options = *options,
                               .mean = supine_patient_deep(options->gravity, options->way),
                               .centre = malloc(count * sizeof *k->centre),
                               .factor = corrected ? malloc(count * count * sizeof(double)) : NULL,
@@ -312,7 +309,7 @@ static supine_status open(supine_patient_krige *k, const supine_patient_fit_opti
                               .normal = malloc(2 * terms * terms * sizeof *k->normal),
                               .weight = malloc(count * sizeof *k->weight),
                               .scratch = malloc(count * sizeof *k->scratch)};
-  for (size_t r = 0; r < k->region_count; ++r) {
+  for (size_t r = 0; r < k->options.region_count; ++r) {
     k->region[r] = 1.0;
   }
   return k->centre == NULL || (corrected && k->factor == NULL) || k->design == NULL ||
@@ -350,7 +347,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   if (options->size_only) {
     return right ? SUPINE_OK : undetermined(error);
   }
-  right = right && (k->kind == SUPINE_PATIENT_DEEP || fit_alone(k, false));
+  right = right && (k->options.law == SUPINE_PATIENT_DEEP || fit_alone(k, false));
   if (!right) {
     return undetermined(error);
   }
@@ -379,9 +376,10 @@ static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share) {
   const supine_patient_krige *k = krige;
   const lapack_int terms = (lapack_int)k->terms;
-  for (size_t r = 0; r < k->region_count; ++r) { /* 1 - (normal^-1 precision)[r, r] */
+  for (size_t r = 0; r < k->options.region_count; ++r) { /* 1 - (normal^-1 precision)[r, r] */
     double x[TERMS_MAX] = {0.0};
-    memcpy(x + TERMS, k->precision + r * k->region_count, k->region_count * sizeof *x);
+    memcpy(x + TERMS, k->options.precision + r * k->options.region_count,
+           k->options.region_count * sizeof *x);
     (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', terms, 1, k->normal, terms, x, terms);
     share[r] = 1.0 - x[TERMS + r];
   }

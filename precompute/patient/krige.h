@@ -91,12 +91,8 @@ typedef struct supine_patient_fit_options {
 typedef struct supine_patient_krige {
   const supine_patient_row *rows;
   size_t count;
-  supine_patient_law kind;
-  supine_patient_moved moved;
-  bool size_only; /* only the law's size and the motion are unknown */
-  size_t terms;   /* unknowns of `design` and `normal` */
-  size_t region_count;
-  const double *precision;
+  supine_patient_fit_options options;
+  size_t terms;                              /* unknowns of `design` and `normal` */
   double region[SUPINE_PATIENT_REGIONS_MAX]; /* expandability of each region; 1 of uniform tissue */
   double sill, noise;                        /* factors in use; a sill of 0: no g */
   supine_patient_power mean;                 /* prior mean of the constants */
@@ -159,14 +155,12 @@ typedef enum supine_patient_score {
 
 /** Result of a fit; errors are in mm RMS. */
 typedef struct supine_patient_fit_report {
-  double points;     /**< number of landmarks, or of points of a surface */
-  double blocks;     /**< number of cubes of 40 mm with points in them */
-  size_t components; /**< components measured per point: 3 if all are landmarks, else 1 */
+  double points;                          /**< number of landmarks, or of points of a surface */
+  double blocks;                          /**< number of cubes of 40 mm with points in them */
   double fitted[SUPINE_PATIENT_SCORES];   /**< on the fitted points */
   double held_out[SUPINE_PATIENT_SCORES]; /**< on held-out blocks */
   double baseline;  /**< on held-out blocks: of a translation if the scans moved, else of none */
   double band;      /**< % of the held-out points within the 95 % band */
-  double expected;  /**< expected error of held-out points (of one component, if one is measured) */
   double explained; /**< held-out share of the squared displacement that the law explains, % */
   double expected_point;                  /**< expected error of points in three dimensions */
   double expected_constant;               /**< its square for each mm of displacement, mm */

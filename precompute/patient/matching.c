@@ -19,16 +19,17 @@ static const double compatible = 0.5;    /* least cosine between normals: 60 deg
 static const double biweight = 4.685;    /* cutoff over the scale: 95 % efficiency */
 static const double surface_noise = 0.5; /* standard deviation along the normal, mm */
 static const double scale_least = 0.02;  /* least scale, mm: surfaces are no more precise */
+static const double matched_least = 0.3; /* least share of the vertices that match */
 
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   supine_patient_matching *m = context;
   for (size_t i = begin; i < end; ++i) {
-    const double *at = m->moved + 3 * i;
-    const double *from = m->rest->mesh.vertices + 3 * m->vertex[i];
+    supine_patient_match *match = &m->match[i];
+    const double *from = m->rest->mesh.vertices + 3 * match->vertex;
     supine_patient_row *row = &m->rows[i];
-    m->nearest[i] = supine_inside_surface_nearest(m->tree, at, m->warm ? &m->nearest[i] : NULL);
-    const supine_inside_place *place = &m->nearest[i];
+    supine_inside_place *place = &match->nearest;
+    *place = supine_inside_surface_nearest(m->tree, match->moved, place);
     const uint32_t *corner = m->state->triangles + 3 * place->triangle;
     double normal[3] = {0.0, 0.0, 0.0};
     double cosine = 0.0;
@@ -38,12 +39,12 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
     }
     const double length = supine_length(normal);
     row->value = 0.0;
-    m->distance[i] = 0.0;
+    match->distance = 0.0;
     for (size_t k = 0; k < 3; ++k) {
       row->axis[k] = length > 0.0 ? normal[k] / length : 0.0;
       row->value += row->axis[k] * (place->nearest[k] - from[k]);
-      m->distance[i] += row->axis[k] * (place->nearest[k] - at[k]);
-      cosine += row->axis[k] * m->rest_normals[3 * m->vertex[i] + k];
+      match->distance += row->axis[k] * (place->nearest[k] - match->moved[k]);
+      cosine += row->axis[k] * m->rest_normals[3 * match->vertex + k];
     }
     row->weight = cosine > compatible ? 1.0 : 0.0;
   }
@@ -51,42 +52,38 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
 
 void supine_patient_matching_find(supine_patient_matching *matching) {
   supine_parallel_for(matching->count, GRAIN, 0, match_range, matching);
-  matching->warm = true;
 }
 
-double supine_patient_matching_weigh(supine_patient_matching *matching, double scale, double *rms) {
+supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
+                                            supine_error *error) {
   supine_patient_matching *m = matching;
   size_t count = 0;
   double squares = 0.0;
   double weights = 0.0;
-  *rms = 0.0;
   for (size_t i = 0; i < m->count; ++i) {
     if (m->rows[i].weight > 0.0) {
-      m->space[count++] = fabs(m->distance[i]);
+      m->space[count++] = fabs(m->match[i].distance);
     }
   }
-  if (count == 0) {
-    return 0.0;
+  m->matched = (double)count / (double)m->count;
+  if (m->matched < matched_least) {
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "only %.0f %% of the vertices find a point that faces the same way on "
+                            "the surface of the other state: check that axes and person are the "
+                            "same, and that no triangles face inwards",
+                            100.0 * m->matched);
   }
   gsl_sort(m->space, 1, count);
   const double most = fmax(fmax(scale_least, scale), 1.4826 * m->space[count / 2]);
   for (size_t i = 0; i < m->count; ++i) {
-    const double t = m->distance[i] / (biweight * most);
+    const double distance = m->match[i].distance;
+    const double t = distance / (biweight * most);
     m->rows[i].weight *= fabs(t) < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
-    squares += m->rows[i].weight * m->distance[i] * m->distance[i];
+    squares += m->rows[i].weight * distance * distance;
     weights += m->rows[i].weight;
   }
-  *rms = weights > 0.0 ? sqrt(squares / weights) : 0.0;
-  return (double)count / (double)m->count;
-}
-
-static void free_chosen(supine_patient_matching *m) {
-  free(m->vertex);
-  free(m->moved);
-  free(m->rows);
-  free(m->distance);
-  free(m->nearest);
-  free(m->space);
+  m->rms = sqrt(squares / weights);
+  return SUPINE_OK;
 }
 
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
@@ -136,44 +133,30 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, e, error);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->columns,
-                                              m->caught, NULL, error);
+                                              m->spread, NULL, error);
   }
   for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-    memcpy(m->rows[i].place.force, m->caught + SUPINE_PATIENT_COLUMNS * m->vertex[i],
+    memcpy(m->rows[i].place.force, m->spread + SUPINE_PATIENT_COLUMNS * m->match[i].vertex,
            sizeof m->rows[i].place.force);
   }
   free(e);
   return status;
 }
 
-supine_status supine_patient_matching_choose(supine_patient_matching *matching, size_t most,
-                                             size_t landmarks, supine_error *error) {
+void supine_patient_matching_choose(supine_patient_matching *matching, size_t most) {
   supine_patient_matching *m = matching;
   const size_t n = m->rest->mesh.vertex_count;
   m->count = n < most ? n : most;
-  m->landmark_rows_count = 0;
-  m->warm = false;
-  free_chosen(m);
-  m->vertex = malloc(m->count * sizeof *m->vertex);
-  m->moved = malloc(3 * m->count * sizeof(double));
-  m->rows = calloc(m->count + 3 * landmarks, sizeof *m->rows);
-  m->distance = malloc(m->count * sizeof(double));
-  m->nearest = calloc(m->count, sizeof *m->nearest);
-  m->space = malloc(m->count * sizeof(double));
-  if (m->vertex == NULL || m->moved == NULL || m->rows == NULL || m->distance == NULL ||
-      m->nearest == NULL || m->space == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", m->count);
-  }
+  m->landmark_row_count = 0;
   for (size_t i = 0; i < m->count; ++i) {
     const size_t v = i * n / m->count;
-    m->vertex[i] = v;
-    m->rows[i].place = supine_patient_find_vertex(m->rest, v);
-    m->rows[i].noise = surface_noise;
-    memcpy(m->rows[i].place.force, m->caught + SUPINE_PATIENT_COLUMNS * v,
+    m->match[i] = (supine_patient_match){.vertex = v, .nearest.depth = INFINITY};
+    m->rows[i] = (supine_patient_row){.place = supine_patient_find_vertex(m->rest, v),
+                                      .noise = surface_noise};
+    memcpy(m->rows[i].place.force, m->spread + SUPINE_PATIENT_COLUMNS * v,
            sizeof m->rows[i].place.force);
-    memcpy(m->moved + 3 * i, m->rest->mesh.vertices + 3 * v, 3 * sizeof(double));
+    memcpy(m->match[i].moved, m->rest->mesh.vertices + 3 * v, sizeof m->match[i].moved);
   }
-  return SUPINE_OK;
 }
 
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
@@ -185,11 +168,14 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
   *m = (supine_patient_matching){.rest = rest, .state = state};
   m->frame = supine_patient_frame_of_lungs(rest);
   m->columns = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
-  m->caught = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
+  m->spread = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
   m->rest_normals = malloc(3 * n * sizeof(double));
   m->state_normals = malloc(3 * state->vertex_count * sizeof(double));
-  if (m->columns == NULL || m->caught == NULL || m->rest_normals == NULL ||
-      m->state_normals == NULL) {
+  m->match = malloc(n * sizeof *m->match);
+  m->rows = malloc((n + 3 * landmarks) * sizeof *m->rows);
+  m->space = malloc(n * sizeof(double));
+  if (m->columns == NULL || m->spread == NULL || m->rest_normals == NULL ||
+      m->state_normals == NULL || m->match == NULL || m->rows == NULL || m->space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   supine_mesh_vertex_normals(&rest->mesh, m->rest_normals);
@@ -204,11 +190,11 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
     status = supine_patient_matching_solve(m, stiffness, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_patient_matching_choose(m, most, landmarks, error);
+    supine_patient_matching_choose(m, most);
+    status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
+                                          &m->tree, error);
   }
-  return status != SUPINE_OK ? status
-                             : supine_inside_surface_create(state->vertices, state->triangle_count,
-                                                            state->triangles, &m->tree, error);
+  return status;
 }
 
 void supine_patient_matching_free(supine_patient_matching *matching) {
@@ -216,10 +202,12 @@ void supine_patient_matching_free(supine_patient_matching *matching) {
   supine_inside_surface_destroy(m->tree);
   supine_physics_equilibrium_destroy(m->equilibrium);
   free(m->columns);
-  free(m->caught);
+  free(m->spread);
   free(m->rest_normals);
   free(m->state_normals);
-  free_chosen(m);
+  free(m->match);
+  free(m->rows);
+  free(m->space);
 }
 
 static void place_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -227,15 +215,16 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
   supine_patient_matching *m = context;
   for (size_t i = begin; i < end; ++i) {
     const supine_patient_place *place = &m->rows[i].place;
+    supine_patient_match *match = &m->match[i];
     double u[3];
     double motion[3];
     supine_patient_displacement(m->patient, place, 1.0, u);
     supine_patient_motion(&m->patient->power, place, motion);
     m->space[i] = 0.0;
     for (size_t a = 0; a < 3; ++a) {
-      const double at = m->rest->mesh.vertices[3 * m->vertex[i] + a] + u[a] + motion[a];
-      m->space[i] += pow(at - m->moved[3 * i + a], 2.0);
-      m->moved[3 * i + a] = at;
+      const double at = m->rest->mesh.vertices[3 * match->vertex + a] + u[a] + motion[a];
+      m->space[i] += pow(at - match->moved[a], 2.0);
+      match->moved[a] = at;
     }
   }
 }

@@ -8,30 +8,36 @@
 #include "precompute/patient/patient_file.h"
 #include "precompute/physics/model.h"
 
+/* A vertex of the reference surface that takes part, and its match on the other surface. */
+typedef struct supine_patient_match {
+  size_t vertex;               /* index in the reference surface */
+  double moved[3];             /* position after the displacement by the law, mm */
+  double distance;             /* from there to the other surface along its normal, mm */
+  supine_inside_place nearest; /* nearest point of the other surface */
+} supine_patient_match;
+
 typedef struct supine_patient_matching {
   const supine_lungs *rest; /* the reference surface */
   const supine_mesh *state; /* the surface in the other state */
   supine_patient_frame frame;
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
-  double *columns;               /* [N, COLUMNS] of the force before spreading */
-  double *caught;                /* [N, COLUMNS] of the force after spreading */
-  double *rest_normals;          /* [N, 3], unit */
-  double *state_normals;         /* [state vertices, 3], unit */
-  size_t count;                  /* vertices that take part */
-  size_t *vertex;                /* [count] indices in the reference surface */
-  double *moved;                 /* [count, 3] positions after the law, mm */
-  supine_patient_row *rows;      /* [count + 3 landmarks] */
-  double *distance;              /* [count] from the moved vertex along the normal, mm */
-  supine_inside_place *nearest;  /* [count] places of the moved vertices */
+  double *columns;               /* [N, COLUMNS] columns of the force before spreading */
+  double *spread;                /* [N, COLUMNS] columns of the force after spreading */
+  double *rest_normals;          /* [N, 3] unit normals of the reference surface */
+  double *state_normals;         /* [state vertices, 3] unit normals of the other surface */
+  size_t count;                  /* number of vertices that take part */
+  supine_patient_match *match;   /* [count] */
+  supine_patient_row *rows;      /* [count + landmark_row_count] */
   double *space;                 /* [count] working space */
-  const supine_patient *patient; /* law that the vertices were moved by last */
-  bool warm;                     /* nearest holds first guesses */
-  size_t landmark_rows_count;
+  double matched;                /* share of the vertices with a compatible normal at the match */
+  double rms;                    /* weighted RMS of the matches' distances, mm */
+  const supine_patient *patient; /* law that moved the vertices last */
+  size_t landmark_row_count;     /* three rows for each landmark */
 } supine_patient_matching;
 
-/* Set up the force's columns and at most `most` vertices of the reference surface, with room for
- * the rows of the landmarks. Zero-initialise before; free even after a failure.
+/* Spread the columns of the force and choose at most `most` vertices of the reference surface;
+ * allocate rows for them and for a number of landmarks. Free the matching even after a failure.
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
                                              const supine_patient_stiffness *stiffness, size_t most,
@@ -39,13 +45,11 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
                                              supine_error *error);
 void supine_patient_matching_free(supine_patient_matching *matching);
 
-/* Choose the vertices that take part, at most `most` at even steps of the index, and make their
- * rows anew, with room for three rows of each landmark.
- * @retval SUPINE_ERROR_MEMORY */
-supine_status supine_patient_matching_choose(supine_patient_matching *matching, size_t most,
-                                             size_t landmarks, supine_error *error);
+/* Choose the vertices that take part, at most `most` at even steps of the index, and initialise
+ * their matches and rows. The rows of landmarks are dropped. */
+void supine_patient_matching_choose(supine_patient_matching *matching, size_t most);
 
-/* Spread the force's columns under a stiffness; write them to `caught` and the rows.
+/* Spread the columns of the force under a stiffness; write them to `spread` and the rows.
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const supine_patient_stiffness *stiffness,
@@ -60,11 +64,12 @@ double supine_patient_matching_place(supine_patient_matching *matching,
  * weight 1, or 0 if the normals are incompatible. */
 void supine_patient_matching_find(supine_patient_matching *matching);
 
-/* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the
- * distances. Return the share of vertices that had weight before.
+/* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the distances,
+ * and find the matched share and the RMS distance.
  * @param scale  least scale, mm; INFINITY: keep the weights
- * @param rms    written: weighted RMS distance, mm */
-double supine_patient_matching_weigh(supine_patient_matching *matching, double scale, double *rms);
+ * @retval SUPINE_ERROR_MESH  less than 30 % of the vertices match */
+supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
+                                            supine_error *error);
 
 /** Find the weights [count] of the regions at a vertex; they sum to 1. */
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,

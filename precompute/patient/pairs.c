@@ -160,99 +160,96 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
 /* --- checking -------------------------------------------------------------------------------- */
 
 typedef struct summary {
-  double mean[2][3];
-  double spread[2]; /* RMS distance from the mean, mm */
-  double side[2];   /* longest side of the box, mm */
-  bool flat;        /* the first points lie in a plane */
-  double turn;      /* best rotation, degrees */
-  double growth;    /* determinant of the best affine map; negative: mirrored */
-  double left;      /* RMS residual of that map, mm */
-  double moved;     /* RMS motion, mm; less its mean if motion between the scans is allowed */
+  double spread[2];    /* RMS distance of each state's points from their mean, mm */
+  double size[2];      /* longest side of each state's box, mm */
+  double translation;  /* distance between the means of the two states, mm */
+  double rotation;     /* angle of the best rotation, degrees */
+  bool flat;           /* the points at rest lie in a plane */
+  double growth;       /* determinant of the best affine map; negative: mirrored */
+  double residual;     /* RMS residual of that map, mm */
+  double displacement; /* RMS, mm; about its mean if motion between the scans is allowed */
 } summary;
 
 static summary measure(const supine_patient_pairs *pairs, bool moved) {
   const size_t n = pairs->count;
+  supine_patient_affinity mean;
   supine_patient_affinity map;
-  summary s = {.left = 0.0};
+  summary s = {.flat = false};
   for (size_t i = 0; i < 6; ++i) {
     const double *points = (i < 3 ? pairs->from : pairs->to) + i % 3;
     double low;
     double high;
     gsl_stats_minmax(&low, &high, points, 3, n);
-    s.side[i / 3] = fmax(s.side[i / 3], high - low);
-    s.mean[i / 3][i % 3] = gsl_stats_mean(points, 3, n);
+    s.size[i / 3] = fmax(s.size[i / 3], high - low);
     s.spread[i / 3] = hypot(s.spread[i / 3], sqrt(gsl_stats_tss(points, 3, n) / (double)n));
   }
+  (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_TRANSLATION, n, pairs->from, pairs->to, &mean);
+  s.translation = supine_length(mean.t);
   (void)supine_patient_map_fit(SUPINE_PATIENT_MAP_RIGID, n, pairs->from, pairs->to, &map);
-  s.turn = acos(fmin(1.0, fmax(-1.0, 0.5 * (map.m[0] + map.m[4] + map.m[8] - 1.0)))) * 180.0 /
-           3.14159265358979323846;
+  s.rotation = acos(fmin(1.0, fmax(-1.0, 0.5 * (map.m[0] + map.m[4] + map.m[8] - 1.0)))) * 180.0 /
+               3.14159265358979323846;
   s.flat = !supine_patient_map_fit(SUPINE_PATIENT_MAP_AFFINE, n, pairs->from, pairs->to, &map);
   s.growth = supine_triple(map.m, map.m + 3, map.m + 6);
   for (size_t i = 0; i < n; ++i) {
     double at[3];
     supine_patient_map_apply(&map, pairs->from + 3 * i, at);
     for (size_t k = 0; k < 3; ++k) {
-      const double shift = moved ? s.mean[1][k] - s.mean[0][k] : 0.0;
-      s.left += pow(pairs->to[3 * i + k] - at[k], 2.0) / (double)n;
-      s.moved += pow(pairs->to[3 * i + k] - pairs->from[3 * i + k] - shift, 2.0) / (double)n;
+      const double u = pairs->to[3 * i + k] - pairs->from[3 * i + k] - (moved ? mean.t[k] : 0.0);
+      s.residual += pow(pairs->to[3 * i + k] - at[k], 2.0) / (double)n;
+      s.displacement += u * u / (double)n;
     }
   }
-  s.left = sqrt(s.left);
-  s.moved = sqrt(s.moved);
+  s.residual = sqrt(s.residual);
+  s.displacement = sqrt(s.displacement);
   return s;
 }
 
-/* Over 60 lines: a sequence of independent checks, each with its message. */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
                                          supine_error *error) {
   if (pairs->count < PAIRS_LEAST) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%zu pair%s of points determine%s no law: give at least %d, spread "
-                            "over both lungs",
-                            pairs->count, pairs->count == 1 ? "" : "s",
-                            pairs->count == 1 ? "s" : "", PAIRS_LEAST);
+                            "pairs of points: %zu, where a law needs at least %d, spread over both "
+                            "lungs: add more",
+                            pairs->count, PAIRS_LEAST);
   }
   const summary s = measure(pairs, moved);
   for (int state = 0; state < 2; ++state) {
     const char *unit = NULL;
-    if (!supine_mesh_unit_is_likely(s.side[state], &unit)) {
-      return supine_error_set(
-          error, SUPINE_ERROR_FORMAT,
-          "the points %s extend over %.3g: too small or large for lungs in mm%s%s; "
-          "give landmarks in mm, spread over the lungs",
-          state == 0 ? "at rest" : "of the other state", s.side[state],
-          unit == NULL ? "" : ", as if in ", unit == NULL ? "" : unit);
+    if (!supine_mesh_unit_is_likely(s.size[state], &unit)) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "the points %s extend over %.3g, too small or large for lungs in "
+                              "mm%s%s: give landmarks in mm, spread over the lungs",
+                              state == 0 ? "at rest" : "of the other state", s.size[state],
+                              unit == NULL ? "" : ", as if in ", unit == NULL ? "" : unit);
     }
   }
   if (s.flat) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "all points lie in one plane: give landmarks spread over the lungs");
   }
-  if (s.left > unmatched * s.spread[1]) {
+  if (s.residual > unmatched * s.spread[1]) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the pairs do not match: the best affine map leaves %.0f mm RMS; are "
-                            "both lists in the same order?",
-                            s.left);
+                            "the pairs do not match: the best affine map has a residual of %.0f mm "
+                            "RMS; check that both lists are in the same order",
+                            s.residual);
   }
-  if (s.growth < 0.0 || s.turn > turn_most) {
+  if (s.growth < 0.0 || s.rotation > turn_most) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "one state is %s by %.0f degrees: they are in different axes "
-                            "(landmarks are LPS: x to the left, y to the back, z to the head)",
-                            s.growth < 0.0 ? "the mirror image of the other, turned" : "turned",
-                            s.turn);
+                            "the two states differ by %sa rotation of %.0f degrees: give both in "
+                            "LPS axes (x to the left, y to the back, z to the head)",
+                            s.growth < 0.0 ? "a reflection and " : "", s.rotation);
   }
-  const double apart = supine_distance(s.mean[0], s.mean[1]);
-  if (!moved && apart > apart_most * s.spread[0]) {
+  if (!moved && s.translation > apart_most * s.spread[0]) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the two states are %.0f mm apart: different frames? --translation or "
-                            "--rigid finds the motion between two scans",
-                            apart);
+                            "the two states are %.0f mm apart: give both in one frame, or fit the "
+                            "motion between the scans with --translation or --rigid",
+                            s.translation);
   }
-  if (s.moved < stillest) {
+  if (s.displacement < stillest) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "the other state is the same as rest (%.2g mm RMS%s): give a state "
                             "in which the lungs have moved",
-                            s.moved, moved ? " beside a translation" : "");
+                            s.displacement, moved ? " apart from a translation" : "");
   }
   return SUPINE_OK;
 }

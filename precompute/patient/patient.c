@@ -110,8 +110,10 @@ double supine_patient_covariance(const supine_patient_centre *a, const supine_pa
   return supine_kriging_covariance(&supine_kriging_default, &p, &q);
 }
 
-void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
-                            double u[3]) {
+void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
+                                 double spread, double u[3]) {
+  const supine_patient_power *power = &patient->power;
+  supine_patient_direction(power, place, spread * supine_patient_force_at(power, place), u);
   supine_patient_centre here = {.side = place->side, .size = supine_length(u)};
   memcpy(here.at, place->arm, sizeof here.at);
   for (size_t i = 0; i < patient->centre_count; ++i) {
@@ -121,13 +123,6 @@ void supine_patient_correct(const supine_patient *patient, const supine_patient_
       u[k] += covariance * centre->weight[k];
     }
   }
-}
-
-void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
-                                 double spread, double u[3]) {
-  const supine_patient_power *power = &patient->power;
-  supine_patient_direction(power, place, spread * supine_patient_force_at(power, place), u);
-  supine_patient_correct(patient, place, u);
 }
 
 void supine_patient_settle(const supine_patient *patient, const double point[3], double side,

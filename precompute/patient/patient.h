@@ -122,10 +122,6 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
 /** Compute the covariance of the correction along one axis between two centres, mm^2. */
 double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b);
 
-/** Add the correction at a place to the law's displacement u there, mm. */
-void supine_patient_correct(const supine_patient *patient, const supine_patient_place *place,
-                            double u[3]);
-
 /** Compute the displacement u at a place, mm, without the motion between the scans.
  * @param spread  factor on the law's force there */
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,

@@ -71,7 +71,7 @@ static const numbers table[] = {
     {"applied_force", "blocks", 1, AT(applied.blocks), true},
     {"applied_force", "correlation_with_height", 1, AT(applied.correlation), true},
     {"applied_force", "c7_to_c9", 3, AT(applied.slopes), true},
-    {"applied_force", "left_rms", 1, AT(applied.left), true},
+    {"applied_force", "left_rms", 1, AT(applied.residual), true},
     {"applied_force", "spread_rms", 1, AT(applied.spread), true}};
 
 /* --- writing --------------------------------------------------------------------------------- */
@@ -111,7 +111,7 @@ static json_t *list_of(const void *values, size_t width, size_t count) {
 
 json_t *supine_patient_encode(const supine_patient_record *record, const char *made_by) {
   const supine_patient *patient = &record->patient;
-  json_t *further = json_array();
+  json_t *further_states = json_array();
   json_t *root = json_pack(
       "{s:s, s:i, s:s, s:s, s:{s:s, s:s}, s:{s:o}, s:{s:o}, s:{s:o}, s:o, s:s*}", "format", format,
       "version", VERSION, "name", record->name, "law", supine_patient_law_names[patient->law],
@@ -119,7 +119,7 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
       record->from_surface ? "surface" : "landmarks", "fuller", "state",
       state_text(&record->state[0]), "emptier", "state", state_text(&record->state[1]),
       "correction", "centres", list_of(patient->centre, CENTRE, patient->centre_count),
-      "further_states", further, "made_by", made_by);
+      "further_states", further_states, "made_by", made_by);
   for (size_t i = 0; i < sizeof table / sizeof *table && root != NULL; ++i) {
     const double *values = (const double *)((const char *)record + table[i].offset);
     bool any = !table[i].optional;
@@ -132,12 +132,12 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
                                                     : array_of(values, table[i].count));
     }
   }
-  for (size_t k = 0; k < record->told_count && root != NULL; ++k) {
-    const supine_patient_told *told = &record->told[k];
-    (void)json_array_append_new(further,
-                                json_pack("{s:o, s:f, s:f, s:f}", "state", state_text(&told->state),
-                                          "scale", told->scale, "left_rms_mm", told->left,
-                                          "left_without_gain_mm", told->left_without));
+  for (size_t k = 0; k < record->further_count && root != NULL; ++k) {
+    const supine_patient_further *further = &record->further[k];
+    (void)json_array_append_new(
+        further_states, json_pack("{s:o, s:f, s:f, s:f}", "state", state_text(&further->state),
+                                  "scale", further->scale, "left_rms_mm", further->residual,
+                                  "left_without_gain_mm", further->residual_without_gain));
   }
   if (record->stiffness.count > 0) {
     (void)json_object_set_new(group_of(root, "expandability"), "regions",

@@ -18,15 +18,15 @@ enum {
 };
 
 /** A further state of the same lungs, as fitted. */
-typedef struct supine_patient_told {
+typedef struct supine_patient_further {
   supine_state state;
-  bool turns;              /**< its posture is not the fitted one, so the gain is fitted */
-  double scale;            /**< distance from full inflation, 1 at rest */
-  double left;             /**< RMS residual of the fit, mm; of a surface along its normals */
-  double left_without;     /**< the same at a gain of 0, with all of the force fixed to the body */
-  double gain, gain_error; /**< gain and its standard error, by leaving out each eighth of the
-                                lungs (jackknife) */
-} supine_patient_told;
+  bool fits_gain;  /**< the posture differs from the fitted one, so the gain is fitted */
+  double scale;    /**< distance from full inflation, 1 at rest */
+  double residual; /**< RMS residual of the fit, mm; of a surface along its normals */
+  double residual_without_gain; /**< the same with all of the force fixed to the body */
+  double gain, gain_error;      /**< gain and its standard error, by leaving out each eighth of the
+                                     lungs (jackknife) */
+} supine_patient_further;
 
 /** A patient's expandability a = 1/E ([Santhanam2008] VI) as a weighted mean over a few
  * regions of each lung, independent of the mesh:
@@ -74,7 +74,7 @@ typedef struct supine_patient_applied {
   double blocks;      /**< number of blocks; 0: not found */
   double correlation; /**< between force and height along gravity, over the blocks */
   double slopes[3];   /**< c7 to c9 of (18) fitted to the force, 1 at the box's centre */
-  double left;        /**< RMS residual of (18), in units of the force at the box's centre */
+  double residual;    /**< RMS residual of (18), in units of the force at the box's centre */
   double spread;      /**< RMS of the force about its mean, in the same unit */
 } supine_patient_applied;
 
@@ -101,8 +101,8 @@ typedef struct supine_patient_record {
   supine_patient_applied applied;
   double gain_error; /**< standard error of the gain; 0: not fitted */
   /* Not in a record that was read: */
-  size_t told_count; /**< further states */
-  supine_patient_told told[SUPINE_PATIENT_OTHERS_MAX];
+  size_t further_count; /**< further states */
+  supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_open; /**< the gain that fits is not between 0 and 2: it is undetermined and kept */
 } supine_patient_record;
 
@@ -201,12 +201,13 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
  * @param rest     the surface of the fuller state; NULL if `surface` is
  * @param pairs    points of the fuller state and of this one; NULL: give `surface`
  * @param moved    also fit a translation between the scans
- * @param told     its state is set; the rest is written
+ * @param further     its state is set; the rest is written
  * @retval SUPINE_ERROR_MESH    too few compatible points
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
                                       const supine_patient_pairs *pairs, const supine_mesh *surface,
-                                      bool moved, supine_patient_told *told, supine_error *error);
+                                      bool moved, supine_patient_further *further,
+                                      supine_error *error);
 
 /** Set the gain of the record's force to the mean over its further states in other postures,
  * weighted by the inverse variances. */

@@ -36,38 +36,30 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
   enum { CELLS = 64 }; /* cells of the grid on a side: 2.5 m */
-  static const size_t numbered = (size_t)1 << 40;
   size_t blocks = 0;
-  double origin[3];
+  double origin[3] = {0.0};
+  size_t *number =
+      calloc((size_t)CELLS * CELLS * CELLS, sizeof *number); /* of a cell's block, + 1 */
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
-  if (random == NULL) {
-    return 0;
+  const bool able = number != NULL && random != NULL;
+  if (able) {
+    gsl_rng_set(random, seed);
   }
-  gsl_rng_set(random, seed);
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 3 && able; ++k) {
     const double half = 0.5 * (frame->maximum[k] - frame->minimum[k]);
     origin[k] = -half - block_side * gsl_rng_uniform(random);
   }
-  gsl_rng_free(random);
-  for (size_t i = 0; i < count; ++i) {
-    rows[i].block = 0;
+  for (size_t i = 0; i < count && able; ++i) {
+    size_t cell = 0;
     for (int k = 0; k < 3; ++k) {
       const double at = floor((rows[i].place.arm[k] - origin[k]) / block_side);
-      rows[i].block = rows[i].block * CELLS + (size_t)fmin(CELLS - 1, fmax(0.0, at));
+      cell = cell * CELLS + (size_t)fmin(CELLS - 1, fmax(0.0, at));
     }
+    number[cell] = number[cell] == 0 ? ++blocks : number[cell];
+    rows[i].block = number[cell] - 1;
   }
-  for (size_t i = 0; i < count; ++i) { /* number the cells in order of first appearance */
-    if (rows[i].block < numbered) {
-      const size_t cell = rows[i].block;
-      for (size_t j = i; j < count; ++j) {
-        rows[j].block = rows[j].block == cell ? numbered + blocks : rows[j].block;
-      }
-      ++blocks;
-    }
-  }
-  for (size_t i = 0; i < count; ++i) {
-    rows[i].block -= numbered;
-  }
+  gsl_rng_free(random);
+  free(number);
   return blocks;
 }
 

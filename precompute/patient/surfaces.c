@@ -14,12 +14,11 @@ enum {
   ROUNDS_MAX = 60
 };
 
-static const double settled = 2e-3;      /* RMS change between rounds that ends the fit, mm */
-static const double near_by = 0.5;       /* the same, for the first fit of a law of known shape */
-static const double outlying = 1.0;      /* least scale of the weights, mm: kriging corrects the
-                                          * law's residual, which weights must not remove */
-static const double same_state = 0.02;   /* RMS distance of equal surfaces, mm */
-static const double matched_least = 0.3; /* least share of the vertices that match */
+static const double settled = 2e-3;    /* RMS change between rounds that ends the fit, mm */
+static const double near_by = 0.5;     /* the same, for the first fit of a law of known shape */
+static const double outlying = 1.0;    /* least scale of the weights, mm: kriging corrects the
+                                        * law's residual, which weights must not remove */
+static const double same_state = 0.02; /* RMS distance of equal surfaces, mm */
 
 typedef supine_patient_matching matching;
 
@@ -30,7 +29,7 @@ static void start_rows(matching *m) {
   supine_mesh_box(m->state, to[0], to[1]);
   for (size_t i = 0; i < m->count; ++i) {
     supine_patient_row *row = &m->rows[i];
-    const double *from = m->rest->mesh.vertices + 3 * m->vertex[i];
+    const double *from = m->rest->mesh.vertices + 3 * m->match[i].vertex;
     const size_t k = i % 3; /* one axis for each vertex, in turn */
     const double t = (from[k] - low[k]) / (m->rest->maximum[k] - low[k]);
     row->axis[0] = row->axis[1] = row->axis[2] = 0.0;
@@ -47,7 +46,7 @@ static supine_status refit(const matching *m, bool shaped, supine_patient_fit_op
   supine_patient_krige krige = {0};
   options->size_only = !shaped;
   const supine_status status =
-      supine_patient_krige_fit(options, m->rows, m->count + m->landmark_rows_count, &krige, error);
+      supine_patient_krige_fit(options, m->rows, m->count + m->landmark_row_count, &krige, error);
   if (status == SUPINE_OK) {
     supine_patient_krige_take(&krige, patient);
   }
@@ -67,31 +66,21 @@ static supine_status settle(matching *m, const supine_patient_fit_options *wante
                             supine_error *error) {
   supine_patient_fit_options options = *wanted;
   supine_status status = SUPINE_OK;
+  double change = INFINITY;
   bool shaped = false;
-  m->warm = false;
   start_rows(m);
-  for (size_t round = 0; status == SUPINE_OK && round < ROUNDS_MAX; ++round) {
+  for (size_t round = 0; status == SUPINE_OK && round < ROUNDS_MAX && !(shaped && change < settled);
+       ++round) {
+    shaped = shaped || change < near_by;
     status = refit(m, shaped, &options, patient, error);
-    if (status != SUPINE_OK) {
-      break;
-    }
-    const double change = supine_patient_matching_place(m, patient);
-    supine_patient_matching_find(m);
-    report->matched = supine_patient_matching_weigh(m, outlying, &report->after);
-    if (report->matched < matched_least) {
-      status = supine_error_set(
-          error, SUPINE_ERROR_MESH,
-          "only %.0f %% of the vertices find the other surface facing the same way: check that "
-          "axes and person are the same, and that no triangles face inwards",
-          100.0 * report->matched);
-    }
-    if (change < (shaped ? settled : near_by)) {
-      if (shaped) {
-        break;
-      }
-      shaped = true;
+    if (status == SUPINE_OK) {
+      change = supine_patient_matching_place(m, patient);
+      supine_patient_matching_find(m);
+      status = supine_patient_matching_weigh(m, outlying, error);
     }
   }
+  report->matched = m->matched;
+  report->after = m->rms;
   return status;
 }
 
@@ -100,7 +89,9 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
                                   supine_error *error) {
   report->vertices = (double)m->count;
   supine_patient_matching_find(m);
-  report->before = sqrt(gsl_stats_tss_m(m->distance, 1, m->count, 0.0) / (double)m->count);
+  const size_t stride = sizeof *m->match / sizeof(double);
+  report->before =
+      sqrt(gsl_stats_tss_m(&m->match->distance, stride, m->count, 0.0) / (double)m->count);
   return report->before >= same_state
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
@@ -113,7 +104,7 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
 static supine_status judge(matching *m, const supine_patient_fit_options *wanted,
                            supine_patient_record *record, supine_error *error) {
   supine_patient_fit_report *report = &record->report;
-  supine_status status = supine_patient_fit(wanted, m->rows, m->count, m->landmark_rows_count / 3,
+  supine_status status = supine_patient_fit(wanted, m->rows, m->count, m->landmark_row_count / 3,
                                             &record->patient, report, error);
   if (status == SUPINE_OK && record->expand.kept) {
     report->held_out[SUPINE_PATIENT_SCORE_CORRECTED] = record->expand.held_out[1];
@@ -163,9 +154,9 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   }
   if (status == SUPINE_OK && landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
-    m.landmark_rows_count = 3 * landmark_count;
-    for (size_t i = 0; i < m.landmark_rows_count; ++i) { /* of the same weight as the surface */
-      m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_rows_count;
+    m.landmark_row_count = 3 * landmark_count;
+    for (size_t i = 0; i < m.landmark_row_count; ++i) { /* of the same weight as the surface */
+      m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
     }
   }
   if (status == SUPINE_OK) {
