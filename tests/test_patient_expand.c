@@ -185,7 +185,7 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
     mean[1] += log(is[i]) / (double)n;
   }
   for (size_t i = 0; i < n; ++i) {
-    double shares[SUPINE_PATIENT_MODES];
+    double shares[SUPINE_PATIENT_REGIONS_MAX];
     double share = 0.0;
     supine_patient_stiffness_shares(&found.stiffness, rest, i, shares);
     for (size_t k = 0; k < found.stiffness.count; ++k) {

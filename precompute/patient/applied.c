@@ -13,27 +13,27 @@
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
-/* Length of a direction, relative to their RMS, below which its share of the force is damped: short
- * ones say little about the force. */
-static const double shortest = 0.1;
+/* Length of a direction over the RMS length below which its share of the force is damped. */
+static const double damped_below = 0.1;
 
 /* Find the spread force [N]: the law's, corrected by the remaining distance to the other surface
  * along its normal. */
-static void find_catch(supine_patient_matching *m, const supine_patient *patient, double *caught) {
+static void find_spread_force(supine_patient_matching *m, const supine_patient *patient,
+                              double *spread) {
   supine_patient law = *patient;
   double softener = 0.0; /* mm^2 */
   double d[3];
   law.centre_count = 0;
   for (size_t v = 0; v < m->count; ++v) {
     supine_patient_direction(&law.power, &m->rows[v].place, 1.0, d);
-    softener += shortest * shortest * supine_dot(d, d) / (double)m->count;
+    softener += damped_below * damped_below * supine_dot(d, d) / (double)m->count;
   }
   (void)supine_patient_matching_place(m, &law);
   supine_patient_matching_find(m);
   for (size_t v = 0; v < m->count; ++v) {
     const supine_patient_row *row = &m->rows[v];
     supine_patient_direction(&law.power, &row->place, 1.0, d);
-    caught[v] = supine_patient_force_at(&law.power, &row->place) +
+    spread[v] = supine_patient_force_at(&law.power, &row->place) +
                 row->weight * m->match[v].distance * supine_dot(row->axis, d) /
                     (supine_dot(d, d) + softener);
   }
@@ -105,7 +105,7 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
           : SUPINE_OK;
   if (status == SUPINE_OK) {
     supine_patient_matching_choose(m, n);
-    find_catch(m, patient, caught);
+    find_spread_force(m, patient, caught);
     status = supine_physics_equilibrium_force(m->equilibrium, caught, caught + n, error);
   }
   if (status == SUPINE_OK) {

@@ -14,25 +14,25 @@ static const double apart = 35.0; /* largest distance of a vertex from the neare
 static const double overlapping = 1.5; /* radius of a region over that distance */
 
 enum {
-  LOOKED_AT = 8192, /* most vertices considered as centres */
-  LANES = 16,       /* regions solved for at once */
-  ROUNDS = 5        /* rounds of fitting and of finding the nearest points */
+  CANDIDATES = 8192, /* most vertices considered as centres */
+  LANES = 16,        /* regions solved for at once */
+  ROUNDS = 5         /* rounds of fitting and of finding the nearest points */
 };
 
-/* Prior standard deviations of a: between neighbouring regions, and of any region from 1. */
-static const double neighbours_differ = 0.3;
-static const double regions_differ = 1.0;
-static const double noise_least = 0.3; /* least noise of a surface point, mm */
-static const double together = 10.0;   /* neighbouring rows with a common error, counted as one */
+static const double neighbours_differ = 0.3; /* prior deviation of a between neighbours */
+static const double regions_differ = 1.0;    /* prior deviation of a from 1 */
+static const double noise_least = 0.3;       /* least noise of a surface point, mm */
+static const double together = 10.0;         /* rows with a common error, which count as one */
 
 static const double near_by = 1.7; /* largest distance of neighbouring centres over the least one */
-static const double worth = 0.95;  /* ratio of held-out RMS, with over without, to keep it */
+static const double worth =
+    0.95; /* largest held-out RMS with regions over that without at which they are kept */
 
 /* Find the vertex of a side farthest from the regions, and its distance, mm. */
 static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
                        int side, double *distance) {
   size_t found = 0;
-  const size_t step = lungs->mesh.vertex_count / LOOKED_AT + 1;
+  const size_t step = lungs->mesh.vertex_count / CANDIDATES + 1;
   *distance = 0.0;
   for (size_t i = 0; i < lungs->mesh.vertex_count; i += step) {
     double nearest = supine_patient_side_of(lungs, i) == side ? INFINITY : 0.0;
@@ -57,7 +57,7 @@ static void spread_regions(const supine_lungs *lungs, supine_patient_stiffness *
     const size_t first = stiffness->count;
     double distance;
     size_t vertex = farthest(lungs, stiffness, side, &distance);
-    while (distance > apart && stiffness->count - first < SUPINE_PATIENT_MODES / 2) {
+    while (distance > apart && stiffness->count - first < SUPINE_PATIENT_REGIONS_MAX / 2) {
       supine_patient_mode *mode = &stiffness->mode[stiffness->count++];
       *mode = (supine_patient_mode){.side = side, .value = 1.0};
       memcpy(mode->centre, lungs->mesh.vertices + 3 * vertex, sizeof mode->centre);
@@ -114,7 +114,7 @@ static supine_status find_responses(const supine_patient_matching *m,
   for (size_t first = 0; first < regions->count && status == SUPINE_OK; first += LANES) {
     const size_t lanes = regions->count - first < LANES ? regions->count - first : LANES;
     for (size_t i = 0; i < n; ++i) {
-      double shares[SUPINE_PATIENT_MODES];
+      double shares[SUPINE_PATIENT_REGIONS_MAX];
       supine_patient_stiffness_shares(regions, m->rest, i, shares);
       for (size_t r = 0; r < lanes; ++r) {
         alone[i * lanes + r] = force[i] * shares[first + r];
@@ -152,7 +152,7 @@ static supine_status settle(supine_patient_matching *m, const double *response,
                             supine_patient_fit_options *options, supine_patient *patient,
                             supine_patient_stiffness *regions, supine_error *error) {
   supine_patient_krige krige = {0};
-  double share[SUPINE_PATIENT_MODES];
+  double share[SUPINE_PATIENT_REGIONS_MAX];
   supine_patient_matching_find(m);
   supine_status status = supine_patient_matching_weigh(m, INFINITY, error);
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {

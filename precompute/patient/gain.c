@@ -10,10 +10,10 @@
 #include "precompute/patient/matching.h"
 #include "sh/base/vec3.h"
 
-static const double gain_least = 0.01, gain_most = 2.0; /* beyond, a gain is undetermined */
+static const double gain_least = 0.01, gain_most = 2.0; /* other gains count as undetermined */
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
 static const double settled = 1e-4;      /* change of s and s gain that ends the rounds */
-static const double force_least = 0.2;   /* least fitted force, of a mean of 1 */
+static const double force_least = 0.2;   /* least fitted force, relative to its mean of 1 */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, UNKNOWNS = 5 };
 
 /* The fitted displacement at a row. */
@@ -26,11 +26,10 @@ typedef struct field {
 typedef struct work {
   const supine_patient_record *record;
   const supine_mesh *surface;       /* NULL: the state is points */
-  bool moved;                       /* fit t */
+  bool moved;                       /* whether t is fitted */
   double gains[2][3];               /* part of the way from full inflation to rest of the fuller and
                                      * the emptier state, by axis */
-  supine_patient_matching matching; /* rows of the state; their block is the eighth of the lungs.
-                                     * Of points it has nothing else */
+  supine_patient_matching matching; /* rows, whose blocks are eighths of the lungs; matches */
   field *field;                     /* [rows] */
   double x[UNKNOWNS];               /* s, s gain, t */
 } work;
@@ -163,9 +162,9 @@ static supine_status settle(work *w, supine_patient_further *further, supine_err
   further->residual_without_gain = fit(w, false, EIGHTHS);
   for (size_t without = 0; without < EIGHTHS && further->fits_gain; ++without) {
     (void)fit(w, true, without);
-    const double off = (w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0) - further->gain;
-    sum += off;
-    square += off * off;
+    const double change_of_gain = (w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0) - further->gain;
+    sum += change_of_gain;
+    square += change_of_gain * change_of_gain;
   }
   further->gain_error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
   return status;

@@ -21,11 +21,10 @@ typedef struct supine_patient_row {
   supine_patient_place place;
   double axis[3];         /* unit */
   double value;           /* displacement along the axis, mm */
-  double weight;          /* of the squared residual */
+  double weight;          /* weight of the squared residual */
   double noise;           /* standard deviation, mm */
   size_t block;           /* index of the block that it is held out with */
-  const double *response; /* [regions] spread force of each region of expandability alone; NULL
-                           * where none is fitted */
+  const double *response; /* [regions] spread force of each region alone; NULL: none is fitted */
 } supine_patient_row;
 
 /* Make three rows of each pair into rows [3 count]. */
@@ -43,8 +42,8 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 size_t supine_patient_rows_fold(const supine_patient_frame *frame, supine_patient_row *rows,
                                 size_t count, unsigned long seed, size_t *fold);
 
-/* Folds of the held-out blocks. */
-enum { SUPINE_PATIENT_FOLDS = 5 };
+/* Folds of the held-out blocks, and grids with other origins for which they are repeated. */
+enum { SUPINE_PATIENT_FOLDS = 5, SUPINE_PATIENT_SEEDS = 3 };
 
 /* --- the law at a row ------------------------------------------------------------------------ */
 
@@ -126,7 +125,7 @@ void supine_patient_krige_free(supine_patient_krige *krige);
  * of the resolution matrix. The remainder comes from neighbouring regions. */
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share);
 
-/* Compute the standard errors of c1 to c9; 0 for those that are not fitted. */
+/* Compute the standard errors of c1 to c9; 0 for a constant that is not fitted. */
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
@@ -139,9 +138,6 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
 void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient);
 
 /* --- held-out error -------------------------------------------------------------------------- */
-
-/** Seeds of the grids that cut the held-out blocks. */
-enum { SUPINE_PATIENT_SEEDS = 3 };
 
 /** Predictions of the displacement: the baselines, the law, and the law with its correction. */
 typedef enum supine_patient_score {

@@ -109,7 +109,7 @@ void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
 
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e) {
-  double shares[SUPINE_PATIENT_MODES];
+  double shares[SUPINE_PATIENT_REGIONS_MAX];
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
     double a = stiffness->count == 0 ? 1.0 : 0.0;
     supine_patient_stiffness_shares(stiffness, lungs, i, shares);

@@ -12,16 +12,15 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between the faces of the surface's box and the nearest state's, over the width
- * of the latter: if the state's box is of landmarks, which is an estimate, and if it is of a
- * surface. */
+/* Largest distance between the faces of the surface's box and those of the nearest state's, over
+ * the width of the latter: for a state's box of landmarks, which is an estimate, and of a surface.
+ */
 static const double apart_most[2] = {0.45, 0.2};
 
 /* Least force, relative to its mean of 1, that a displacement is divided by. */
 static const double force_least = 0.2;
 
-/* Least part of the way from full inflation to rest between the two states; if it is less, they
- * count as full inflation and rest. */
+/* Least part of the way between the two states; below it they count as full and rest. */
 static const double part_least = 0.02;
 
 /* Range of a lung's volume at rest over its full volume. */
@@ -52,7 +51,6 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   supine_resting resting = supine_reference_resting_default();
   supine_patient_resting(record, &resting);
   const double full = full_of_either(record, &resting);
-
   const double rest = full * supine_reference_resting_total(&resting, record->state[1].gravity);
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *of = &record->state[k].volume;
@@ -68,7 +66,7 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   }
 }
 
-/* Compute the gains of two parts of the way, by axis. */
+/* Compute the gains by axis at two parts of the way. */
 static void find_gains(const double part[2], double gains[2][3]) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   supine_volume_bend(deep.bend, part[0], gains[0]);
@@ -88,7 +86,7 @@ typedef struct work {
   supine_lungs lungs;  /* present estimate of the lungs in the fuller state */
   const double *scan;  /* [N, 3] */
   const double *ratio; /* [N] spread force over (18) at the vertex */
-  double *moved;       /* [N, 3] mm */
+  double *moved;       /* [N, 3] displacements, mm */
   bool settle;         /* the scan is the emptier state: find its vertices in the fuller one */
 } work;
 

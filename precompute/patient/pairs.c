@@ -20,12 +20,13 @@ enum {
   PAIRS_LEAST = 12 /* an affine map needs 4 pairs; three times that */
 };
 
-static const double flattest = 1.0;   /* least RMS distance of points from a plane, mm */
-static const double stillest = 0.05;  /* least RMS motion, mm: below the precision of a landmark */
-static const double turn_most = 25.0; /* largest rotation between two scans, degrees */
+static const double flat_least = 1.0; /* least RMS distance of points from a plane, mm */
+static const double motion_least =
+    0.05; /* least RMS motion, mm: below the precision of a landmark */
+static const double rotation_most = 25.0; /* largest rotation between two scans, degrees */
 static const double apart_most = 0.5; /* largest distance of the states over the points' spread */
 static const double box_overlap_least = 0.5; /* least overlap of surfaces' boxes over the larger */
-static const double unmatched = 0.7; /* largest residual of the affine map over the spread */
+static const double residual_most = 0.7; /* largest residual of the affine map over the spread */
 
 /* --- reading --------------------------------------------------------------------------------- */
 
@@ -114,8 +115,8 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
   double mean[2][3] = {{0.0}};
   double cross[3][3] = {{0.0}};   /* sum of from_a to_b about the means */
   double scatter[3][3] = {{0.0}}; /* sum of from_a from_b */
-  double moved[3];
-  bool right = true;
+  double mapped[3];
+  bool determined = true;
   *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
   if (kind == SUPINE_PATIENT_MAP_NONE) {
     return true;
@@ -137,16 +138,16 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
     for (size_t k = 0; k < 9; ++k) { /* by columns, as LAPACKE copies rows to memory of its own */
       map->m[k] = cross[k % 3][k / 3];
     }
-    right = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
+    determined = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
     for (size_t k = 0; k < 3; ++k) { /* RMS distance from the plane or line of the axes before */
-      right = right && scatter[k][k] >= flattest * sqrt((double)count);
+      determined = determined && scatter[k][k] >= flat_least * sqrt((double)count);
     }
   }
-  supine_patient_map_apply(map, mean[0], moved);
+  supine_patient_map_apply(map, mean[0], mapped);
   for (size_t k = 0; k < 3; ++k) {
-    map->t[k] = mean[1][k] - moved[k];
+    map->t[k] = mean[1][k] - mapped[k];
   }
-  return right;
+  return determined;
 }
 
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
@@ -227,13 +228,13 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "all points lie in one plane: give landmarks spread over the lungs");
   }
-  if (s.residual > unmatched * s.spread[1]) {
+  if (s.residual > residual_most * s.spread[1]) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "the pairs do not match: the best affine map has a residual of %.0f mm "
                             "RMS; check that both lists are in the same order",
                             s.residual);
   }
-  if (s.growth < 0.0 || s.rotation > turn_most) {
+  if (s.growth < 0.0 || s.rotation > rotation_most) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "the two states differ by %sa rotation of %.0f degrees: give both in "
                             "LPS axes (x to the left, y to the back, z to the head)",
@@ -245,7 +246,7 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                             "motion between the scans with --translation or --rigid",
                             s.translation);
   }
-  if (s.displacement < stillest) {
+  if (s.displacement < motion_least) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "the other state is the same as rest (%.2g mm RMS%s): give a state "
                             "in which the lungs have moved",

@@ -32,7 +32,7 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
 
 /** Compute the volume ratio of the other state to rest: the determinant of the best affine map.
- * @return 1 if the points determine none, or a mirror image */
+ * @return 1 if the points do not determine a map, or if it is a reflection */
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
 /** Check by the best affine map that the pairs can be two states of one chest.

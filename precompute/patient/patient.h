@@ -45,7 +45,7 @@ typedef struct supine_patient_frame {
 
 enum {
   SUPINE_PATIENT_CONSTANTS = 9,
-  SUPINE_PATIENT_COLUMNS = 4, /**< of the force: 1, X - 1/2, Y - 1/2, Z - 1/2 */
+  SUPINE_PATIENT_COLUMNS = 4, /**< columns of the force: 1, X - 1/2, Y - 1/2, Z - 1/2 */
   SUPINE_PATIENT_CENTRES_MAX = 900
 };
 
@@ -59,9 +59,9 @@ typedef struct supine_patient_power {
 
 /** One kernel of the correction. */
 typedef struct supine_patient_centre {
-  double at[3];     /**< from the box's centre, mm */
-  double side;      /**< of its lung: +1 left, -1 right */
-  double size;      /**< law's displacement there, mm */
+  double at[3];     /**< position from the box's centre, mm */
+  double side;      /**< lung: +1 left, -1 right */
+  double size;      /**< length of the law's displacement, mm */
   double weight[3]; /**< 1/mm */
 } supine_patient_centre;
 
@@ -77,13 +77,12 @@ typedef struct supine_patient {
 typedef struct supine_patient_place {
   double box[3];                        /**< X, Y, Z; 0 to 1 inside */
   double side;                          /**< +1 left, -1 right */
-  double arm[3];                        /**< from the box's centre, mm */
+  double arm[3];                        /**< position from the box's centre, mm */
   double force[SUPINE_PATIENT_COLUMNS]; /**< columns of the force; of a surface, after spreading */
 } supine_patient_place;
 
-/** Find a point's place; its force is not spread; outside the box it has the value of the nearest
- * face.
- * @param side  of the point's lung, +1 or -1; 0: by the midline */
+/** Find a point's place. Its force is not spread; outside the box it is that of the nearest face.
+ * @param side  +1 if the point is in the left lung, -1 in the right; 0: by the midline */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
 
@@ -102,9 +101,9 @@ int supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 /** Find the place of a vertex in the box of its own lungs. */
 supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex);
 
-/** Express the deep law by nine constants for gravity along a unit vector (all 0: supine). Its
- * lengths along x, y and z are scaled by `way`, the part of the way from full inflation to rest
- * that lies between the two states (all 0: 1). */
+/** Express the deep law by nine constants for gravity along a unit vector (all 0: supine).
+ * @param way  factors on its lengths along x, y and z: the difference between the two states' gains
+ *             on the path from full inflation to rest (all 0: 1) */
 supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]);
 
 /** Compute (18) of the law at a place. */
@@ -122,16 +121,17 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
 /** Compute the covariance of the correction along one axis between two centres, mm^2. */
 double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b);
 
-/** Compute the displacement u at a place, mm, without the motion between the scans.
- * @param spread  factor on the law's force there */
+/** Compute the displacement u at a place, mm, with the correction but without the motion between
+ * the scans.
+ * @param spread  factor on the law's force */
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
                                  double spread, double u[3]);
 
 /** Find where a point of the emptier state was in the fuller one, by fixed-point iteration.
- * @param side    of its lung; 0: by the midline
- * @param spread  factor on the law's force there: spread force over (18)
- * @param at      in: a first guess; out: its place, mm
- * @param u       its displacement, mm */
+ * @param side    +1 left lung, -1 right; 0: by the midline
+ * @param spread  factor on the law's force: spread force over (18)
+ * @param at      in: a first guess; out: position in the fuller state, mm
+ * @param u       written: displacement from there, mm */
 void supine_patient_settle(const supine_patient *patient, const double point[3], double side,
                            double spread, double at[3], double u[3]);
 

@@ -250,8 +250,8 @@ static bool take_correction(const json_t *root, supine_patient *patient) {
 
 static bool take_regions(const json_t *root, supine_patient_stiffness *stiffness) {
   const json_t *regions = json_object_get(json_object_get(root, "expandability"), "regions");
-  bool right = regions == NULL ||
-               take_list(regions, REGION, SUPINE_PATIENT_MODES, stiffness->mode, &stiffness->count);
+  bool right = regions == NULL || take_list(regions, REGION, SUPINE_PATIENT_REGIONS_MAX,
+                                            stiffness->mode, &stiffness->count);
   for (size_t k = 0; k < stiffness->count; ++k) {
     const supine_patient_mode *mode = &stiffness->mode[k];
     right = right && fabs(mode->side) == 1.0 && mode->value > 0.0 && mode->radius > 0.0;

@@ -10,34 +10,27 @@
 #include "precompute/physics/model.h"
 #include "precompute/physics/reference.h"
 
-enum {
-  SUPINE_PATIENT_TEXT = 48,
-  SUPINE_PATIENT_OTHERS_MAX = 8,
-  SUPINE_PATIENT_STATE_TEXT = 160,
-  SUPINE_PATIENT_MODES = SUPINE_PATIENT_REGIONS_MAX /**< most regions of both lungs */
-};
+enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
 
 /** A further state of the same lungs, as fitted. */
 typedef struct supine_patient_further {
   supine_state state;
   bool fits_gain;  /**< the posture differs from the fitted one, so the gain is fitted */
-  double scale;    /**< distance from full inflation, 1 at rest */
+  double scale;    /**< factor on the displacement from full inflation to rest */
   double residual; /**< RMS residual of the fit, mm; of a surface along its normals */
   double residual_without_gain; /**< the same with all of the force fixed to the body */
   double gain, gain_error;      /**< gain and its standard error, by leaving out each eighth of the
                                      lungs (jackknife) */
 } supine_patient_further;
 
-/** A patient's expandability a = 1/E ([Santhanam2008] VI) as a weighted mean over a few
- * regions of each lung, independent of the mesh:
+/** A region of a patient's expandability a = 1/E ([Santhanam2008] VI), which is a weighted mean
+ * over some regions of each lung, independent of the mesh:
  *
  *     a(p) = sum over k of w(|p - centre_k| / radius_k) a_k
  *            / sum over k of w(|p - centre_k| / radius_k)
- *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t)
- *
- * This is one region. */
+ *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
 typedef struct supine_patient_mode {
-  double side;      /**< of its lung: 1 left, -1 right */
+  double side;      /**< lung: 1 left, -1 right */
   double value;     /**< a_k > 0 */
   double centre[3]; /**< mm, in the reference surface */
   double radius;    /**< mm, > 0 */
@@ -45,10 +38,10 @@ typedef struct supine_patient_mode {
                      * neighbouring regions */
 } supine_patient_mode;
 
-/** The regions, those of the left lung first; none: even tissue. */
+/** The regions, of the left lung first; none: uniform tissue. */
 typedef struct supine_patient_stiffness {
   size_t count;
-  supine_patient_mode mode[SUPINE_PATIENT_MODES];
+  supine_patient_mode mode[SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_stiffness;
 
 /** Least diagonal of the resolution matrix at which a region counts as seen. */
@@ -59,11 +52,12 @@ typedef struct supine_patient_expand_report {
   bool tried, kept;
   double fitted[2];   /**< RMS distance between the surfaces along normals, mm, without and with */
   double held_out[2]; /**< the same on held-out blocks */
-  double unseen;      /**< number of regions that do not count as seen */
+  double unseen;      /**< number of regions with `seen` below SUPINE_PATIENT_SEEN */
 } supine_patient_expand_report;
 
-/** The force that a measured displacement shows ([Santhanam2008] IV-B.3), with no assumption about
- * its form. With u the displacement to the other surface and d the fitted directions (15)-(17),
+/** The force that a measured displacement implies ([Santhanam2008] IV-B.3), with no assumption
+ * about its form. With u the displacement to the other surface and d the fitted directions
+ * (15)-(17),
  *
  *     F_i = u_i . d_i / |d_i|^2
  *     f = A F                    inverts the spreading operator (equilibrium.h)
@@ -95,7 +89,7 @@ typedef struct supine_patient_record {
   double emptier[2][3];   /**< box of the emptier state, mm; the fuller one's is the frame */
   bool from_surface;      /**< the boxes are of surfaces, else of landmarks */
   supine_patient_fit_report report;
-  supine_patient_stiffness stiffness; /**< no regions: even tissue */
+  supine_patient_stiffness stiffness; /**< no regions: uniform tissue */
   supine_patient_surface_report surface;
   supine_patient_expand_report expand;
   supine_patient_applied applied;
@@ -103,7 +97,7 @@ typedef struct supine_patient_record {
   /* Not in a record that was read: */
   size_t further_count; /**< further states */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
-  bool gain_open; /**< the gain that fits is not between 0 and 2: it is undetermined and kept */
+  bool gain_open; /**< the fitted gain is not between 0.01 and 2, so the force keeps its own */
 } supine_patient_record;
 
 /** Write the record whole or not at all.
@@ -149,7 +143,7 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
 
 /** Compute the gains of the two states along x, y and z: 0 at full inflation, 1 at rest, on the
  * deep law's path between them (supine_volume_bend), by their states or the cube roots of their
- * volumes. Where neither tells, the fuller state counts as full and the emptier one as at rest. */
+ * volumes. Where both are unknown, the fuller state counts as full and the emptier one as rest. */
 void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
 /** Scale the resting shares to that of the two states, if one of them is at rest and the volume of
@@ -201,7 +195,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
  * @param rest     the surface of the fuller state; NULL if `surface` is
  * @param pairs    points of the fuller state and of this one; NULL: give `surface`
  * @param moved    also fit a translation between the scans
- * @param further     its state is set; the rest is written
+ * @param further  in: its state; out: the fit
  * @retval SUPINE_ERROR_MESH    too few compatible points
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,

@@ -10,20 +10,18 @@
 
 enum {
   VERTICES_MAX = 600,  /* most vertices of a fit: kriging has a length of 90 mm */
-  EXPANDED_MAX = 2000, /* the same if expandability is fitted, of regions some 45 mm apart */
+  EXPANDED_MAX = 2000, /* the same with expandability, of regions some 45 mm apart */
   ROUNDS_MAX = 60
 };
 
 static const double settled = 2e-3;    /* RMS change between rounds that ends the fit, mm */
-static const double near_by = 0.5;     /* the same, for the first fit of a law of known shape */
+static const double near_by = 0.5;     /* RMS change that ends the fit of the law's size, mm */
 static const double outlying = 1.0;    /* least scale of the weights, mm: kriging corrects the
                                         * law's residual, which weights must not remove */
 static const double same_state = 0.02; /* RMS distance of equal surfaces, mm */
 
-typedef supine_patient_matching matching;
-
 /* Make the first rows by mapping the lungs' box to that of the other state. */
-static void start_rows(matching *m) {
+static void start_rows(supine_patient_matching *m) {
   const double *low = m->rest->minimum;
   double to[2][3];
   supine_mesh_box(m->state, to[0], to[1]);
@@ -41,8 +39,9 @@ static void start_rows(matching *m) {
 
 /* Fit the size of the deep law to the rows; or, if `shaped`, its constants and the correction,
  * whose sill is chosen the first time. */
-static supine_status refit(const matching *m, bool shaped, supine_patient_fit_options *options,
-                           supine_patient *patient, supine_error *error) {
+static supine_status refit(const supine_patient_matching *m, bool shaped,
+                           supine_patient_fit_options *options, supine_patient *patient,
+                           supine_error *error) {
   supine_patient_krige krige = {0};
   options->size_only = !shaped;
   const supine_status status =
@@ -61,7 +60,7 @@ static supine_status refit(const matching *m, bool shaped, supine_patient_fit_op
 
 /* Alternate between nearest points and the fit. Fit the law's size first: the motion along the
  * surfaces, which they do not show, then starts from the law's. */
-static supine_status settle(matching *m, const supine_patient_fit_options *wanted,
+static supine_status settle(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                             supine_patient *patient, supine_patient_surface_report *report,
                             supine_error *error) {
   supine_patient_fit_options options = *wanted;
@@ -85,8 +84,8 @@ static supine_status settle(matching *m, const supine_patient_fit_options *wante
 }
 
 /* Find the distance of the surfaces before the fit; fail if they are equal. */
-static supine_status look_at_rest(matching *m, supine_patient_surface_report *report,
-                                  supine_error *error) {
+static supine_status check_apart(supine_patient_matching *m, supine_patient_surface_report *report,
+                                 supine_error *error) {
   report->vertices = (double)m->count;
   supine_patient_matching_find(m);
   const size_t stride = sizeof *m->match / sizeof(double);
@@ -101,7 +100,7 @@ static supine_status look_at_rest(matching *m, supine_patient_surface_report *re
 }
 
 /* Fit and judge the law, and find the force that the displacement implies. */
-static supine_status judge(matching *m, const supine_patient_fit_options *wanted,
+static supine_status judge(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                            supine_patient_record *record, supine_error *error) {
   supine_patient_fit_report *report = &record->report;
   supine_status status = supine_patient_fit(wanted, m->rows, m->count, m->landmark_row_count / 3,
@@ -116,10 +115,10 @@ static supine_status judge(matching *m, const supine_patient_fit_options *wanted
 }
 
 /* Match the nearest points, then fit and judge the law. */
-static supine_status run(matching *m, const supine_patient_fit_options *wanted, bool expandability,
-                         supine_patient_record *record, supine_error *error) {
+static supine_status run(supine_patient_matching *m, const supine_patient_fit_options *wanted,
+                         bool expandability, supine_patient_record *record, supine_error *error) {
   record->patient = (supine_patient){.law = wanted->law, .frame = m->frame};
-  supine_status status = look_at_rest(m, &record->surface, error);
+  supine_status status = check_apart(m, &record->surface, error);
   if (status == SUPINE_OK) {
     status = settle(m, wanted, &record->patient, &record->surface, error);
   }
@@ -139,7 +138,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
                                          bool expandability, supine_patient_record *record,
                                          supine_error *error) {
   const size_t landmark_count = expandability ? 0 : landmarks->count;
-  matching m = {0};
+  supine_patient_matching m = {0};
   supine_patient_fit_options wanted = *options;
   if (expandability) { /* the stiffness replaces the correction */
     wanted.law = SUPINE_PATIENT_PAPER;
