@@ -172,7 +172,7 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
     (void)printf("; grid of %zu x %zu x %zu", content->grid.size[0], content->grid.size[1],
                  content->grid.size[2]);
   }
-  (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count);
+  (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count + 3);
   if (report->rigid > 0) {
     (void)printf("rigid parts, moved and turned, never deformed: %zu\n", report->rigid);
   }

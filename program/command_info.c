@@ -128,7 +128,7 @@ static void add_errors(json_t *root, const supine_basis *basis, const char *key)
 static supine_status describe(const char *path, const supine_basis *basis, const double *energy,
                               json_t **described, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const size_t products = info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 0 : 3);
+  const size_t products = info->mode_count * (info->vector ? 3 : 1) + (info->vector ? 3 : 6);
   const char *lungs = supine_basis_metadata(basis, "lungs");
   const char *at = supine_basis_metadata(basis, "warnings");
   json_t *of = json_object();
@@ -143,7 +143,7 @@ static supine_status describe(const char *path, const supine_basis *basis, const
                 "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "lung_count",
                 (json_int_t)info->lung_count, "has_volume", (int)info->has_volume, "kind",
                 info->vector ? "vector" : "scalar", "multiplications", (json_int_t)products,
-                "additions", (json_int_t)(info->vector ? products : products - 1));
+                "additions", (json_int_t)(products - (info->vector ? 3 : 4)));
   for (size_t i = 0; i < sizeof facts / sizeof *facts; ++i) {
     add_fact(root, facts[i], basis, facts[i]);
   }
