@@ -3,7 +3,7 @@
  *
  * With the third moments of volume, m_abc = integral of a b c dV / (V sd_a sd_b sd_c) about the
  * centre, and x outwards from the midline, these sums were positive for all of nine lungs of
- * five people and two synthetic ones:
+ * five people and two synthetic lungs:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
  *     deepest at the back        m_yzz - m_yyy             0.49 to 0.89
@@ -18,23 +18,24 @@
 
 #include "mesh/anatomy.h"
 
-/* Smallest margin by which other axes must fit better; the true ones led by 0.35 to 0.7. */
-static const double clearly = 0.2;
-/* Bound of the logarithm of the ratio of volumes, so that a collapsed lung does not decide alone.
- */
+/* Smallest lead in score that makes axes certain; the true axes led by 0.35 to 0.7. */
+static const double least_lead = 0.2;
+/* Bound of |ln(V_right / V_left)| in the score, so that a collapsed lung does not decide alone. */
 static const double most_ratio = 0.25;
-/* Largest ratio of a lung's standard deviations, side to side over depth: lungs have 0.6 to 0.7. */
+/* Largest ratio of a single lung's standard deviation from side to side to each of the others; its
+ * ratio to that from front to back is 0.6 to 0.7. */
 static const double thin = 0.85;
-/* Smallest ratio of the standard deviation from side to side to the others of two lungs in one
- * surface; their kurtosis from side to side is below that of a uniform distribution, 1.8. */
+/* For two lungs in one surface: smallest ratio of the standard deviation from side to side to each
+ * of the others, and largest kurtosis from side to side, that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
 /* Smallest concavity towards the heart that determines the side of a single lung. */
 static const double least_side = 0.12;
 
 typedef struct shape {
-  double volume, centre[3], deviation[3], kurtosis[3];
-  double third[3][3][3];
+  double volume, centre[3], deviation[3]; /* mm^3, mm, mm */
+  double kurtosis[3];
+  double third[3][3][3]; /* m_abc */
 } shape;
 
 /* Add w times the monomials of point p about an origin. */
@@ -118,7 +119,7 @@ static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
   }
 }
 
-/* Find the moments; false if the surface encloses almost nothing. */
+/* Measure a surface; false if it encloses less than 0.1 % of its box. */
 static bool measure(const supine_mesh *mesh, shape *s) {
   double sum[3];
   double square[3];
@@ -223,7 +224,7 @@ supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t co
   shape s[2];
   double best = -INFINITY;
   double second = -INFINITY;
-  double here = -INFINITY;
+  double of_lps = -INFINITY;
   supine_axes which = SUPINE_AXES_LPS;
   for (size_t lung = 0; lung < count; ++lung) {
     if (!measure(&lungs[lung], &s[lung])) {
@@ -236,7 +237,7 @@ supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t co
     const view v = view_of(axes);
     const double fit =
         count == 2 ? fit_pair(s, &v) : fit_single(&s[0], &v, supine_mesh_axes_mirrored(axes));
-    here = axes == SUPINE_AXES_LPS ? fit : here;
+    of_lps = axes == SUPINE_AXES_LPS ? fit : of_lps;
     if (fit > best) {
       second = best;
       best = fit;
@@ -245,10 +246,10 @@ supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t co
       second = fit;
     }
   }
-  if (best > here + clearly) {
+  if (best > of_lps + least_lead) {
     found.axes = which;
   }
-  found.certain = which == found.axes && best > second + clearly;
+  found.certain = which == found.axes && best > second + least_lead;
   if (count == 1 && found.axes == SUPINE_AXES_LPS) {
     const view v = view_of(found.axes);
     const double side = hollow(&s[0], &v);

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "sh/base/vec3.h"
+
 #include "mesh/mesh.h"
 
 enum { CODES = 48, SIGNS = 8 };
@@ -78,8 +80,5 @@ supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then) {
 bool supine_mesh_axes_mirrored(supine_axes axes) {
   double m[3][3];
   supine_mesh_axes_matrix(axes, m);
-  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-             m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-             m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]) <
-         0.0;
+  return supine_triple(m[0], m[1], m[2]) < 0.0;
 }

@@ -14,10 +14,10 @@
 #include <supine/status.h>
 
 /** Axes of a file's coordinates, one of 48: three letters, each the direction in which a coordinate
- * grows (Left, Right, Posterior, Anterior, Superior, Inferior), as in Slicer and nibabel.
- * supine_mesh_axes_parse returns also those without a name here. */
+ * grows (Left, Right, Posterior, Anterior, Superior, Inferior), as in Slicer and nibabel. Values
+ * without a name here are returned by supine_mesh_axes_parse. */
 typedef enum supine_axes {
-  SUPINE_AXES_AUTO = 0, /**< by the file's SPACE tag; LPS without one */
+  SUPINE_AXES_AUTO = 0, /**< the axes of the file's SPACE tag; LPS without a tag */
   SUPINE_AXES_LPS = 1,
   SUPINE_AXES_RAS = 4,
   SUPINE_AXES_COUNT = 49
@@ -31,9 +31,10 @@ void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
 void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
 /** Convert a point or vector to LPS, times `scale`. */
 void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
-/** Find the axes whose matrix is that of `then` times that of `first`. */
+/** Find the axes whose matrix is the product of the matrices of `then` and `first`. */
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
-/** Report whether the axes are left-handed, so that triangles read in them face inwards. */
+/** Report whether the axes are left-handed: triangles that face outwards in them face inwards in
+ * LPS. */
 bool supine_mesh_axes_mirrored(supine_axes axes);
 
 /** A triangle surface. Zero-initialise; release with supine_mesh_free. */
@@ -52,8 +53,8 @@ typedef struct supine_mesh_load_options {
 
 /** Result of loading. */
 typedef struct supine_mesh_report {
-  size_t degenerate_faces;      /**< faces dropped: repeated corners, or not a polygon */
-  size_t unreferenced_vertices; /**< vertices dropped: in no triangle */
+  size_t degenerate_faces;      /**< faces dropped: fewer than three different corners */
+  size_t unreferenced_vertices; /**< vertices dropped: part of no triangle */
   supine_axes axes;             /**< axes assumed for the file */
   bool axes_from_tag;           /**< the axes come from a SPACE tag */
 } supine_mesh_report;
@@ -80,9 +81,9 @@ typedef struct supine_mesh_report {
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
-/** Report whether the bounding box of lungs can have this longest side, mm.
+/** Report whether `side`, mm, is a possible longest side of the bounding box of lungs.
  * @param other  output: the unit other than mm, a literal, in which this number is most likely;
- * NULL if there is none */
+ *               NULL if it is impossible in all of them */
 bool supine_mesh_unit_is_likely(double side, const char **other);
 /** Find the length of "mm", "cm", "m", "um" or "in" in mm; return false for any other name. */
 bool supine_mesh_unit_find(const char *name, double *millimetres);
@@ -127,11 +128,11 @@ double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximu
 /** Reverse the triangles, so that they face the other way. */
 void supine_mesh_reverse(const supine_mesh *mesh);
 
-/** Find one third of the area of the triangles at each vertex, mm^2, into area [vertex_count]. */
+/** Compute the area of each vertex [vertex_count], mm^2: one third of the area of its triangles. */
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 
-/** Find outward unit normals [vertex_count, 3], the area-weighted mean of the triangles' at each
- * vertex; 0 if undefined. */
+/** Compute the unit normal of each vertex [vertex_count, 3], the area-weighted mean of the normals
+ * of its triangles; 0 if that is 0. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
 /** Return the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
@@ -148,20 +149,20 @@ typedef struct supine_mesh_field {
 
 /** How to write a file, and its optional content. */
 typedef struct supine_mesh_save_options {
-  supine_axes axes;    /**< of the file, written as its SPACE tag; AUTO: LPS */
-  const double *rest;  /**< optional [vertex_count, 3]: VTP and PLY then carry the displacement
-                            vector and its magnitude as point data */
+  supine_axes axes;    /**< axes of the file, written as its SPACE tag; AUTO: LPS */
+  const double *from;  /**< optional [vertex_count, 3] mm, where displacements start: VTP and PLY
+                            then carry displacements and their magnitudes as point data */
   const char *comment; /**< optional, one line */
-  double millimetres_per_unit; /**< of the file; 0: 1. Displacements are in its units as well */
-  const float *expected_error; /**< optional [vertex_count] mm, whatever the unit: VTP's and PLY's
-                                    "expected_error_mm" */
-  /** @{ Of VTP alone, all optional. */
-  const float *normals;            /**< [vertex_count, 3]: its "Normals" */
-  const unsigned char *lung;       /**< [vertex_count] number of each vertex's lung: its "lung" */
+  double millimetres_per_unit; /**< unit of positions and displacements in the file; 0: 1 */
+  const float *expected_error; /**< optional [vertex_count], mm in every unit: point data
+                                    "expected_error_mm" of VTP and PLY */
+  /** @{ For VTP only, all optional. */
+  const float *normals;            /**< [vertex_count, 3] point data "Normals" */
+  const unsigned char *lung;       /**< [vertex_count] index of the lung, point data "lung" */
   const supine_mesh_field *fields; /**< [field_count] */
   size_t field_count;
-  double rounding; /**< mm: lengths are rounded to the next power of two below it, and normals to
-                        1/256, so that they compress; 0: exact */
+  double rounding; /**< mm: lengths are rounded to multiples of the largest power of two, in the
+                        file's unit, not above it, and normals to 1/256; 0: exact */
   /** @} */
 } supine_mesh_save_options;
 
@@ -176,9 +177,8 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
 /** Surfaces of one topology over time in one VTP file, in the form of time that VTK and ParaView
- * read: triangles once, every array compressed, displacements without their magnitude. Their
- * time is the frame's number; seconds and the fields are tables of all frames, "time_s" and as
- * named. The file appears whole or not at all. */
+ * read: triangles once, every array compressed. The field data holds the times, "time_s", and each
+ * of the fields, with one tuple for each frame. The file appears whole or not at all. */
 typedef struct supine_mesh_series supine_mesh_series;
 
 /** Begin a series. All arguments must outlive it; before each frame the caller updates the
@@ -195,7 +195,7 @@ supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
 /** Complete the file after all frames and give it its name. Statuses as supine_mesh_save. */
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
-/** Free a series, and drop it if it was not committed. NULL is legal. */
+/** Free a series; if it was not committed, no file appears. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);
 
 /** The formats of supine_mesh_save, by ending; each has a function supine_mesh_save_NAME in

@@ -10,13 +10,14 @@
 #include "mesh/repair.h"
 
 /* Largest share of loose triangles that are dropped; with more, the mesh is not a surface. */
-static const double few = 0.01;
+static const double most_loose = 0.01;
 
 typedef struct links {
   uint32_t *parent; /* [triangles] union-find tree of each surface */
-  uint8_t *turned;  /* [triangles] 1 if a triangle faces against its parent */
+  uint8_t *turned;  /* [triangles] 1 if a triangle faces against its parent, else 0 */
 } links;
 
+/* Return the corner opposite a side. */
 static uint32_t opposite(const supine_mesh *mesh, const supine_mesh_side *s) {
   return mesh->triangles[s->at % 3 == 0 ? s->at + 2 : s->at - 1];
 }
@@ -49,7 +50,7 @@ static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, u
       drop[sides[i + s].at / 3] = 0;
     }
   }
-  if ((double)loose > few * (double)mesh->triangle_count) { /* not a surface with a small defect */
+  if ((double)loose > most_loose * (double)mesh->triangle_count) {
     memset(drop, 0, mesh->triangle_count);
   }
 }
@@ -143,8 +144,9 @@ static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)
   return reversed;
 }
 
-/* Give each surface its own vertices where several meet in one. */
-static supine_status part_touching(supine_mesh *mesh, const links *l, size_t *parted) {
+/* Copy the vertices that several surfaces share, so that each has its own.
+ * @param separated  output: number of copies */
+static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t *separated) {
   const size_t corners = 3 * mesh->triangle_count;
   size_t count = mesh->vertex_count;
   uint32_t *owner = malloc((count + corners + 1) * sizeof *owner); /* surface of each vertex */
@@ -164,8 +166,8 @@ static supine_status part_touching(supine_mesh *mesh, const links *l, size_t *pa
     owner[v] = root;
     mesh->triangles[i] = v;
   }
-  *parted = count - mesh->vertex_count;
-  if (status == SUPINE_OK && *parted > 0) {
+  *separated = count - mesh->vertex_count;
+  if (status == SUPINE_OK && *separated > 0) {
     double *grown = realloc(mesh->vertices, 3 * count * sizeof *grown);
     status = grown == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
     mesh->vertices = grown != NULL ? grown : mesh->vertices;
@@ -195,7 +197,7 @@ static supine_status mend_links(supine_mesh *mesh, const supine_mesh_side *sides
       report->reversed = turn_minority(mesh, &l, count);
     }
     if (closed) {
-      status = part_touching(mesh, &l, &report->parted);
+      status = separate_touching(mesh, &l, &report->separated);
     }
   }
   free(l.parent);
@@ -255,6 +257,7 @@ typedef struct piece {
   uint32_t first; /* vertex */
 } piece;
 
+/* Find the volume of each component about its first vertex. */
 static void find_volumes(const supine_mesh *mesh, const supine_topology *topology, piece *pieces) {
   for (size_t i = mesh->vertex_count; i-- > 0;) {
     pieces[topology->component[i]].first = (uint32_t)i;

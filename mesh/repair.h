@@ -7,9 +7,9 @@
 
 typedef struct supine_mesh_repair_report {
   size_t duplicates; /**< triangles dropped: same corners as an earlier one */
-  size_t loose;      /**< triangles dropped: none of their edges has exactly two triangles */
+  size_t loose;      /**< triangles dropped: none of its edges has exactly two triangles */
   size_t reversed;   /**< triangles reversed to face like most of their surface */
-  size_t parted;     /**< vertices added where closed surfaces shared one */
+  size_t separated;  /**< vertices added where closed surfaces shared one */
 } supine_mesh_repair_report;
 
 /** Repair a surface in place. A surface without defects is not changed.
@@ -20,7 +20,7 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
  * @param space  [vertex_count] work space */
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
-/** Drop connected pieces with a volume below this share of the volume of all pieces.
+/** Drop connected pieces with less than `share` of the volume of all pieces.
  * @param pieces  output: number of pieces kept
  * @param specks  output: number of pieces dropped
  * @retval SUPINE_ERROR_MEMORY */
@@ -33,10 +33,11 @@ typedef struct supine_mesh_side {
   uint32_t at; /**< 3 * triangle + corner that the side starts at */
 } supine_mesh_side;
 
-/** Sort all sides by low, then high, then at; NULL if out of memory. The caller frees them. */
+/** Sort the sides of all triangles by low, then high, then at; NULL if out of memory. The caller
+ * frees them. */
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
 
-/** Return the number of sides, from side i on, that belong to its edge. */
+/** Return how many of `count` sorted sides belong to the edge whose first side is i. */
 size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t count);
 
 #endif

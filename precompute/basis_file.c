@@ -230,12 +230,12 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   double *rest = malloc(3 * n * sizeof *rest);
   unsigned char *lung = malloc(n);
   if (rest != NULL) { /* first for the positions of collapsed lungs, then for their directions */
-    supine_tissue_rest(lungs, share, rest);
+    supine_tissue_collapse(lungs, share, rest);
     vertices = to_float(rest, 3 * n);
   }
   if (rest != NULL && !vector) {
     memcpy(rest, content->directions, 3 * n * sizeof *rest);
-    supine_tissue_rest_directions(lungs, share, rest);
+    supine_tissue_collapse_directions(lungs, share, rest);
     directions = to_float(rest, 3 * n);
   }
   if (vertices == NULL || (directions == NULL && !vector) || lung == NULL) {

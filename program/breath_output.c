@@ -41,7 +41,7 @@ static void fill_save(breath_output *made) {
   made->fields[1] =
       (supine_mesh_field){"volume_mL", content->frames->lungs, content->frames->volumes};
   made->save = *content->frame;
-  made->save.rest = content->origin;
+  made->save.from = content->origin;
   (void)snprintf(made->comment, sizeof made->comment,
                  "displacement from %s; volumes are gas and "
                  "tissue of each lung; %s",

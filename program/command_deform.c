@@ -118,7 +118,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (info->has_volume) {
     supine_basis_volumes(basis, &moved->pose, volumes);
   }
-  save->rest = from.vertices;
+  save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL; /* points have no normals */
   save->expected_error = moved->expected.sigma;
   save->lung = lung == NULL ? NULL : lung->data;

@@ -251,12 +251,12 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
                               deformed.vertex_count);
     goto cleanup;
   }
-  supine_tissue_rest(lungs, wanted->model.prepared.model.share, rest.vertices);
+  supine_tissue_collapse(lungs, wanted->model.prepared.model.share, rest.vertices);
   for (size_t i = 0; i < 3 * solution.vertex_count; ++i) {
     solution.directions[i] *= gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
   }
   supine_physics_solution_apply(&solution, &rest, 1.0, deformed.vertices);
-  const supine_mesh_save_options save = {.rest = rest.vertices};
+  const supine_mesh_save_options save = {.from = rest.vertices};
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
     (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);

@@ -163,7 +163,7 @@ static supine_status write_errors(const request *wanted, const supine_command_su
   }
   const supine_mesh shown = {s->rest.vertex_count, s->outcome[0].predicted, s->rest.triangle_count,
                              s->rest.triangles};
-  const supine_mesh_save_options save = {.rest = s->outcome[0].nearest};
+  const supine_mesh_save_options save = {.from = s->outcome[0].nearest};
   return supine_mesh_save(wanted->path, &shown, &save, error);
 }
 

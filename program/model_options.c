@@ -214,8 +214,8 @@ static void print_map(const char *path, const supine_source *source) {
   (void)printf("%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
                report->size[0], report->size[1], report->size[2], report->spacing[0],
                report->spacing[1], report->spacing[2], report->axes, report->source, report->taken);
-  if (report->parted > 0.0) {
-    (void)printf("  the lungs touch: separated at necks up to %.3g mm wide\n", report->parted);
+  if (report->neck > 0.0) {
+    (void)printf("  the lungs touch: separated at necks up to %.3g mm wide\n", report->neck);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];

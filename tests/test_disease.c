@@ -265,7 +265,7 @@ TEST(test_collapse_any_direction_rest_and_breath_scaled) {
     for (int ill = 0; ill < 2; ++ill) {
       model.share[0] = ill == 1 ? share : 1.0;
       supine_solution solution = solve(&lungs, directions[d]);
-      supine_tissue_rest(&lungs, model.share, rest);
+      supine_tissue_collapse(&lungs, model.share, rest);
       const supine_mesh shape = {n, rest, 0, NULL};
       supine_physics_solution_apply(&solution, &shape, scale, moved);
       for (size_t lung = 0; lung < 2; ++lung) {
@@ -298,7 +298,7 @@ TEST(test_collapse_fixed_point_at_hilum) {
   const double *p = lungs.mesh.vertices;
   const double share[2] = {0.3, 0.6};
   double *rest = malloc(3 * n * sizeof *rest);
-  supine_tissue_rest(&lungs, share, rest);
+  supine_tissue_collapse(&lungs, share, rest);
   for (size_t lung = 0; lung < 2; ++lung) {
     const double sign = lung == 0 ? 1.0 : -1.0; /* outwards */
     double inner = INFINITY;
@@ -337,7 +337,7 @@ TEST(test_collapse_real_lung_shrinks_towards_midline) {
   }
   model.share[1] = 0.25;
   double *rest = malloc(3 * lungs.mesh.vertex_count * sizeof *rest);
-  supine_tissue_rest(&lungs, model.share, rest);
+  supine_tissue_collapse(&lungs, model.share, rest);
   double outer[2] = {0.0, 0.0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     for (size_t k = 0; k < 3; ++k) {

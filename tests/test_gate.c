@@ -318,7 +318,7 @@ TEST(test_repair_open_surface_unchanged) {
   mesh.triangle_count -= 3; /* a hole */
   const size_t count = mesh.triangle_count;
   assert_int_equal(supine_mesh_repair(&mesh, &report), SUPINE_OK);
-  assert_int_equal(report.duplicates + report.loose + report.reversed + report.parted, 0);
+  assert_int_equal(report.duplicates + report.loose + report.reversed + report.separated, 0);
   assert_int_equal(mesh.triangle_count, count);
   supine_mesh_free(&mesh);
 }

@@ -166,7 +166,7 @@ TEST(test_labels_conventions_same_lungs) {
       {{2, 2}, {1, 1, 1}, {NULL, "lungmask", "left=2,right=1"}, "2 left; 1 right"},
       {{1, 1}, {2, 2, 2}, {NULL, "left=1,right=2", NULL}, "1 left; 2 right (by their sides)"},
       {{7, 7}, {9, 9, 9}, {NULL, "right=9,left=7", NULL}, "7 left; 9 right"},
-      {{2, 1}, {5, 4, 3}, {NULL, "lobes", NULL}, "1, 2 left; 3, 4, 5 right (as of lobes)"},
+      {{2, 1}, {5, 4, 3}, {NULL, "lobes", NULL}, "1, 2 left; 3, 4, 5 right (convention lobes)"},
       {{11, 10}, {14, 13, 12}, {NULL, "totalsegmentator", NULL}, "10, 11 left; 12, 13, 14 right"},
       {{14, 13}, {17, 16, 15}, {NULL, "totalsegmentator-v1", NULL}, "13, 14 left"},
       {{1, 1}, {1, 1, 1}, {NULL, "one", NULL}, "1 both lungs"},
@@ -278,7 +278,7 @@ TEST(test_labels_touching_lungs_separated) {
   const supine_labels_options options = {.edge = 4.0};
   made out = surfaces_of_image(&image, "touch.nrrd", &options);
   assert_int_equal(out.report.lung_count, 2);
-  assert_true(out.report.parted >= 16.0 && out.report.parted <= 24.0);
+  assert_true(out.report.neck >= 16.0 && out.report.neck <= 24.0);
   /* the bridge is divided between the lungs, and no other voxel changes sides */
   assert_true(out.report.lung[0].mask >= 0.064 * (double)left - added &&
               out.report.lung[0].mask <= 0.064 * (double)left + added);
@@ -588,7 +588,7 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
   memset(at, 0, voxels(&image) * sizeof *at);
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   assert_int_equal(supine_labels_shapes(path, NULL, 0, &shapes, &count, &error), SUPINE_ERROR_MESH);
-  assert_non_null(strstr(error.message, "all voxels are 0"));
+  assert_non_null(strstr(error.message, "every voxel is 0"));
   for (size_t i = 0; i < voxels(&image); ++i) {
     at[i] = (uint16_t)(i % 400);
   }
@@ -619,9 +619,9 @@ TEST(test_labels_bad_maps_refused) {
       {"left=70000", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=-1", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=1,right=2", SUPINE_ERROR_MESH, "the other way round"},
-      {"left=2,right=3", SUPINE_ERROR_MESH, "no voxel of the right lung"},
-      {"totalsegmentator", SUPINE_ERROR_MESH, "are 1, 2, but --labels names none"},
-      {"left=9", SUPINE_ERROR_MESH, "names none of them"},
+      {"left=2,right=3", SUPINE_ERROR_MESH, "gives the right lung"},
+      {"totalsegmentator", SUPINE_ERROR_MESH, "the left lung; the labels there are 1, 2"},
+      {"left=9", SUPINE_ERROR_MESH, "gives the left lung"},
   };
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
@@ -656,7 +656,7 @@ TEST(test_labels_bad_maps_refused) {
   at[5000] = 1;
   at[5030] = 2;
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
-  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "too little for a lung");
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "impossible for a lung");
   /* sheets of one voxel vanish in cubes of 20 mm */
   const supine_labels_options coarse = {.edge = 20.0};
   box_set(&image, (const size_t[3]){5, 5, 5}, (const size_t[3]){6, 40, 50}, 1);
@@ -665,7 +665,7 @@ TEST(test_labels_bad_maps_refused) {
   refused("bad.nrrd", &coarse, SUPINE_ERROR_MESH, "smaller edge");
   image.step[2][2] *= 100.0; /* as from a header in other units */
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
-  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "check the size of the voxels");
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "impossible for a lung");
   supine_image_free(&image);
 }
 

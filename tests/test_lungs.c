@@ -137,8 +137,8 @@ TEST(test_lungs_inward_flipped_and_reported) {
     supine_lungs lungs = {0};
     assert_int_equal(supine_lungs_create(lumps, 2, NULL, &lungs, NULL), SUPINE_OK);
     assert_close(supine_mesh_volume(&lungs.mesh), volume, 1e-12 * volume);
-    assert_int_equal(lungs.turned[0], which & 1);
-    assert_int_equal(lungs.turned[1], which >> 1);
+    assert_int_equal(lungs.reversed[0], which & 1);
+    assert_int_equal(lungs.reversed[1], which >> 1);
     supine_lungs_free(&lungs);
     supine_mesh_free(&lumps[0]);
     supine_mesh_free(&lumps[1]);
@@ -153,7 +153,7 @@ TEST(test_lungs_half_inward_not_closed) {
   assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
   assert_false(lungs.topology.closed);
   assert_true(lungs.topology.inconsistent_edges > 0);
-  assert_false(lungs.turned[0]);
+  assert_false(lungs.reversed[0]);
   supine_lungs_free(&lungs);
   supine_mesh_free(&lump);
 }

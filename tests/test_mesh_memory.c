@@ -125,7 +125,7 @@ static supine_status save(const char *path, supine_error *error) {
   double vertices[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   uint32_t triangles[] = {0, 1, 2};
   const supine_mesh mesh = {3, vertices, 1, triangles};
-  const supine_mesh_save_options options = {.rest = vertices, .comment = "a triangle"};
+  const supine_mesh_save_options options = {.from = vertices, .comment = "a triangle"};
   const supine_status status = supine_mesh_save(path, &mesh, &options, error);
   assert_int_equal(unlink(path), status == SUPINE_OK ? 0 : -1);
   return status;

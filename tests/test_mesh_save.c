@@ -62,7 +62,7 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
     for (size_t a = 0; a < 3; ++a) {
       char path[256];
       const supine_mesh_save_options options = {
-          .axes = all_axes[a], .rest = mesh.vertices, .comment = "solid element vertex 9\nRAS"};
+          .axes = all_axes[a], .from = mesh.vertices, .comment = "solid element vertex 9\nRAS"};
       save(sample_path(state, endings[k], path), &mesh, &options);
       supine_mesh again = {0};
       supine_mesh_report report = {0};
@@ -123,7 +123,7 @@ TEST(test_save_ply_displacement_rows) {
   rest[8] -= 12.0;
   for (int ras = 0; ras < 2; ++ras) {
     const supine_mesh_save_options options = {.axes = ras ? SUPINE_AXES_RAS : SUPINE_AXES_LPS,
-                                              .rest = rest};
+                                              .from = rest};
     char path[256];
     save(sample_path(state, "a.ply", path), &mesh, &options);
     size_t size = 0;
@@ -150,7 +150,7 @@ TEST(test_save_expected_error_stays_in_millimetres) {
   supine_mesh mesh = sample_tetrahedron();
   for (int moved = 0; moved < 2; ++moved) {
     const size_t row = moved ? 32 : 16;
-    const supine_mesh_save_options options = {.rest = moved ? mesh.vertices : NULL,
+    const supine_mesh_save_options options = {.from = moved ? mesh.vertices : NULL,
                                               .millimetres_per_unit = 10.0,
                                               .expected_error = errors};
     char path[256];
@@ -223,7 +223,7 @@ TEST(test_save_vtp_layout) {
   memcpy(rest, mesh.vertices, sizeof rest);
   rest[9] -= 3.0;
   rest[10] += 4.0;
-  const supine_mesh_save_options options = {.rest = rest, .comment = "a -- b -\xC3\xA4-"};
+  const supine_mesh_save_options options = {.from = rest, .comment = "a -- b -\xC3\xA4-"};
   char path[256];
   save(sample_path(state, "a.vtp", path), &mesh, &options);
   size_t size = 0;
@@ -287,7 +287,7 @@ TEST(test_save_vtp_opens_in_vtk) {
   for (size_t i = 0; i < 24; ++i) {
     rest[i] = mesh.vertices[i] - (i % 3 == 0 ? 1.0 : 2.0);
   }
-  const supine_mesh_save_options options = {.rest = rest, .comment = "box & <tag> -- end"};
+  const supine_mesh_save_options options = {.from = rest, .comment = "box & <tag> -- end"};
   save(sample_path(state, "a.vtp", path), &mesh, &options);
   (void)sample_text(state, "check.py", check, script);
   (void)snprintf(command, sizeof command, "/usr/bin/python3 %s %s", script, path);
@@ -347,7 +347,7 @@ TEST(test_save_vtp_axes_units_and_rounding) {
   static const float normals[12] = {1, 0, 0, 0, 0.6F, 0.8F, 0, 0, 1, 0, 0, -1};
   const supine_mesh_save_options options = {.axes = SUPINE_AXES_RAS,
                                             .millimetres_per_unit = 1000.0,
-                                            .rest = rest,
+                                            .from = rest,
                                             .normals = normals,
                                             .rounding = 1.0 / 256.0};
   char path[256];

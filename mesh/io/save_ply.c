@@ -12,7 +12,7 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
   (void)fprintf(writer->out,
                 "element vertex %zu\nproperty float x\nproperty float y\nproperty float z\n",
                 mesh->vertex_count);
-  if (writer->options.rest != NULL) {
+  if (writer->options.from != NULL) {
     (void)fputs("property float displacement_x\nproperty float displacement_y\n"
                 "property float displacement_z\nproperty float displacement_magnitude\n",
                 writer->out);
@@ -27,7 +27,7 @@ supine_status supine_mesh_save_ply(const mesh_writer *writer) {
     float row[8];
     size_t count = 3;
     supine_mesh_writer_position(writer, i, row);
-    if (writer->options.rest != NULL) {
+    if (writer->options.from != NULL) {
       supine_mesh_writer_displacement(writer, i, row + 3);
       count = 7;
     }

@@ -117,7 +117,7 @@ static supine_status vtp_begin(vtp *file) {
   *to++ = (vtp_array){"Float32", "Points", 3, 12, points, false, put_point};
   *to++ = (vtp_array){"Int32", "connectivity", 1, 12, triangles, true, put_connectivity};
   *to++ = (vtp_array){"Int32", "offsets", 1, 4, triangles, true, put_offset};
-  if (writer->options.rest != NULL) {
+  if (writer->options.from != NULL) {
     *to++ = (vtp_array){"Float32", "displacement", 3, 12, points, false, put_displacement};
     *to++ = (vtp_array){"Float32", "displacement_magnitude", 1, 4, points, false, put_magnitude};
   }

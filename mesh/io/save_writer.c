@@ -93,7 +93,7 @@ void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float 
   double square = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const size_t from = 3 * i + writer->source[axis];
-    const double d = writer->mesh->vertices[from] - writer->options.rest[from];
+    const double d = writer->mesh->vertices[from] - writer->options.from[from];
     const double scaled = rounded(writer, writer->factor[axis] * d);
     displacement[axis] = (float)(scaled + 0.0);
     square += scaled * scaled;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Choose the side of each label, by the segmenter's convention or by its position. */
+/* Choose the side of each label by --labels, by the labels present, or by their position. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,8 @@
 
 #include "mesh/labels/mask.h"
 
-/* Labels of segmenters: lungmask's R231 and LTRCLobes, TotalSegmentator's `total` from 2.0 and
- * earlier. */
+/* Labels of segmenters: R231 and LTRCLobes of lungmask, `total` of TotalSegmentator from 2.0 on and
+ * before. */
 static const struct {
   const char *name, *labels;
 } conventions[] = {{"lungmask", "left=2,right=1"},
@@ -39,7 +39,8 @@ static bool centre_of(const supine_image *image, const labels_tally *tally, cons
   return count > 0.0;
 }
 
-/* Print a list such as "1, 2 and 17 more". */
+/* Write a list such as "1, 2 and 17 more" of the labels present; unless `side` is NULL, only those
+ * whose side is `wanted`. */
 static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t wanted, char *text,
                         size_t size) {
   enum { SHOWN = 12 };
@@ -96,7 +97,8 @@ static bool read_sides(const char *wanted, uint8_t *side) {
   }
 }
 
-/* Choose without an option: two labels are two lungs, whatever their numbers. */
+/* Choose by the labels present: one label is both lungs, two are a lung each, more must be exactly
+ * those of a convention. Return false if they are not. */
 static bool choose_by_presence(const supine_image *image, const labels_tally *tally, uint8_t *side,
                                const char **name) {
   size_t present[2] = {0, 0};
@@ -139,23 +141,20 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
   return false;
 }
 
-/* Set the sides of labels as requested; set `name` to that of the convention used, if any. */
+/* Set the side of each label as requested; set `name` to the convention used, if any. */
 static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
                             const char *wanted, uint8_t *side, const char **name,
                             supine_error *error) {
   char present[128];
-  list_labels(tally, NULL, 0, present, sizeof present);
-  if (present[0] == '\0') {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: every voxel is 0: give a mask with labels", path);
+  if (wanted == NULL && choose_by_presence(image, tally, side, name)) {
+    return SUPINE_OK;
   }
   if (wanted == NULL) {
-    return choose_by_presence(image, tally, side, name)
-               ? SUPINE_OK
-               : supine_error_set(error, SUPINE_ERROR_MESH,
-                                  "%s: which of its labels (%s) are lungs? Give --labels, as "
-                                  "left=10+11,right=12+13+14 or totalsegmentator",
-                                  path, present);
+    list_labels(tally, NULL, 0, present, sizeof present);
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: which of its labels (%s) are lungs? Give --labels, as "
+                            "left=10+11,right=12+13+14 or totalsegmentator",
+                            path, present);
   }
   if (strcmp(wanted, "one") == 0) {
     memset(side + 1, LABELS_EITHER, LABELS_MAX - 1);
@@ -177,8 +176,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
   return SUPINE_OK;
 }
 
-/* Check that both lungs are present if both are named; set `doubted` unless the left one lies to
- * the left of the other. */
+/* Check that every lung that is named is present; set `doubted` if both are present and the left
+ * one does not lie left of the other. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
                            const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};
@@ -186,26 +185,17 @@ static supine_status check(const char *path, const supine_image *image, const la
   double centre[2][3];
   bool there[2];
   char present[128];
-  char alone[128];
-  list_labels(tally, NULL, 0, present, sizeof present);
   for (size_t s = 0; s < 2; ++s) {
     there[s] = centre_of(image, tally, side, sides[s], centre[s]);
-  }
-  for (size_t s = 0; s < 2; ++s) {
-    if (there[s] || memchr(side, sides[s], LABELS_MAX) == NULL) {
-      continue;
-    }
-    if (!there[1 - s]) {
+    if (!there[s] && memchr(side, sides[s], LABELS_MAX) != NULL) {
+      list_labels(tally, NULL, 0, present, sizeof present);
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "%s: its labels are %s, but --labels names none of them: correct --labels", path,
-          present);
+          "%s: no voxel has a label that --labels gives the %s lung; the labels "
+          "there are %s: correct --labels, or name one lung alone, as --labels "
+          "%s=1+2",
+          path, names[s], present, names[1 - s]);
     }
-    list_labels(tally, side, sides[1 - s], alone, sizeof alone);
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: no voxel of the %s lung. For the %s lung alone, give only its "
-                            "labels (%s), as --labels %s=1+2",
-                            path, names[s], names[1 - s], alone, names[1 - s]);
   }
   if (!(there[0] && there[1])) {
     return SUPINE_OK;
@@ -239,7 +229,7 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
                   list[0][0] != '\0' && list[1][0] != '\0' ? "; " : "", list[1],
                   list[1][0] != '\0' ? " right" : "");
   if (name != NULL) {
-    supine_text_add(taken, 256, " (%s%s)", strcmp(name, "their sides") == 0 ? "by " : "as of ",
+    supine_text_add(taken, 256, " (%s%s)", strcmp(name, "their sides") == 0 ? "by " : "convention ",
                     name);
   }
   return SUPINE_OK;

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Average a mask over cubes, in steps along its own axes, and correct these so that no two inner or
- * outer cubes meet only in an edge or a corner: its surface is then a manifold [Latecki1995]. */
+/* Average a mask over cubes aligned with its axes, and correct them so that no two inner or outer
+ * cubes meet only in an edge or a corner: the surface is then a manifold [Latecki1995]. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
 
-enum { LAYERS = 2 }; /* of empty cubes around the mask */
+enum { LAYERS = 2 }; /* layers of empty cubes around the mask */
 
-/* Average along one axis over cubes, from `in` [outer, n, inner] into `out` [outer, m, inner]. A
- * cube narrower than a voxel is widened to one, which interpolates linearly between centres. */
+/* Average along one axis over cubes, from `in` [outer, n, inner] into `out` [outer, m, inner]; a
+ * cube is `ratio` voxels wide. A cube narrower than a voxel is widened to one voxel, which
+ * interpolates linearly between centres. */
 static void average(const float *in, size_t outer, size_t n, size_t inner, size_t m, double ratio,
                     float *out) {
   const double width = fmax(1.0, ratio);
@@ -34,7 +35,7 @@ static void average(const float *in, size_t outer, size_t n, size_t inner, size_
   }
 }
 
-/* Average rows of bytes along the first axis, straight from the mask. */
+/* Average the mask along the first axis into `out` [rows, m]. */
 static void average_rows(const labels_mask *mask, size_t m, double ratio, float *out) {
   const size_t n = mask->size[0];
   const double width = fmax(1.0, ratio);
@@ -53,8 +54,8 @@ static void average_rows(const labels_mask *mask, size_t m, double ratio, float 
   }
 }
 
-static const float half = 0.5F;
-/* Number of levels that shares are rounded to, so that all processors agree on a half. */
+static const float half = 0.5F; /* least share of a cube that counts as inside */
+/* Shares are rounded to multiples of 1 / levels, so that all processors agree on a half. */
 static const float levels = 65536.0F;
 
 /* If only two opposite cubes of the four around an edge are inside, fill the fuller of the other
@@ -94,7 +95,7 @@ static bool mend_corner(float *share, const size_t at[8]) {
   return false;
 }
 
-/* Correct every edge and corner; true if any changed. */
+/* Correct every edge and corner; return whether any changed. */
 static bool mend(const size_t size[3], float *share) {
   const size_t stride[3] = {1, size[0], size[0] * size[1]};
   bool mended = false;
@@ -139,8 +140,8 @@ static supine_status one_piece(labels_cubes *cubes) {
   for (size_t i = 0; status == SUPINE_OK && i < count; ++i) {
     inside.at[i] = cubes->share[i] >= half;
   }
-  status = status == SUPINE_OK ? supine_labels_keep_largest(&inside, &pieces, &changed) : status;
-  status = status == SUPINE_OK ? supine_labels_fill_cavities(&inside, &pieces, &changed) : status;
+  status = status == SUPINE_OK ? supine_labels_keep_one(&inside, false, &pieces, &changed) : status;
+  status = status == SUPINE_OK ? supine_labels_keep_one(&inside, true, &pieces, &changed) : status;
   for (size_t i = 0; status == SUPINE_OK && i < count; ++i) {
     const bool is = cubes->share[i] >= half;
     cubes->share[i] = is == (inside.at[i] != 0) ? cubes->share[i] : is ? 0.0F : half;

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute exact distances from every voxel to a set of voxels: along the first axis by counting,
- * along the others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2 + f(y)
- * [Felzenszwalb2012]. */
+/* Compute the exact squared distance from every voxel to the nearest of a set: along the first axis
+ * by counting, along the others by the lower envelope of parabolas, d(x) = min over y of (x - y)^2
+ * + f(y) [Felzenszwalb2012]. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "mesh/labels/mask.h"
 #include "sh/base/parallel.h"
 
-static const float far_away = 1e30F; /* mm^2: no voxel of the set in that row */
+static const float far_away = 1e30F; /* mm^2: the row has no voxel of the set */
 
 typedef struct sweep {
   const labels_mask *mask;
-  bool zero;
+  bool zero; /* the set is the zero voxels, else the nonzero ones */
   float *squares;
   int axis;
-  size_t length; /* larger of size[1] and size[2] */
+  size_t length; /* larger of the mask's size[1] and size[2] */
   double *space; /* [threads, 3, length + 2] work space */
 } sweep;
 
@@ -41,8 +41,8 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Transform one line of n values, `stride` apart. Work space: v, indices of the lowest parabolas;
- * z, where each becomes the lowest, mm; f, the values. */
+/* Replace n values f(y), `stride` apart, by the minimum over y of (x - y)^2 + f(y). Work space: v,
+ * indices of the lowest parabolas; z, where each becomes the lowest, mm; f, the values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;

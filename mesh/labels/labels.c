@@ -10,22 +10,23 @@
 #include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
-static const double least_edge = 0.2; /* mm: a hundredth of it would give a billion vertices */
-static const double most_edge = 20.0; /* mm: a larger one leaves nothing of a lung */
-static const double most_closing = 20.0;
-static const double least_lung = 1.0;      /* mL: the least volume of a lung */
-static const double longest_lung = 1000.0; /* mm; beyond it the stated voxel size is wrong */
+static const double least_edge = 0.2;      /* mm: gives ten million vertices */
+static const double most_edge = 20.0;      /* mm: larger cubes leave little of a lung */
+static const double most_closing = 20.0;   /* mm */
+static const double least_lung = 1.0;      /* least volume of a lung, mL */
+static const double longest_lung = 1000.0; /* mm; beyond it the header's voxel size is wrong */
 
 typedef struct work {
   const char *path; /* first file, for messages */
   const supine_labels_options *options;
   supine_labels_report *report;
   double edge;
-  supine_image image; /* freed when the mask is made */
+  supine_image image; /* the map; freed once `both` is cut from it */
   labels_mask both;
-  bool doubted; /* by the header, the left lung is not left of the right one */
+  bool doubted; /* by the header, the left lung does not lie left of the right one */
 } work;
 
+/* Report progress; SUPINE_ERROR_INTERRUPTED if the caller stops. */
 static supine_status advance(work *w, double fraction, supine_error *error) {
   const supine_labels_options *options = w->options;
   return options->progress == NULL || options->progress(options->progress_context, fraction)
@@ -34,7 +35,7 @@ static supine_status advance(work *w, double fraction, supine_error *error) {
                                 "interrupted: nothing was written");
 }
 
-/* Report whether two images have the same voxels, to a hundredth of one over the whole image. */
+/* Report whether two images have the same size and their corners agree to 0.01 voxels. */
 static bool same_frame(const supine_image *a, const supine_image *b) {
   if (memcmp(a->size, b->size, sizeof a->size) != 0) {
     return false;
@@ -81,7 +82,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
     status = f == 0 ? SUPINE_OK : read_image(w, paths[f], &next, error);
     if (status == SUPINE_OK && !same_frame(&w->image, image)) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: its voxels are not those of %s: give masks of one scan",
+                                "%s: differs in size or frame from %s: give masks of one scan",
                                 paths[f], paths[0]);
     }
     for (size_t i = 0; i < voxels && status == SUPINE_OK; ++i) {
@@ -96,7 +97,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
   return status;
 }
 
-/* Make the mask of the lungs' voxels, with a margin, as LABELS_LEFT, _RIGHT or _EITHER. */
+/* Cut the box of the lungs from the map; its voxels are 0, LABELS_LEFT, _RIGHT or _EITHER. */
 static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
                                supine_error *error) {
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
@@ -179,12 +180,12 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
     return status;
   }
   if (memchr(w->both.at, LABELS_EITHER, supine_labels_mask_count(&w->both)) != NULL) {
-    status = supine_labels_part(w->path, &w->both, &report->parted, error);
+    status = supine_labels_split(w->path, &w->both, &report->neck, error);
   }
   return status;
 }
 
-/* Undo closing where it entered the other lung. */
+/* Clear the voxels that closing added to a lung inside the other lung. */
 static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
   const long *offset = mask->from;
   for (long k = 0; k < (long)mask->size[2]; ++k) {
@@ -218,11 +219,11 @@ static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
     lung->closed = ml * (double)voxels;
   }
   if (status == SUPINE_OK) {
-    status = supine_labels_keep_largest(mask, &lung->islands, &voxels);
+    status = supine_labels_keep_one(mask, false, &lung->islands, &voxels);
     lung->dropped = ml * (double)voxels;
   }
   if (status == SUPINE_OK) {
-    status = supine_labels_fill_cavities(mask, &lung->cavities, &voxels);
+    status = supine_labels_keep_one(mask, true, &lung->cavities, &voxels);
     lung->filled = ml * (double)voxels;
   }
   voxels = 0;
@@ -233,9 +234,11 @@ static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
   return status;
 }
 
+/* Make the surface of one lung; an empty lung leaves `lung` and `mesh` as they are. */
 static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung, supine_mesh *mesh,
                                supine_error *error) {
   labels_mask mask;
+  const char *name = value == LABELS_LEFT ? "left" : "right";
   const double least = fmin(w->both.spacing[0], fmin(w->both.spacing[1], w->both.spacing[2]));
   const size_t margin = LABELS_MARGIN + (size_t)ceil(w->options->close / least);
   supine_status status = supine_labels_mask_extract(&w->both, value, margin, &mask);
@@ -245,25 +248,17 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   lung->side = value == LABELS_LEFT ? 1 : -1;
   lung->cut = is_cut(w, &mask, margin);
   status = status == SUPINE_OK ? clean(w, value, &mask, lung) : status;
-  if (status == SUPINE_OK && lung->mask < least_lung) {
-    status = supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: the largest piece of the %s lung holds %.2g mL, too little for "
-                              "a lung: check --labels and the voxels' size",
-                              w->path, value == LABELS_LEFT ? "left" : "right", lung->mask);
-    supine_labels_mask_free(&mask);
-    return status;
+  double longest = 0.0;
+  for (int a = 0; a < 3; ++a) {
+    longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
   }
-  for (int a = 0; a < 3 && status == SUPINE_OK; ++a) {
-    const double length = (double)mask.size[a] * mask.spacing[a];
-    if (!(length <= longest_lung + 2.0 * (double)margin * mask.spacing[a])) {
-      status = supine_error_set(error, SUPINE_ERROR_MESH,
-                                "%s: the %s lung is %.3g mm long: check the size of the voxels in "
-                                "the image's header",
-                                w->path, value == LABELS_LEFT ? "left" : "right",
-                                length - 2.0 * (double)margin * mask.spacing[a]);
-      supine_labels_mask_free(&mask);
-      return status;
-    }
+  if (status == SUPINE_OK && !(lung->mask >= least_lung && longest <= longest_lung)) {
+    supine_labels_mask_free(&mask);
+    return supine_error_set(error, SUPINE_ERROR_MESH,
+                            "%s: the %s lung holds %.2g mL in a box %.3g mm long, which is "
+                            "impossible for a lung: check --labels and the voxel size in the "
+                            "header",
+                            w->path, name, lung->mask, longest);
   }
   status = status == SUPINE_OK ? supine_labels_mask_surface(&mask, w->edge, true, mesh) : status;
   supine_labels_mask_free(&mask);
@@ -282,12 +277,12 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
              : supine_error_set(error, SUPINE_ERROR_MESH,
                                 "%s: the %s lung is thinner than half of --edge %g everywhere: "
                                 "give a smaller edge",
-                                w->path, value == LABELS_LEFT ? "left" : "right", w->edge);
+                                w->path, name, w->edge);
 }
 
-/* If the left lung does not lie left of the other, tell by the lungs' shape whether the labels
- * or the header are wrong. */
-static supine_status settle_doubt(const work *w, const supine_mesh *surfaces, supine_error *error) {
+/* Refuse lungs of which the left one does not lie left of the other, and say by their shape
+ * whether the labels or the header's axes are wrong. */
+static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_report *report = w->report;
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);
   char letters[4];
@@ -328,7 +323,7 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   supine_image_free(&w.image);
   supine_labels_mask_free(&w.both);
   if (status == SUPINE_OK && w.doubted) {
-    status = settle_doubt(&w, surfaces, error);
+    status = refuse_sides(&w, surfaces, error);
   }
   status = status == SUPINE_OK ? advance(&w, 1.0, error) : status;
   if (status == SUPINE_OK) {

@@ -18,8 +18,8 @@ typedef struct supine_labels_options {
   const char *labels;
   supine_axes axes; /**< of the header's coordinates, instead of its own; AUTO: by the header */
   double edge;      /**< approximate distance between vertices, mm; 0: SUPINE_LABELS_EDGE */
-  double close;     /**< mm: close gaps and channels narrower than twice this */
-  /** from 0 to 1; false stops; optional */
+  double close;     /**< close gaps and channels narrower than twice this, mm; 0: none */
+  /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
 } supine_labels_options;
@@ -27,15 +27,15 @@ typedef struct supine_labels_options {
 /** Voxels and surface of one lung. Volumes in mL. */
 typedef struct supine_labels_lung {
   int side;        /**< +1 left, -1 right */
-  double mask;     /**< volume of the voxels that the surface is made of */
-  double closed;   /**< part of it added by closing */
+  double mask;     /**< volume of the voxels that the surface is made from */
+  double closed;   /**< volume added by closing */
   size_t islands;  /**< number of pieces dropped */
   double dropped;  /**< volume of the pieces dropped */
   size_t cavities; /**< number of cavities filled */
   double filled;   /**< volume of the cavities filled */
-  double surface;  /**< volume of the surface */
-  long tunnels;    /**< tunnels left through the lung: the surface's genus */
-  bool cut;        /**< it reaches the image's border, where it is cut off */
+  double surface;  /**< volume that the surface encloses */
+  long tunnels;    /**< number of tunnels through the lung: the surface's genus */
+  bool cut;        /**< the lung reaches the image's border, where it is cut off */
 } supine_labels_lung;
 
 /** Geometry and labels read from a map, and what was repaired. */
@@ -44,9 +44,9 @@ typedef struct supine_labels_report {
   double spacing[3];  /**< mm */
   char axes[64];      /**< "i to the left, j to the back, k to the head" */
   const char *source; /**< frame_source of the image, a literal */
-  bool frames_differ; /**< sform and qform are both present and differ */
-  char taken[256];    /**< "labels 1 right, 2 left" */
-  double parted;      /**< widest neck at which touching lungs were split, mm; 0: none */
+  bool frames_differ; /**< frames_differ of the image */
+  char taken[256];    /**< labels of each side: "2 left; 1 right (convention lungmask)" */
+  double neck;        /**< width of the neck at which touching lungs were split, mm; 0: none */
   size_t lung_count;
   supine_labels_lung lung[2]; /**< the left one first if both are present */
   supine_axes coordinates;    /**< coordinates assumed for the header */
@@ -56,19 +56,19 @@ typedef struct supine_labels_report {
  * masks in one frame, each a part given by its nonzero voxels.
  *
  * The largest piece of each lung is kept and its cavities are filled. The map is averaged over
- * cubes of `edge`, in steps along its own axes; cubes at least half filled are inside, corrected
- * so that no two cubes meet only in an edge or corner, which makes the surface net [Gibson1998]
- * a closed manifold. It is smoothed without shrinking [Taubin1995], each vertex within its cell
- * of the net.
+ * cubes with sides of `edge` along the map's axes. Cubes at least half filled are inside; they are
+ * corrected so that no two meet only in an edge or corner, which makes the surface net
+ * [Gibson1998] a closed manifold. The net is smoothed without shrinking [Taubin1995], each vertex
+ * within its cell.
  *
  * @param surfaces  [2] zero-initialised; report->lung_count are written, in its order, outwards
  * @retval SUPINE_ERROR_ARGUMENT  an edge, closing distance or list of labels that is invalid
  * @retval SUPINE_ERROR_MESH      no lungs, one where two are named, labels that are not two
- *         lungs', a lung that the header puts on the wrong side, or less than a few cubes
- * @retval SUPINE_ERROR_FORMAT    voxels that are not labels; images that differ in size or frame
+ *         lungs', a left lung that does not lie left of the other, one too small or too large
+ * @retval SUPINE_ERROR_FORMAT    voxels that are not labels, images that differ in size or frame
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and those of supine_image_read
- * Memory: the map and 1 byte per voxel; to split lungs or close gaps, 9 more per voxel of their
- * box. */
+ * Memory: the map and 1 byte per voxel; per voxel of the lungs' box 10 bytes more to split lungs,
+ * and 4 more to close gaps. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);

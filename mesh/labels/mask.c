@@ -77,7 +77,8 @@ supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value,
   return SUPINE_OK;
 }
 
-/* Read the labels [count] of one row; false if a voxel, then put into `bad`, is not a label. */
+/* Read the labels of one row; if a voxel is not a label, set `bad` to its value and return false.
+ */
 static bool read_row(const supine_image *image, size_t row, uint16_t *labels, double *bad) {
   const size_t size = image->size[0];
   for (size_t i = 0; i < size; ++i) {
@@ -91,6 +92,7 @@ static bool read_row(const supine_image *image, size_t row, uint16_t *labels, do
   return true;
 }
 
+/* Add the voxels of one row to the tally, run by run. */
 static void count_row(const supine_image *image, size_t row, const uint16_t *labels,
                       labels_tally *tally) {
   const size_t size = image->size[0];
@@ -132,7 +134,10 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
   }
   free(labels);
   if (well) {
-    return SUPINE_OK;
+    return tally[0].count < image->size[0] * image->size[1] * image->size[2]
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_MESH,
+                                  "%s: every voxel is 0: give an image with labels", path);
   }
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
                           bad < 0.0 ? "%s: a voxel holds %g, but labels are 0 to 65535: if this is "
@@ -168,7 +173,7 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   for (size_t k = low[2]; k <= high[2]; ++k) {
     for (size_t j = low[1]; j <= high[1]; ++j) {
       double bad;
-      (void)read_row(image, j + image->size[1] * k, row, &bad); /* read before */
+      (void)read_row(image, j + image->size[1] * k, row, &bad); /* checked by supine_labels_count */
       uint8_t *out = mask->at + LABELS_MARGIN +
                      mask->size[0] * (j - low[1] + LABELS_MARGIN +
                                       mask->size[1] * (k - low[2] + LABELS_MARGIN));

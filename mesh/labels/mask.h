@@ -8,14 +8,14 @@
 #include "mesh/io/image.h"
 #include "mesh/labels/labels.h"
 
-/** Voxels with a margin of 0 around the nonzero ones. */
+/** A box of voxels with a margin of zeros around the nonzero ones. */
 typedef struct labels_mask {
   size_t size[3];
-  long from[3];      /**< voxel 0 in the image or mask that it was cut from */
+  long from[3];      /**< index of voxel 0 in the image or mask that the box was cut from */
   double origin[3];  /**< centre of voxel 0, mm, LPS */
   double step[3][3]; /**< mm, LPS */
   double spacing[3]; /**< the steps' lengths, mm */
-  uint8_t *at;       /**< [size[2], size[1], size[0]] */
+  uint8_t *at;       /**< [size[2], size[1], size[0]] values */
 } labels_mask;
 
 enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* values of a mask of both lungs */
@@ -35,91 +35,97 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
 
 enum { LABELS_MAX = 65536, LABELS_MARGIN = 2 };
 
-/** The voxels of one label. */
+/** Number, sum and box of the voxels of one label. */
 typedef struct labels_tally {
   uint64_t count;
-  uint64_t sum[3]; /**< sum of their indices */
-  uint32_t low[3], high[3];
+  uint64_t sum[3];          /**< sum of their indices along each axis */
+  uint32_t low[3], high[3]; /**< first and last index along each axis */
 } labels_tally;
 
 /** Count the voxels of each label and find their boxes.
  * @param tally  [LABELS_MAX] output
- * @retval SUPINE_ERROR_FORMAT  a voxel is not a label */
+ * @retval SUPINE_ERROR_FORMAT  a voxel is not a label
+ * @retval SUPINE_ERROR_MESH    every voxel is 0 */
 supine_status supine_labels_count(const char *path, const supine_image *image, labels_tally *tally,
                                   supine_error *error);
+
 typedef struct labels_choice {
-  char *taken;  /**< [256] "labels 1 right, 2 left", written */
+  char *taken;  /**< [256] the `taken` of supine_labels_report, written */
   bool doubted; /**< by the header, the left lung does not lie left of the other */
 } labels_choice;
 
 /** Choose the side of each label: as `wanted`, or by the labels present if that is NULL.
- * @param side  [LABELS_MAX] output: 0, LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER */
+ * @param side     [LABELS_MAX] output: 0, LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER */
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
                                    labels_choice *choice, supine_error *error);
 
 /** Cut the box of voxels low to high from a counted image, with LABELS_MARGIN around it; on
  * SUPINE_ERROR_MEMORY `at` is NULL.
- * @param value  [LABELS_MAX] value in the mask of each label */
+ * @param value  [LABELS_MAX] value of each label in the mask */
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
                                      const size_t high[3], const uint8_t *value, labels_mask *mask);
 
 /* ---- pieces.c: pieces of equal voxels that share faces ---- */
 
+/** Equal voxels begin <= i < end of a row. */
 typedef struct labels_run {
-  uint32_t begin, end, parent;
+  uint32_t begin, end;
+  uint32_t parent; /**< first run of the piece */
 } labels_run;
 
 typedef struct labels_piece {
-  uint64_t count;
-  double sum[3]; /**< sum of the indices */
+  uint64_t count; /**< voxels */
+  double sum[3];  /**< sum of their indices along each axis */
 } labels_piece;
 
 typedef struct labels_pieces {
   size_t run_count;
   size_t *row;         /**< [rows + 1] first run of each row of voxels */
-  labels_run *run;     /**< parent; after uniting, the first run of its piece */
-  labels_piece *piece; /**< [run_count] at each piece's first run; others are 0 */
+  labels_run *run;     /**< [run_count] */
+  labels_piece *piece; /**< [run_count] each piece is at the index of its first run; others are 0 */
   size_t piece_count;
 } labels_pieces;
 
-/** Find the pieces of zero voxels, or of nonzero ones. */
+/** Find the pieces of zero voxels or, if `zero` is false, of nonzero voxels. */
 supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, labels_pieces *pieces);
 void supine_labels_pieces_free(labels_pieces *pieces);
-/** Keep the largest piece, and fill its cavities; return voxels dropped and filled. */
-supine_status supine_labels_keep_largest(labels_mask *mask, size_t *islands, size_t *dropped);
-supine_status supine_labels_fill_cavities(labels_mask *mask, size_t *cavities, size_t *filled);
+/** Set all pieces of nonzero voxels except the largest to 0 or, if `zero`, all pieces of zeros
+ * except the outer one (cavities) to 1.
+ * @param others  output: number of pieces changed
+ * @param voxels  output: number of their voxels */
+supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *others, size_t *voxels);
 
 /* ---- distance.c ---- */
 
-/** Compute the squared distance, mm^2, from the centre of every voxel to that of the nearest zero
- * voxel or, unless `zero`, nonzero voxel. The steps are assumed to be orthogonal.
+/** Compute the squared distance, mm^2, from the centre of every voxel to the centre of the nearest
+ * zero voxel or, if `zero` is false, nonzero voxel. The steps are assumed to be orthogonal.
  * @param squares  [size] output */
 supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *squares);
-/** Close the mask: fill all voxels that a ball of this radius, mm, cannot reach from outside. The
+/** Close the mask: fill all voxels that no ball of this radius, mm, outside the mask can cover. The
  * mask's margin must be wider than the radius.
  * @param added  output: number of voxels filled */
 supine_status supine_labels_close(labels_mask *mask, double radius, size_t *added);
 
-/* ---- part.c ---- */
+/* ---- split.c ---- */
 
 /** Replace LABELS_EITHER by LABELS_LEFT or LABELS_RIGHT.
- * @param neck  output: width of the widest neck cut, mm; 0: none
+ * @param neck  output: width of the neck at which the lungs were split, mm; 0: none
  * @retval SUPINE_ERROR_MESH  one lung, or two that cannot be separated */
-supine_status supine_labels_part(const char *path, labels_mask *both, double *neck,
-                                 supine_error *error);
+supine_status supine_labels_split(const char *path, labels_mask *both, double *neck,
+                                  supine_error *error);
 
 /* ---- cubes.c ---- */
 
-/** The share of lung in each cube. */
+/** Share of each cube that is inside the mask. */
 typedef struct labels_cubes {
   size_t size[3];
   double origin[3]; /**< centre of cube 0, in voxels of the mask */
-  double ratio[3];  /**< size of a cube in voxels */
+  double ratio[3];  /**< edge of a cube along each axis, in voxels */
   float *share;     /**< [size] 0 to 1; 0 in the outermost layers */
 } labels_cubes;
 
-/** Average a mask over cubes of `edge` mm.
+/** Average a mask over cubes with edges of `edge` mm.
  * @param one  keep only the largest piece, and fill its cavities */
 supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
                                          labels_cubes *cubes);
@@ -127,8 +133,9 @@ void supine_labels_cubes_free(labels_cubes *cubes);
 
 /* ---- net.c ---- */
 
-/** Make the net of a mask's cubes, of `one` piece or all, and smooth it, each vertex within
- * its cell. */
+/** Make the surface of a mask by a surface net of cubes of `edge` mm, and smooth it, keeping each
+ * vertex within its cell.
+ * @param one  keep only the largest piece, and fill its cavities */
 supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
                                          supine_mesh *mesh);
 

@@ -25,7 +25,7 @@ static const float half = 0.5F;
 
 typedef struct build {
   const labels_cubes *cubes;
-  size_t stride[3];
+  size_t stride[3]; /* from a cube to the next along each axis */
   uint32_t *vertex; /* [cubes] vertex of the cell at each cube, or NONE */
   surface_net *net;
 } build;
@@ -40,7 +40,7 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
     inside += share[cell + (c & 1U) * b->stride[0] + (c >> 1U & 1U) * b->stride[1] +
                     (c >> 2U) * b->stride[2]] >= half;
   }
-  if (inside == 0 || inside == 8) { /* the usual case */
+  if (inside == 0 || inside == 8) { /* most cells */
     return false;
   }
   for (size_t c = 0; c < 8; ++c) {
@@ -67,7 +67,7 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
   return true;
 }
 
-/* Number the cells; with `write`, fill the net's vertices. */
+/* Count the cells that the surface runs through; with `write`, also fill the net's vertices. */
 static void find_vertices(build *b, bool write) {
   const size_t *size = b->cubes->size;
   surface_net *net = b->net;
@@ -93,23 +93,24 @@ static void find_vertices(build *b, bool write) {
   }
 }
 
-/* Add a quadrilateral around the edge from a cube along an axis; link its neighbours. */
+/* Add the quadrilateral around the edge between `cube` and the next cube along axis `a`, and link
+ * its vertices; without `write`, only count it. */
 static void add_quad(build *b, size_t cube, size_t a, bool write) {
   surface_net *net = b->net;
   const size_t u = (a + 1) % 3;
   const size_t v = (a + 2) % 3;
   const size_t cells[4] = {cube - b->stride[u] - b->stride[v], cube - b->stride[v], cube,
                            cube - b->stride[u]};
-  /* To the next cell: along +u, +v, -u, -v. */
-  const size_t way[4] = {2 * u + 1, 2 * v + 1, 2 * u, 2 * v};
+  /* Face through which each cell touches the next: +u, +v, -u, -v. */
+  const size_t face[4] = {2 * u + 1, 2 * v + 1, 2 * u, 2 * v};
   if (write) {
     const bool outwards = b->cubes->share[cube] >= half;
     for (size_t c = 0; c < 4; ++c) {
       const uint32_t from = b->vertex[cells[c]];
       const uint32_t to = b->vertex[cells[(c + 1) % 4]];
       net->quad[net->quad_count][outwards ? c : 3 - c] = from;
-      net->neighbour[from][way[c]] = to;
-      net->neighbour[to][way[c] ^ 1U] = from;
+      net->neighbour[from][face[c]] = to;
+      net->neighbour[to][face[c] ^ 1U] = from;
     }
   }
   ++net->quad_count;
@@ -171,7 +172,7 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
  * 16 cubes, and removes the steps between slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
-enum { TURNS = 40 };
+enum { TURNS = 40 }; /* each shrinks, then inflates */
 
 /* Move every vertex by a share of the way to the mean of its neighbours, within its cell. */
 static void step(const surface_net *net, double share, double (*next)[3]) {

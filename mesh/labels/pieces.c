@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Find pieces of voxels that share faces, by runs along the rows: islands and cavities. */
 #include <stdlib.h>
+#include <string.h>
 
 #include "mesh/labels/mask.h"
 
@@ -12,13 +13,14 @@ static uint32_t root(labels_run *run, uint32_t i) {
   return i;
 }
 
-/* Unite two pieces under the earlier run. */
+/* Unite the pieces of two runs under the earlier root. */
 static void unite(labels_run *run, uint32_t a, uint32_t b) {
   a = root(run, a);
   b = root(run, b);
   run[a > b ? a : b].parent = a > b ? b : a;
 }
 
+/* Unite the runs [a, a_end) and [b, b_end) of two neighbouring rows where they overlap. */
 static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t b_end) {
   while (a < a_end && b < b_end) {
     if (run[a].begin < run[b].end && run[b].begin < run[a].end) {
@@ -32,7 +34,8 @@ static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t
   }
 }
 
-/* Find the runs of one row; if `run` is NULL, only count them. */
+/* Find the runs of zero (or nonzero) voxels of one row and return their number; if `run` is NULL,
+ * only count them. */
 static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run *run) {
   size_t count = 0;
   for (size_t i = 0; i < size;) {
@@ -113,46 +116,27 @@ void supine_labels_pieces_free(labels_pieces *pieces) {
   *pieces = (labels_pieces){0};
 }
 
-/* Set the voxels of all pieces except `kept` to `value`; return how many. */
-static size_t change_others(labels_mask *mask, const labels_pieces *pieces, uint32_t kept,
-                            uint8_t value) {
-  size_t changed = 0;
+supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *others, size_t *voxels) {
+  labels_pieces pieces = {0};
+  const supine_status status = supine_labels_pieces_find(mask, zero, &pieces);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  uint32_t kept = 0; /* its first run; the first run of zeros lies in the margin */
+  for (size_t r = 1; !zero && r < pieces.run_count; ++r) {
+    kept = pieces.piece[r].count > pieces.piece[kept].count ? (uint32_t)r : kept;
+  }
+  *others = pieces.piece_count > 0 ? pieces.piece_count - 1 : 0;
+  *voxels = 0;
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
-    for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
-      const labels_run *run = &pieces->run[r];
-      for (uint32_t i = run->begin; run->parent != kept && i < run->end; ++i) {
-        mask->at[row * mask->size[0] + i] = value;
-        ++changed;
+    for (size_t r = pieces.row[row]; r < pieces.row[row + 1]; ++r) {
+      const labels_run *run = &pieces.run[r];
+      if (run->parent != kept) {
+        memset(mask->at + row * mask->size[0] + run->begin, zero, run->end - run->begin);
+        *voxels += run->end - run->begin;
       }
     }
   }
-  return changed;
-}
-
-supine_status supine_labels_keep_largest(labels_mask *mask, size_t *islands, size_t *dropped) {
-  labels_pieces pieces = {0};
-  const supine_status status = supine_labels_pieces_find(mask, false, &pieces);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  uint32_t largest = 0;
-  for (size_t r = 1; r < pieces.run_count; ++r) {
-    largest = pieces.piece[r].count > pieces.piece[largest].count ? (uint32_t)r : largest;
-  }
-  *islands = pieces.piece_count > 0 ? pieces.piece_count - 1 : 0;
-  *dropped = change_others(mask, &pieces, largest, 0);
-  supine_labels_pieces_free(&pieces);
-  return SUPINE_OK;
-}
-
-supine_status supine_labels_fill_cavities(labels_mask *mask, size_t *cavities, size_t *filled) {
-  labels_pieces pieces = {0};
-  const supine_status status = supine_labels_pieces_find(mask, true, &pieces);
-  if (status != SUPINE_OK) {
-    return status;
-  }
-  *cavities = pieces.piece_count > 0 ? pieces.piece_count - 1 : 0;
-  *filled = change_others(mask, &pieces, 0, 1); /* the first run lies in the margin */
   supine_labels_pieces_free(&pieces);
   return SUPINE_OK;
 }

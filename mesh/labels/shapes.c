@@ -7,13 +7,14 @@
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
 
-enum { ALL_MOST = 256 }; /* more labels suggest that it is no label map */
+enum { ALL_MOST = 256 }; /* an image with more values is probably no label map */
 
-/* Distance between vertices relative to the cube root of a large part's volume; gives 15,000
- * vertices in a lobe. */
+/* Distance between vertices over the cube root of the volume, for large parts: 15,000 vertices in a
+ * lobe. */
 static const double edge_share = 0.02;
 
-/* Make one part. `value` [LABELS_MAX] holds zeros before and after. */
+/* Make the surface of one label.
+ * @param value  [LABELS_MAX] work space, zeros before and after */
 static supine_status make_part(const supine_image *image, const labels_tally *tally, uint8_t *value,
                                supine_labels_shape *part) {
   const size_t low[3] = {tally->low[0], tally->low[1], tally->low[2]};
@@ -32,7 +33,7 @@ static supine_status make_part(const supine_image *image, const labels_tally *ta
   return status;
 }
 
-/* Choose the labels; refuse those that are absent. */
+/* List the labels to make surfaces of; refuse a label without voxels. */
 static supine_status choose(const char *path, const labels_tally *tally, const unsigned *wanted,
                             size_t wanted_count, supine_labels_shape *parts, size_t *count,
                             supine_error *error) {
@@ -55,9 +56,7 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
       parts[(*count)++].label = label;
     }
   }
-  return *count > 0 ? SUPINE_OK
-                    : supine_error_set(error, SUPINE_ERROR_MESH,
-                                       "%s: all voxels are 0: give a label map", path);
+  return SUPINE_OK;
 }
 
 supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,

@@ -8,7 +8,7 @@
 
 #include "precompute/lungs/disease.h"
 
-/* Find the weight of a lesion at a distance: 1 inside, 0 from the radius on. */
+/* Compute the weight w of a lesion at a distance: 1 up to half the radius, 0 from the radius on. */
 static double lesion_weight(double distance, double radius) {
   if (distance >= radius) {
     return 0.0;
@@ -76,7 +76,7 @@ static void find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) 
   }
 }
 
-void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double *vertices) {
+void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices) {
   memcpy(vertices, lungs->mesh.vertices, 3 * lungs->mesh.vertex_count * sizeof *vertices);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (share[lung] == 1.0) {
@@ -93,8 +93,8 @@ void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double
   }
 }
 
-void supine_tissue_rest_directions(const supine_lungs *lungs, const double share[2],
-                                   double *directions) {
+void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
+                                       double *directions) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (share[lung] == 1.0) {
       continue;

@@ -29,15 +29,15 @@ typedef struct supine_lesion {
  * therefore moves as before; at a given volume all of it moves more, by one ratio, to make up for
  * the lesion.
  *
- * @param reached  optional: number of vertices nearer than the radius; 0: no effect
+ * @param reached  optional output: number of vertices nearer than the radius; 0: no effect
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
  *                                positive and finite
  */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                                        double *factors, size_t *reached, supine_error *error);
 
-/** Compute the surface with collapsed lungs (pneumothorax), [N, 3] mm. `mesh` of the lungs keeps
- * the healthy shape, on which forces, heights and links are based.
+/** Compute the surface with collapsed lungs (pneumothorax). `mesh` of the lungs keeps the healthy
+ * shape, on which forces, heights and links are based.
  *
  * A lung of share < 1 is shrunk about its hilum, the mean of the vertices in the quarter of its
  * width nearest the midline: lengths, and displacements with them, by k = share^(1/3), after the
@@ -49,10 +49,10 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
  *
  * @param share     [lungs] volume over the healthy volume, 0 < share <= 1; 1: healthy
  * @param vertices  [N, 3] mm, written */
-void supine_tissue_rest(const supine_lungs *lungs, const double share[2], double *vertices);
+void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
-/** Scale directions d [N, 3] of the healthy shape to those of the collapsed lungs, in place. */
-void supine_tissue_rest_directions(const supine_lungs *lungs, const double share[2],
-                                   double *directions);
+/** Scale directions of displacement [N, 3] from the healthy to the collapsed lungs, in place. */
+void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
+                                       double *directions);
 
 #endif

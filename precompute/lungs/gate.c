@@ -15,6 +15,7 @@ static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
 }
 
+/* Repair one surface and drop its specks; note what was changed. */
 static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *findings,
                           supine_error *error) {
   supine_mesh_repair_report report;
@@ -34,7 +35,7 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
       {report.duplicates, "dropped", "duplicate triangle", ""},
       {report.loose, "dropped", "loose triangle", ""},
       {report.reversed, "reversed", "triangle", " that faced the other way"},
-      {report.parted, "surfaces touched at", "point", ": separated there"},
+      {report.separated, "surfaces touched at", "point", ": separated there"},
   };
   for (size_t i = 0; i < sizeof notes / sizeof *notes; ++i) {
     if (notes[i].count > 0) {
@@ -56,6 +57,7 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   return SUPINE_OK;
 }
 
+/* Refuse lungs of an impossible size; only warn if the user gave the axes or units. */
 static supine_status check_size(const supine_lungs *lungs, const supine_lungs_source *source,
                                 supine_findings *findings, supine_error *error) {
   const char *unit = NULL;
@@ -67,19 +69,20 @@ static supine_status check_size(const supine_lungs *lungs, const supine_lungs_so
     return SUPINE_OK;
   }
   if (source->axes_given || source->units_given) {
-    supine_findings_add(findings, "%s: warning: %.3g mm long, which no lung is: check --units",
+    supine_findings_add(findings,
+                        "%s: warning: %.3g mm long, which is impossible for lungs: check --units",
                         source->name, side);
     return SUPINE_OK;
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "%s: %.3g mm long, which no lung is: %s%s. If it is right as it stands, "
-                          "add --units mm",
+                          "%s: %.3g mm long, which is impossible for lungs: %s%s. If the size is "
+                          "right, add --units mm",
                           source->name, side,
                           unit != NULL ? "its unit is likely --units " : "check its units",
                           unit != NULL ? unit : "");
 }
 
-/* Separate the triangles of two lungs, along whichever axis the lungs lie apart. Return the number
+/* Separate the triangles of two lungs along the axis on which they overlap least. Return the number
  * of lungs; 0: out of memory.
  * @param parts  written; they share the lungs' vertices, and the caller frees their triangles */
 static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
@@ -172,7 +175,7 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
 
 static void note_lungs(const supine_lungs *lungs, const char *name, supine_findings *findings) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    if (lungs->turned[lung]) {
+    if (lungs->reversed[lung]) {
       supine_findings_add(findings,
                           "%s: note: the triangles of the %s lung faced inwards: reversed", name,
                           supine_lungs_name(lungs, lung));
@@ -181,10 +184,9 @@ static void note_lungs(const supine_lungs *lungs, const char *name, supine_findi
   const supine_topology *t = &lungs->topology;
   if (!t->closed) {
     supine_findings_add(findings,
-                        "%s: note: the surface is not closed (%zu boundary, %zu non-manifold, %zu "
-                        "inconsistent edge%s): volumes are unknown",
-                        name, t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges,
-                        plural(t->inconsistent_edges));
+                        "%s: note: the surface is not closed (edges: %zu boundary, %zu "
+                        "non-manifold, %zu inconsistent): volumes are unknown",
+                        name, t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges);
   }
 }
 
@@ -192,8 +194,8 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
                                 const supine_lungs_source *source, supine_lungs *lungs,
                                 bool *axes_hold, supine_findings *findings, supine_error *error) {
   supine_status status = SUPINE_OK;
-  bool hold = false;
   int side = 0;
+  *axes_hold = false;
   for (size_t m = 0; m < count && status == SUPINE_OK; ++m) {
     status = mend(&meshes[m], source->name, findings, error);
   }
@@ -208,7 +210,7 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
     return status;
   }
   status = check_size(lungs, source, findings, error);
-  status = status == SUPINE_OK ? judge(lungs, source, &side, &hold, findings, error) : status;
+  status = status == SUPINE_OK ? judge(lungs, source, &side, axes_hold, findings, error) : status;
   if (status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
     status = take_side(meshes, count, source, side, lungs, findings, error);
   }
@@ -216,9 +218,6 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
     note_lungs(lungs, source->name, findings);
   } else {
     supine_lungs_free(lungs);
-  }
-  if (axes_hold != NULL) {
-    *axes_hold = hold;
   }
   return status;
 }

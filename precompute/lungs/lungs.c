@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Join surfaces into lungs, tell left from right, check, measure. */
+/* Join surfaces into lungs, find left and right, check and measure them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -232,8 +232,8 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
 static void face_outwards(supine_lungs *lungs) {
   for (size_t lung = 0; lungs->topology.closed && lung < lungs->lung_count; ++lung) {
     const supine_mesh part = supine_lungs_part(lungs, lung);
-    lungs->turned[lung] = supine_mesh_volume(&part) < 0.0;
-    if (lungs->turned[lung]) {
+    lungs->reversed[lung] = supine_mesh_volume(&part) < 0.0;
+    if (lungs->reversed[lung]) {
       supine_mesh_reverse(&part);
     }
   }

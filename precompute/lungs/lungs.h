@@ -15,7 +15,7 @@ typedef struct supine_lungs {
   size_t lung_begin[3];     /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
   size_t triangle_begin[3]; /**< likewise its triangles */
   int side[2];              /**< +1 left, -1 right */
-  bool turned[2];           /**< its triangles faced inwards and were reversed */
+  bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
   double *scanned; /**< [N, 3] vertices in the scan if `mesh` was moved from there to full
@@ -27,11 +27,11 @@ typedef struct supine_lungs {
  *
  * Components whose centres lie left and right of the box's centre, and that hardly overlap in x,
  * are two lungs; otherwise all of them are one lung. The midline is the box's centre for two lungs
- * and the face of the box nearest x = 0 for one. If the
- * triangles of a closed lung face inwards, they are reversed.
+ * and the face of the box nearest x = 0 for one. If the triangles of a closed lung face inwards,
+ * they are reversed.
  *
  * @param meshes   [count] not changed
- * @param midline  mm; it alone decides which lung is left. NULL: find it
+ * @param midline  x of the plane between left and right, mm; NULL: find it
  * @param lungs    written on success; release with supine_lungs_free
  * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach;
  *                                one lung given twice, a tiny surface beside another;
@@ -44,15 +44,15 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
 /** Free the arrays; a zeroed struct is legal. */
 void supine_lungs_free(supine_lungs *lungs);
 
-/** Largest overlap of two lungs along an axis, as a share of the narrower lung; lobes of one lung
- * overlap more. */
+/** Largest overlap of two lungs along an axis, as a share of the extent of the narrower lung; lobes
+ * of one lung overlap more. */
 #define SUPINE_LUNGS_MOST_OVERLAP 0.5
 
 /** Sort connected components to the two sides of `middle` along an axis, by the mean of their
  * vertices.
  * @param above  [components] written: whether the mean is above `middle`
- * @return overlap of the sides' significant components as a share of the narrower side; INFINITY if
- *         one side has none, NAN if out of memory */
+ * @return overlap of the two sides, each the range of its significant components, as a share of the
+ *         narrower side; INFINITY if a side has none, NAN if out of memory */
 double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
                           double middle, uint8_t *above);
 

@@ -57,7 +57,7 @@ static size_t edge_index(unsigned a, unsigned b) {
   return count;
 }
 
-/* Find the index of the vertex at steps (f - i - j, i, j) from the corners of a face. */
+/* Find the index of the vertex of a face with barycentric coordinates (f - i - j, i, j) / f. */
 static size_t number(size_t face, size_t f, size_t i, size_t j) {
   const size_t step[3] = {f - i - j, i, j};
   size_t inside = 0;
@@ -118,7 +118,7 @@ void supine_phantom_geodesic(size_t frequency, uint32_t base, double *vertices,
   }
 }
 
-enum { BAND = 12, TERMS = 169 };
+enum { BAND = 12, TERMS = (BAND + 1) * (BAND + 1) };
 
 /* Centres of the left and the right lung, mm, LPS. */
 static const double centre[2][3] = {{97.4, -135.2, -98.5}, {-114.3, -153.7, -85.5}};

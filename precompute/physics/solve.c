@@ -61,7 +61,7 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
       supine_physics_volume_form_add(&made.form[lung], made.cubic);
     }
   }
-  supine_tissue_rest_directions(lungs, model->share, made.directions);
+  supine_tissue_collapse_directions(lungs, model->share, made.directions);
   *solution = made;
   made = (supine_solution){0};
 cleanup:

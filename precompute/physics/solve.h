@@ -36,7 +36,7 @@ void supine_physics_solution_free(supine_solution *solution);
 double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Compute positions [N, 3], p + s F d, mm.
- * @param rest  p: the lungs' mesh; of collapsed lungs the surface of supine_tissue_rest */
+ * @param rest  p: the lungs' mesh; of collapsed lungs the surface of supine_tissue_collapse */
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *rest,
                                    double scale, double *positions);
 

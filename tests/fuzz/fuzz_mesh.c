@@ -43,7 +43,7 @@ static uint8_t *saved(size_t *size) {
   double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
   uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
   const supine_mesh mesh = {4, vertices, 4, triangles};
-  const supine_mesh_save_options options = {.rest = vertices};
+  const supine_mesh_save_options options = {.from = vertices};
   const char *path = supine_fuzz_file((const uint8_t *)"", 0, FUZZ_ENDING);
   supine_fuzz_expect(supine_mesh_save(path, &mesh, &options, NULL) == SUPINE_OK, "saving a seed");
   return supine_fuzz_take(path, size);

@@ -9,15 +9,16 @@
 
 /* Smallest ratio of the smaller lung's volume to that of the larger. */
 static const double least_share = 0.1;
-/* Widest neck between lungs that is cut. */
-static const double widest_neck = 40.0; /* mm */
+/* Widest neck between lungs that is cut, mm. */
+static const double widest_neck = 40.0;
 
 typedef struct pair {
-  uint32_t piece[2];
+  uint32_t piece[2];   /* index of the first run, left piece first */
   double centre[2][3]; /* mm, larger piece first */
 } pair;
 
-/* Find the two largest pieces if they lie beside each other; the left one first. */
+/* Find the two largest pieces; false unless they lie beside each other and differ by less than a
+ * factor of ten in volume. */
 static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
   uint32_t top[2] = {0, 0};
   for (uint32_t r = 1; r < pieces->run_count; ++r) {
@@ -49,15 +50,16 @@ static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair
          fabs(apart) > fabs(found->centre[0][2] - found->centre[1][2]);
 }
 
-/* Keep only the voxels deeper than this, mm. */
-static void erode(const labels_mask *both, const float *squares, double depth, uint8_t *worn) {
+/* Set `eroded` to the voxels of the mask deeper than `depth`, mm.
+ * @param squares  squared depth of each voxel, mm^2; not read for depth 0 */
+static void erode(const labels_mask *both, const float *squares, double depth, uint8_t *eroded) {
   const size_t count = supine_labels_mask_count(both);
   for (size_t i = 0; i < count; ++i) {
-    worn[i] = both->at[i] != 0 && (depth == 0.0 || sqrt((double)squares[i]) > depth);
+    eroded[i] = both->at[i] != 0 && (depth == 0.0 || sqrt((double)squares[i]) > depth);
   }
 }
 
-/* Mark the voxels of the pair as 1 and 2, all others as 0. */
+/* Mark the voxels of the pair as LABELS_LEFT and LABELS_RIGHT, all others as 0. */
 static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const pair *found,
                       uint8_t *marks) {
   memset(marks, 0, supine_labels_mask_count(mask));
@@ -72,7 +74,8 @@ static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, cons
   }
 }
 
-/* Assign every voxel to the nearer marked piece. `squares` is work space. */
+/* Assign every voxel of the mask to the nearer marked piece.
+ * @param squares  [size] work space */
 static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares) {
   const size_t count = supine_labels_mask_count(both);
   labels_mask one = *both;
@@ -93,53 +96,54 @@ static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares
   return status;
 }
 
-supine_status supine_labels_part(const char *path, labels_mask *both, double *neck,
-                                 supine_error *error) {
+supine_status supine_labels_split(const char *path, labels_mask *both, double *neck,
+                                  supine_error *error) {
   const size_t count = supine_labels_mask_count(both);
   const double step = fmax(both->spacing[0], fmax(both->spacing[1], both->spacing[2]));
-  labels_mask worn = *both;
+  labels_mask eroded = *both;
   float *squares = malloc(count * sizeof *squares);
   supine_status status = SUPINE_ERROR_MEMORY;
-  bool parted = false;
-  worn.at = malloc(count);
+  bool found_pair = false;
+  eroded.at = malloc(count);
   *neck = 0.0;
-  if (squares == NULL || worn.at == NULL) {
+  if (squares == NULL || eroded.at == NULL) {
     goto cleanup;
   }
   status = SUPINE_OK;
   bool all = false; /* whether the two pieces hold all voxels of the mask */
-  for (double depth = 0.0; status == SUPINE_OK && !parted && 2.0 * depth <= widest_neck;
+  for (double depth = 0.0; status == SUPINE_OK && !found_pair && 2.0 * depth <= widest_neck;
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
     if (depth == step) { /* not needed by most lungs, which do not touch */
       status = supine_labels_distance(both, true, squares);
     }
-    erode(both, squares, depth, worn.at);
-    status = status == SUPINE_OK ? supine_labels_pieces_find(&worn, false, &pieces) : status;
-    parted = status == SUPINE_OK && pieces.run_count > 0 && find_pair(both, &pieces, &found);
-    if (parted) {
+    erode(both, squares, depth, eroded.at);
+    status = status == SUPINE_OK ? supine_labels_pieces_find(&eroded, false, &pieces) : status;
+    found_pair = status == SUPINE_OK && pieces.run_count > 0 && find_pair(both, &pieces, &found);
+    if (found_pair) {
       *neck = 2.0 * depth;
       all = depth == 0.0 && pieces.piece_count == 2;
-      mark_pair(both, &pieces, &found, worn.at);
+      mark_pair(both, &pieces, &found, eroded.at);
     }
     supine_labels_pieces_free(&pieces);
   }
-  if (parted && all) {
-    memcpy(both->at, worn.at, count);
-  } else if (parted) {
-    status = share_out(both, worn.at, squares);
+  if (found_pair && all) {
+    memcpy(both->at, eroded.at, count);
+  } else if (found_pair) {
+    status = share_out(both, eroded.at, squares);
   }
 cleanup:
   free(squares);
-  free(worn.at);
+  free(eroded.at);
   if (status != SUPINE_OK) {
     return supine_error_set(error, status, "%s: no memory to split %zu voxels", path, count);
   }
-  return parted ? SUPINE_OK
-                : supine_error_set(error, SUPINE_ERROR_MESH,
-                                   "%s: cannot split the mask into two lungs: erosion leaves no "
-                                   "two pieces beside each other. If it is one lung, name the "
-                                   "side: --labels left=LABEL or right=LABEL",
-                                   path);
+  return found_pair
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "%s: cannot split the mask into two lungs: erosion leaves no "
+                                "two pieces beside each other. If it is one lung, name the "
+                                "side: --labels left=LABEL or right=LABEL",
+                                path);
 }
