@@ -23,7 +23,7 @@ static const double margin = 60.0;
 
 enum { LABELS_MOST = 64 };
 
-/* Labels of the parts to embed, and the names of the parts. */
+/* The value of --labels: labels to embed, and the names of their parts. */
 typedef struct label_list {
   bool given;
   size_t count; /* 0: all */
@@ -41,7 +41,7 @@ typedef struct request {
   supine_mesh_load_options load;
 } request;
 
-/* Read "all", "7" or "7=nodule,8=vessels". */
+/* Parse "all", "7" or "7=nodule,8=vessels". */
 static supine_status read_labels(const char *text, void *field, supine_error *error) {
   label_list *list = field;
   (void)error;

@@ -230,8 +230,8 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   return status;
 }
 
-/* Compute the field from one state to another: back to the scan by the inverse of the first field,
- * and on by the second, which the result replaces. */
+/* Replace `second`, the field from the scan to a state, by the field to it from the state that
+ * `first` leads to: back to the scan by the inverse of `first`, and on by `second`. */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};
@@ -270,7 +270,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   return status;
 }
 
-/* Compute the field from the state that displacements start from to the pose. */
+/* Compute the field from the scan, or the state of --from, to the pose. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
   supine_field first = {0};

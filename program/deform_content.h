@@ -22,12 +22,12 @@ typedef struct supine_deform_content {
 
 extern const supine_option supine_command_deform_content_options[];
 
-/* A state of the lungs, and where displacements start. */
+/* A state of the lungs, and the state that displacements start from. */
 typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;
-  supine_reference_pose from; /* state that displacements are measured from, and of images */
-  bool from_given;            /* by --from; else it is the scan */
+  supine_reference_pose from; /* state that displacements start from, and that images show */
+  bool from_given;            /* --from was given; else `from` is the scan */
   supine_expected expected;
   supine_mesh_save_options save; /* axes and unit of the output */
 } supine_deformation;
@@ -41,7 +41,7 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error);
 
-/* Return whether points, a field or an image is wanted instead of a surface. */
+/* Return whether points, a field or an image are to be written instead of a surface. */
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
 
 /* Write the points, field or image, and print what was written. */

@@ -100,7 +100,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-/* Compute the mean of the neighbours of node i that earlier layers have set; false: none. */
+/* Compute the mean displacement of the neighbours of node i that earlier layers have set; false if
+ * there are none. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
                            size_t i, float mean[3]) {
   const float *u = nodes->values;
@@ -155,7 +156,7 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
     if (!any) {
       break;
     }
-    /* The previous layer counts as known from here on. */
+    /* Earlier layers count as known; only the newest keeps its own mark. */
     for (size_t i = 0; i < count; ++i) {
       known[i] = known[i] != 0 && known[i] != now ? 1 : known[i];
     }

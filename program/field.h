@@ -54,7 +54,7 @@ supine_status supine_field_resample(const supine_field *inverse, const supine_im
                                     bool labels, const supine_image *image, supine_image *moved,
                                     supine_error *error);
 
-/* Trilinear interpolation, for the files of this folder. */
+/* Trilinear interpolation, for field.c and field_*.c. */
 
 /* Cell of voxels that contains a point: index of its first corner, and position of the point in it,
  * 0 to 1 along each axis. */

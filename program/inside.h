@@ -21,7 +21,7 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
                                         supine_error *error);
 void supine_command_names_close(supine_command_names *names);
 
-/* Return the lung of a vertex. */
+/* Return the index of a vertex's lung. */
 size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
 
 /* Check that structures were embedded in these lungs (SUPINE_ERROR_FORMAT). */
@@ -42,7 +42,7 @@ typedef struct supine_command_marks {
 } supine_command_marks;
 
 /* Make the marks of a pose.
- * @param from  pose that displacements are measured from
+ * @param from  pose that displacements start from
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names, const supine_pose *pose,

@@ -64,7 +64,7 @@ void supine_image_free(supine_image *image);
  * compressed. Three channels are a displacement, mm, LPS in every format, as ITK and ANTs read
  * them.
  * @param note  optional: one line for the header
- * @retval SUPINE_ERROR_ARGUMENT  another name, or too large or too many channels for NIfTI-1
+ * @retval SUPINE_ERROR_ARGUMENT  another ending, or too large or too many channels for NIfTI-1
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
                                  supine_error *error);

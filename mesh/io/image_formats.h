@@ -31,7 +31,7 @@ typedef supine_status image_write(const char *path, const supine_image *image, c
 image_describe supine_image_describe_nrrd, supine_image_describe_nifti, supine_image_describe_mha;
 image_write supine_image_write_nrrd, supine_image_write_nifti, supine_image_write_mha;
 
-/* Compressed streams, by their window bits in zlib. */
+/* Formats of compressed streams; the values are zlib's window bits. */
 enum { IMAGE_ZLIB = 15, IMAGE_GZIP = 31 };
 
 /* Read the voxels; refuse more than a file of `file_size` bytes can hold, streams that are

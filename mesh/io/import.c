@@ -35,7 +35,7 @@ typedef struct assimp {
 /* Limits of an importer, far above what it needs for a lung. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
-/* Result of the child process; in the stream, its vertices and triangles follow. */
+/* Result of the child process; the vertices and triangles follow it in the stream. */
 typedef struct outcome {
   supine_error error;
   size_t dropped, vertex_count, triangle_count;
@@ -50,6 +50,7 @@ typedef struct gathering {
   supine_error *error;
 } gathering;
 
+/* Report a failure in the importer's words, on one line. */
 static supine_status import_fail(const char *path, const char *words, supine_error *error) {
   char line[256];
   size_t length = 0;
@@ -131,6 +132,7 @@ static bool take_node(const struct aiNode *node, const struct aiMatrix4x4 *above
   return good;
 }
 
+/* Limit time and memory of the child process for a file of this size. */
 static void confine(size_t bytes) {
   const rlim_t seconds = SECONDS_LEAST + SECONDS_PER_MEGABYTE * (bytes >> 20);
   const struct rlimit time = {seconds, seconds};
@@ -175,7 +177,7 @@ static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t b
   _exit(0); /* also frees the scene */
 }
 
-/* Read the child's outcome. */
+/* Read the outcome and the surface that the child process wrote. */
 static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *mesh,
                                   size_t *dropped, supine_error *error) {
   outcome result;
@@ -270,7 +272,7 @@ supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *d
   return bad > 0 ? bad_line(file, bad, error) : import_file(file, "obj", mesh, dropped, error);
 }
 
-/* Text has no NUL byte; some binary files begin with "solid" too. */
+/* Read STL. A file without NUL bytes is text; some binary files begin with "solid" too. */
 supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   mesh_text last = {0};

@@ -102,7 +102,7 @@ supine_status supine_image_describe_nifti(const char *path, supine_image *image,
   return status;
 }
 
-/* Make the header, 348 bytes and 4 that say that no extension follows. */
+/* Make the header of 348 bytes, and 4 bytes 0: no extension follows. */
 static void make_header(const supine_image *image, const char *note, unsigned char header[352]) {
   nifti_1_header h = {0};
   static const short bits[SUPINE_VOXEL_COUNT] = {8, 8, 16, 16, 32, 32, 32, 64};
@@ -140,9 +140,9 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
   memcpy(header, &h, sizeof h);
 }
 
-/* Separate the components of the vectors, in LPS: ITK and ANTs, which established such files, do
- * not convert vectors of this intent (of DISPVECT before ITK 5.3 they read only the first
- * component). NULL if out of memory. */
+/* Separate the components of the vectors; NULL if out of memory. They stay in LPS: ITK and ANTs do
+ * not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the first component of
+ * NIFTI_INTENT_DISPVECT. */
 static float *planes(const supine_image *image) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   float *made = malloc(3 * count * sizeof *made);

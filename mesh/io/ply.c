@@ -30,7 +30,7 @@ typedef struct ply {
   encoding encoding;
   mesh_text text; /* not yet read; in ASCII, `line` is the rest of the line */
   mesh_text line;
-  unsigned present; /* a bit for each role in an element with items */
+  unsigned present; /* bit 1 << role: an element with items has a property of that role */
   size_t element_count;
   size_t property_count;
   element elements[ELEMENTS_MAX];
@@ -143,7 +143,7 @@ static supine_status read_header(ply *in) {
       "%s: the PLY header has no end_header: the file is truncated; save it again", path);
 }
 
-/* Check that the header promises a surface that can be read. */
+/* Check that the header announces vertices and faces that can be read. */
 static supine_status check_header(const ply *in) {
   static const unsigned needed = 1U << X | 1U << Y | 1U << Z | 1U << CORNERS;
   const char *path = in->file->path;
@@ -210,12 +210,12 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
   if (!take(in, list->count, &length)) {
     return cut_short(in, of, item);
   }
-  if (length < 0.0) {
+  if (length < 0.0 || length > (double)INT64_MAX / 2) {
     return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
                             "%s: the length of a list is %.0f; save the mesh again", in->file->path,
                             length);
   }
-  const uint64_t count = (uint64_t)length; /* below 2^64: the file ends first */
+  const uint64_t count = (uint64_t)length;
   for (uint64_t k = 0; k < count; ++k) {
     double value = 0.0;
     if (!take(in, list->type, &value)) {

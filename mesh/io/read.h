@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Internal declarations of this folder. */
-#ifndef SUPINE_MESH_INTERNAL_H
-#define SUPINE_MESH_INTERNAL_H
+/* Readers of surface files, and what they share. */
+#ifndef SUPINE_MESH_READ_H
+#define SUPINE_MESH_READ_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -49,8 +49,8 @@ typedef struct mesh_file {
   const char *path;
   unsigned char *bytes; /**< the file, then a 0 */
   size_t size;
-  bool tagged;       /**< a SPACE tag is present */
-  supine_axes space; /**< the axes it names; AUTO: unknown ones */
+  bool tagged;       /**< the file has a SPACE tag */
+  supine_axes space; /**< axes that the tag names; AUTO if unknown */
 } mesh_file;
 
 /** Refuse a text with NUL bytes or with a CR that no LF follows, which other readers would split
@@ -69,7 +69,7 @@ typedef struct mesh_faces {
   const char *path;
   supine_mesh *mesh;
   size_t capacity; /**< triangles allocated */
-  size_t count;    /**< faces added */
+  size_t count;    /**< faces read, including points and lines */
   size_t dropped;  /**< points and lines skipped */
 } mesh_faces;
 
@@ -83,7 +83,7 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
 
 /** Read a surface in the file's units and axes, not welded, in single precision. The caller frees
  * `mesh`, also after a failure. `dropped` is set to the number of faces that are points or lines.
- * If the format has its own place for a SPACE tag, that is noted in `file`. */
+ * A SPACE tag in a place that only this format has is noted in `file`. */
 typedef supine_status mesh_reader(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                   supine_error *error);
 mesh_reader supine_mesh_read_ply;

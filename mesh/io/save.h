@@ -13,17 +13,17 @@ typedef struct mesh_writer {
   const supine_mesh *mesh;
   supine_mesh_save_options options;
   unsigned char source[3]; /**< source axis, 0 to 2, of each coordinate in the file */
-  double factor[3];        /**< its sign, divided by the file's unit */
+  double factor[3];        /**< sign of each coordinate over the file's unit in mm */
   bool mirrored;           /**< left-handed axes: triangles are written in reverse order */
   double quantum;          /**< step of lengths in the file's units, a power of two; 0: exact */
-  char space[4];           /**< "LPS", "RAS", ... */
-  char unit[24];           /**< of lengths: "mm", "cm", ... */
+  char space[4];           /**< letters of the axes: "LPS", "RAS", ... */
+  char unit[24];           /**< unit of lengths: "mm", "cm", ... */
   char comment[256];       /**< one printable line, or "" */
 } mesh_writer;
 
-/** Compute vertex i in the file's axes and units. */
+/** Compute the position of vertex i in the file's axes and unit. */
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]);
-/** Compute the displacement of vertex i in the file's axes and units, followed by its length. */
+/** Compute the displacement of vertex i in the file's axes and unit, followed by its length. */
 void supine_mesh_writer_displacement(const mesh_writer *writer, size_t i, float displacement[4]);
 
 /** Find the normal of vertex i in the file's axes. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Write VTK XML PolyData with compressed appended arrays, for one surface or a series of one
- * topology. The arrays of a series come in order, then their offsets into the space reserved at the
- * head. */
+ * topology. The arrays of a series are written frame by frame; then the head is written again, with
+ * their offsets. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +17,7 @@ enum { VTP_ARRAYS = 8, VTP_FIRST_OF_POINTS = 3 };
 
 typedef struct vtp vtp;
 
-/* Put the bytes of item `i` of an array at *at, and advance *at. */
+/* Write the bytes of item `i` of an array to *at, and advance *at. */
 typedef void vtp_put(const vtp *file, size_t i, unsigned char **at);
 
 /* One array in all frames. */
@@ -27,7 +27,7 @@ typedef struct vtp_array {
   unsigned components;
   size_t item; /* bytes per point or triangle: 1, 4 or 12 */
   size_t count;
-  bool still; /* equal in all frames: written once */
+  bool constant; /* equal in all frames: written once */
   vtp_put *put;
 } vtp_array;
 
@@ -41,14 +41,14 @@ struct vtp {
   size_t next;         /* frame to write */
   uint64_t written;    /* bytes of arrays written */
   size_t threads;
-  unsigned char *raw;    /* a block for each thread */
-  unsigned char *packed; /* room for the blocks of any array */
-  uint64_t *sizes;       /* header of an array: 3 numbers, then the size of each block */
-  const vtp_array *packing;
+  unsigned char *raw;       /* a block for each thread */
+  unsigned char *packed;    /* room for the blocks of any array */
+  uint64_t *sizes;          /* header of an array: 3 numbers, then the packed size of each block */
+  const vtp_array *packing; /* array being compressed */
 };
 
-/* Bytes compressed together, a multiple of every item's size, and libdeflate's level: 2 takes
- * half as long again for 5 % less. */
+/* BLOCK: bytes compressed together, a multiple of every item's size. LEVEL of libdeflate: 2 takes
+ * 1.5 times as long for files 5 % smaller. */
 enum { BLOCK = 3 << 18, LEVEL = 1 };
 
 static size_t room_of_block(void) {
@@ -161,8 +161,8 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
   const size_t each = BLOCK / array->item;
   unsigned char *raw = file->raw + thread * BLOCK;
   for (size_t i = begin; i < end; ++i) {
-    const size_t left = array->count - i * each;
-    const size_t items = left < each ? left : each;
+    const size_t remaining = array->count - i * each;
+    const size_t items = remaining < each ? remaining : each;
     unsigned char *at = raw;
     for (size_t k = 0; k < items; ++k) {
       array->put(file, i * each + k, &at);
@@ -177,8 +177,8 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Write the number of blocks, their size, that of a shorter last one, their compressed sizes;
- * then the blocks. */
+/* Write an array: the number of blocks, the size of a block, the size of a shorter last block (0:
+ * none), the compressed size of each block, and the blocks. */
 static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
   const size_t bytes = array->item * array->count;
   const size_t blocks = (bytes + BLOCK - 1) / BLOCK;
@@ -204,7 +204,7 @@ static supine_status vtp_frame(vtp *file, FILE *out) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < file->array_count && status == SUPINE_OK; ++i) {
     uint64_t *offset = &file->offsets[frame * file->array_count + i];
-    if (frame > 0 && file->arrays[i].still) {
+    if (frame > 0 && file->arrays[i].constant) {
       *offset = file->offsets[i];
     } else {
       *offset = file->written;
@@ -214,7 +214,8 @@ static supine_status vtp_frame(vtp *file, FILE *out) {
   return status;
 }
 
-/* Write an element whose length does not depend on its array's offset. */
+/* Write the DataArray elements of an array, one for each frame. Their length does not depend on the
+ * offsets, so that the head can be written again. */
 static void write_array(const vtp *file, size_t number, FILE *out) {
   const vtp_array *array = &file->arrays[number];
   for (size_t frame = 0; frame < file->frames; ++frame) {
@@ -253,7 +254,7 @@ static void write_text(const char *name, const char *text, FILE *out) {
   (void)fputs("0</Array>\n", out);
 }
 
-/* Write one tuple for each frame. */
+/* Write a field as numbers, one tuple for each frame. */
 static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE *out) {
   (void)fprintf(out,
                 "<DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"%zu\" "
@@ -281,7 +282,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("</FieldData>\n", out);
 }
 
-/* Write all before the arrays; its length does not depend on their offsets. */
+/* Write everything before the arrays; its length does not depend on their offsets. */
 static void vtp_head(const vtp *file, FILE *out) {
   const mesh_writer *writer = &file->writer;
   (void)fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", out);

@@ -15,7 +15,7 @@ enum { PIECE = 1 << 16, ANY_HEADER = 32 };
 /* Read `size` bytes after the first `skip` of the stream, and check its checksum. */
 static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size) {
   unsigned char packed[PIECE];
-  unsigned char rest[PIECE]; /* what is not needed */
+  unsigned char discarded[PIECE]; /* bytes before and after the wanted ones */
   z_stream z = {.avail_in = 0};
   uint64_t from = 0; /* bytes unpacked */
   const uint64_t end = skip + size;
@@ -28,7 +28,7 @@ static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_
     const bool wanted = from >= skip && from < end;
     const uint64_t room = wanted ? end - from : from < skip ? skip - from : PIECE;
     const unsigned given = (unsigned)(room < PIECE ? room : PIECE);
-    z.next_out = wanted ? values + (from - skip) : rest;
+    z.next_out = wanted ? values + (from - skip) : discarded;
     z.avail_out = given;
     result = inflate(&z, Z_NO_FLUSH); /* Z_BUF_ERROR at the end of the file */
     from += given - z.avail_out;
@@ -60,7 +60,7 @@ static void widen(unsigned char *at, size_t count, bool is_signed) {
   }
 }
 
-/* Convert stored numbers to F32, times slope plus intercept. */
+/* Convert the voxels to F32, slope x number + intercept, unless that changes nothing. */
 static supine_status rescale(const char *path, const image_storage *storage, supine_image *image,
                              supine_error *error) {
   const double slope = storage->slope;

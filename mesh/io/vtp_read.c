@@ -15,13 +15,13 @@ typedef struct vtp_file {
   const char *bytes, *end; /* `bytes` ends with a NUL, but may contain others */
   const char *appended;    /* first byte after the underscore; NULL: none */
   bool appended_raw, compressed;
-  size_t header_size; /* 4 or 8 */
+  size_t header_size; /* bytes of each size before an array: 4 or 8 */
 } vtp_file;
 
-/* An element's attributes, name="value". */
+/* An XML element. */
 typedef struct element {
-  const char *at, *end; /* text between < and > */
-  const char *body;     /* text after its > */
+  const char *at, *end; /* its attributes, name="value" */
+  const char *body;     /* the text after its > */
 } element;
 
 static supine_status malformed(const vtp_file *v, const char *what, supine_error *error) {
@@ -106,8 +106,9 @@ static size_t base64(const char *at, const char *end, unsigned char *bytes) {
   return (size_t)(to - bytes);
 }
 
-/* Unpack the bytes of an array into out [wanted]: its size and the numbers; or, if compressed, the
- * number of blocks, their size, that of a shorter last one, their compressed sizes, the blocks. */
+/* Unpack the bytes of an array into out [wanted]. A plain array is its size and the numbers. A
+ * compressed one is the number of blocks, the size of a block, the size of a shorter last block (0:
+ * none), the compressed size of each block, and the blocks. */
 static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, size_t wanted,
                    unsigned char *out) {
   const size_t h = v->header_size;
@@ -171,7 +172,7 @@ static bool take_bytes(const vtp_file *v, const element *e, size_t wanted, unsig
   return good;
 }
 
-/* Read `count` numbers of an array; strings hold the codes of their characters. */
+/* Read `count` numbers of an array; a string is read as the codes of its characters. */
 static supine_status take_numbers(const vtp_file *v, const element *e, size_t count,
                                   double **numbers, supine_error *error) {
   char name[32] = "";
@@ -216,7 +217,7 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   return SUPINE_OK;
 }
 
-/* Bound an element's body by its end tag, and find an array in it by name, or the first. */
+/* Find an array by name, or the first if `name` is NULL, inside the element `within` of a piece. */
 static bool find_array(const vtp_file *v, const element *piece, const char *within,
                        const char *name, element *found) {
   element e;
