@@ -16,7 +16,7 @@ typedef struct breath_turn {
  * left side, or the back where gravity starts along the body or to a side. */
 void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
 
-/* Times, orientations and volumes of all frames. */
+/* Times, directions of gravity and volumes of all frames. */
 typedef struct breath_frames {
   const supine_basis *basis;
   size_t count;    /* T */

@@ -129,7 +129,8 @@ typedef struct supine_command {
 int supine_options_run(const supine_command *command, int argc, char **argv);
 
 /* Refuse an output that is the same file as an input (SUPINE_ERROR_ARGUMENT). Call it for inputs
- * that are named within other inputs: those of the command line are checked before. */
+ * named in a list file or within an option's value; all others are checked before the command runs.
+ */
 supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 

@@ -25,7 +25,7 @@ typedef struct supine_pv_report {
   double control_interval[SUPINE_PV_CONTROLS]; /**< half-width of the confidence interval of c_i */
   double volume_interval[2];                   /**< half-widths for V_low and V_high, mL */
   double rms;                                  /**< root mean square residual, mL */
-  double rms_percent; /**< the same as a percentage of the samples' range of volumes */
+  double rms_percent; /**< rms as a percentage of the samples' range of volumes */
 } supine_pv_report;
 
 /** Fit a limb to samples:

@@ -72,7 +72,7 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
 
 /* Refuse volumes that fall below the largest one before them by more than noise explains. */
 static supine_status check_falls(const problem *limb, double span, supine_error *error) {
-  static const double allowed = 0.1; /* share of the range of volumes */
+  static const double allowed = 0.1; /* largest fall, as a share of the range of volumes */
   double peak = limb->sample[0].volume;
   for (size_t j = 1; j < limb->count; ++j) {
     const supine_pv_sample *sample = &limb->sample[j];

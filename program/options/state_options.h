@@ -7,7 +7,7 @@
 
 #include "program/options/command.h"
 
-/* Table of options that fills a supine_orientation: {.table = ..., SUPINE_FILLS(...)}. */
+/* --posture and --gravity: a table that fills a supine_orientation. */
 extern const supine_option supine_options_orientation[];
 
 typedef struct supine_orientation {
