@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine stream: receive the poses of a tracked patient, and send the lungs in each of them. */
+/* supine stream: receive the poses of a tracked patient, and send the lungs in each pose. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,13 +22,13 @@ static const double budget = 15e-3; /* time allowed per frame, s */
 
 typedef struct request {
   supine_stream_options options;
-  double down[3], body[4]; /* body: quaternion W, X, Y, Z */
-  int space;
+  double down[3], body[4]; /* --world-down, --body-from-tracker */
+  int space;               /* index in `spaces` */
   supine_state volume;
   bool has_volume;
   const char *pv;
   supine_pv_breath breath;
-  double smooth; /* ms */
+  double smooth; /* --smooth, ms */
   const char *record, *replay;
   const char *web, *certificate, *key;
   supine_from from;
@@ -40,14 +40,14 @@ static const char *const spaces[] = {"lps", "ras", NULL};
 
 static const supine_option table[] = {
     {"listen", 0, "[ADDRESS:]PORT",
-     "address at which to wait for peers; a port alone can be reached from this machine only; 0: "
-     "any free port. Default: 18944, the port of the protocol, unless --connect is given",
+     "address at which to wait for peers; a port alone can be reached from this machine only; port "
+     "0: any free port. Default: 18944, the port of the protocol, unless --connect is given",
      SUPINE_FILLS(request, options.listen)},
     {"connect", 0, "HOST:PORT", "connect to a peer that listens: a tracker server, 3D Slicer",
      SUPINE_FILLS(request, options.connect)},
     {"device", 0, "NAME", "device whose poses are followed; default: any",
      SUPINE_FILLS(request, options.device)},
-    {.help = "Where gravity points:"},
+    {.help = "Direction of gravity:"},
     {"world-down", 0, "X,Y,Z", "direction of gravity in the tracker's world",
      SUPINE_FILLS(request, down), .standard = "0,0,-1", .more = true},
     {"body-from-tracker", 0, "W,X,Y,Z",
@@ -55,23 +55,23 @@ static const supine_option table[] = {
      "0,0,0,1 where the marker's axes are right, front, head",
      SUPINE_FILLS(request, body), .standard = "1,0,0,0", .more = true},
     {"smooth", 0, "MS",
-     "time constant of smoothing, for a noisy tracker; turns are shown late by as much",
+     "time constant of smoothing, for a noisy tracker; a turn is shown this much later",
      SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms",
      .more = true},
     {.help = "Observed points inside the lungs, as in 'supine locate':"},
     {"points", 0, "FILE",
-     "the points in the scan, made by 'supine embed BASIS'. Their observed positions come as a "
-     "TRANSFORM with the point's name as its device, or as a POINT list, in the axes of "
-     "--space. From then on surfaces and points are sent in the frame of the observations, "
-     "with the attribute expected_error_mm. The volume is also determined, unless --volume or "
-     "a message fixes it",
+     "the points in the scan, made by 'supine embed BASIS'. Their observed positions are received "
+     "as a TRANSFORM whose device is the point's name, or as a POINT list, in the axes of "
+     "--space. Surfaces are then sent in the frame of the observations, with the attribute "
+     "expected_error_mm. The volume is also determined, unless --volume or a message fixes it",
      SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
      .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres", .more = true},
     {.help = "Volume and breathing:"},
     {"volume", 0, "VOLUME",
      "fixed volume, instead of breathing: " SUPINE_VOLUME_HELP
-     ". A STRING of device VOLUME also sets it, as does an NDARRAY of one number, mL above rest",
+     ". A message of device VOLUME also fixes it: a STRING like this option, or an NDARRAY of one "
+     "number, mL above rest",
      SUPINE_FILLS(request, volume), .read = supine_options_read_volume,
      SUPINE_SAYS_GIVEN(request, has_volume)},
     {"tidal", 0, "ML", "tidal volume; default 500", SUPINE_FILLS(request, breath.tidal),
@@ -86,7 +86,7 @@ static const supine_option table[] = {
      "three gains of each lung; surface, a POLYDATA of points and triangle strips; points, a "
      "POLYDATA whose triangles are sent once. A peer chooses with a STRING of device SEND that "
      "holds one of these words",
-     SUPINE_FILLS(request, options.what), .choices = supine_stream_what_names,
+     SUPINE_FILLS(request, options.content), .choices = supine_stream_content_names,
      .standard = "weights"},
     {"space", 0, "NAME", "axes of the points: lps (left, back, head), or ras as in 3D Slicer",
      SUPINE_FILLS(request, space), .choices = spaces, .standard = "lps"},
@@ -128,63 +128,66 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
+/* Print what was received and sent, and the latencies. */
 static void report(const supine_stream_server *server, const request *wanted) {
   const supine_stream_counts *n = supine_stream_server_counts(server);
   if (wanted->points != NULL) {
-    (void)printf("%llu positions of observed points\n", (unsigned long long)n->places);
+    (void)printf("positions of observed points: %llu\n", (unsigned long long)n->positions);
   }
-  (void)printf("%llu poses (%llu repaired, %llu refused), %llu frames, %llu sent to %llu peers\n",
+  (void)printf("poses: %llu (repaired: %llu; refused: %llu); frames: %llu (sent: %llu); peers: "
+               "%llu\n",
                (unsigned long long)n->poses, (unsigned long long)n->repaired,
                (unsigned long long)n->refused, (unsigned long long)n->frames,
                (unsigned long long)n->sent, (unsigned long long)n->peers);
   if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
-    (void)printf("%llu messages malformed, %llu of other types; %llu peers lost, %llu turned away; "
-                 "%llu frames whose volume could not be reached\n",
-                 (unsigned long long)n->malformed, (unsigned long long)n->skipped,
-                 (unsigned long long)n->lost, (unsigned long long)n->turned_away,
-                 (unsigned long long)n->unreachable);
+    (void)printf(
+        "malformed messages: %llu; messages not read: %llu; peers disconnected: %llu; peers "
+        "refused: %llu; frames whose volume is out of reach: %llu\n",
+        (unsigned long long)n->malformed, (unsigned long long)n->skipped,
+        (unsigned long long)n->lost, (unsigned long long)n->turned_away,
+        (unsigned long long)n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     const supine_stream_latency *latency = supine_stream_server_latency(
         server, surfaces != 0 ? SUPINE_STREAM_SURFACE : SUPINE_STREAM_WEIGHTS);
     if (latency->count > 0) {
       (void)printf(
-          "pose received to %s sent: median %.3f ms, 99 %% within %.3f ms, worst %.3f ms, "
-          "of %.0f ms\n",
-          surfaces != 0 ? "surface" : "weights", 1e3 * supine_stream_latency_share(latency, 0.5),
-          1e3 * supine_stream_latency_share(latency, 0.99), 1e3 * latency->worst, 1e3 * budget);
+          "pose received to %s sent: median %.3f ms, 99 %% within %.3f ms, worst %.3f ms; "
+          "allowed: %.0f ms\n",
+          surfaces != 0 ? "surface" : "weights", 1e3 * supine_stream_latency_quantile(latency, 0.5),
+          1e3 * supine_stream_latency_quantile(latency, 0.99), 1e3 * latency->worst, 1e3 * budget);
     }
   }
   if (wanted->smooth > 0.0) {
-    (void)printf("smoothing shows a steady turn %.0f ms later in addition\n", wanted->smooth);
+    (void)printf("--smooth shows a steady turn another %.0f ms later\n", wanted->smooth);
   }
 }
 
-/* Observed points: the file of 'supine embed', and the names in it. */
+/* Observed points, and the file of 'supine embed' with their names. */
 typedef struct observed_points {
   supine_basis *inside;
   supine_command_names names;
-  supine_stream_sensors sensors;
+  supine_stream_observed observed;
 } observed_points;
 
 static supine_status open_points(const supine_basis *basis, const request *wanted,
                                  observed_points *points, supine_error *error) {
-  points->sensors.ras = wanted->space == 1;
+  points->observed.ras = wanted->space == 1;
   const supine_status status =
       supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error);
   return status == SUPINE_OK
              ? supine_command_observed_names(wanted->points, points->inside, &points->names,
-                                             wanted->noise, &points->sensors, error)
+                                             wanted->noise, &points->observed, error)
              : status;
 }
 
 static void close_points(observed_points *points) {
-  free(points->sensors.space);
+  free(points->observed.space);
   supine_command_names_close(&points->names);
   supine_basis_close(points->inside);
 }
 
-/* Make the page of a basis file; the caller frees it. */
+/* Make the page of a basis file. The caller frees *page. */
 static supine_status make_page(const char *path, const export_page *shown, char **page,
                                size_t *size, supine_error *error) {
   export_source source = {0};
@@ -202,6 +205,7 @@ static supine_status make_page(const char *path, const export_page *shown, char 
   return status;
 }
 
+/* Make the page and serve it, if --web is given. The caller frees *page after the web server. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
                                char **page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
@@ -230,9 +234,9 @@ static supine_status open_page(const request *wanted, const supine_basis *basis,
     status = supine_stream_web_create(&site, web, error);
   }
   if (status == SUPINE_OK) {
-    const bool six = strchr(address.host, ':') != NULL;
+    const bool ipv6 = strchr(address.host, ':') != NULL;
     (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
-                 six ? "[" : "", address.host, six ? "]" : "", supine_stream_web_port(*web));
+                 ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", supine_stream_web_port(*web));
   }
   return status;
 }
@@ -263,7 +267,7 @@ static supine_status stream(const supine_basis *basis, const char *path, const r
   options.volume = &volume;
   if (status == SUPINE_OK && wanted->points != NULL) {
     status = open_points(basis, wanted, &points, error);
-    options.sensors = &points.sensors;
+    options.observed = &points.observed;
   }
   if (status == SUPINE_OK && wanted->replay != NULL) {
     status = supine_stream_poses_load(wanted->replay, &poses, error);
@@ -325,7 +329,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       !supine_normalise(wanted->down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--world-down or --body-from-tracker is zero: give a "
-                            "direction and a rotation, as 0,0,-1 and 1,0,0,0");
+                            "direction, as 0,0,-1, and a rotation, as 1,0,0,0");
   }
   supine_basis *basis = NULL;
   supine_status status =
@@ -344,12 +348,13 @@ const supine_command supine_command_stream = {
     name,
     "follow a tracked patient live, over OpenIGTLink",
     .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
-    .about = "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
-             "and sends the lungs in that pose to any number of peers. Poses are TRANSFORM, QTDATA "
-             "or POSITION messages, or an NDARRAY [3], the direction of gravity that a tilt sensor "
-             "measures. Only the newest pose counts: nothing queues, and a slow peer misses frames "
-             "without delaying the others. At the "
-             "end the time from a pose received to its frame sent is printed.",
+    .about =
+        "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
+        "and sends the lungs in that pose to any number of peers. A pose is a TRANSFORM, QTDATA "
+        "or POSITION message, or an NDARRAY of three numbers, the direction of gravity that a "
+        "tilt sensor measures. Only the newest pose counts: a slow peer misses frames without "
+        "delaying the others. At the end the command prints the time from receiving a pose to "
+        "sending its frame.",
     .options = table,
     .notes =
         "Examples:\n"

@@ -88,7 +88,7 @@ supine_status supine_command_observed_load(const char *path, const supine_basis 
 
 supine_status supine_command_observed_names(const char *path, const supine_basis *inside,
                                             const supine_command_names *names, double noise,
-                                            supine_stream_sensors *sensors, supine_error *error) {
+                                            supine_stream_observed *observed, supine_error *error) {
   const size_t n = supine_basis_get_info(inside)->vertex_count;
   size_t count = 0;
   for (size_t i = 0; i < n; ++i) { /* the vertices of a name are contiguous */
@@ -96,8 +96,8 @@ supine_status supine_command_observed_names(const char *path, const supine_basis
     const bool first = i == 0 || names->part[names->order[i - 1]] != part;
     const bool last = i + 1 == n || names->part[names->order[i + 1]] != part;
     if (first && last && count++ < SUPINE_LOCATE_POINTS_MAX) {
-      sensors->name[count - 1] = names->text[part];
-      sensors->last[count - 1] = (supine_observation){
+      observed->name[count - 1] = names->text[part];
+      observed->last[count - 1] = (supine_observation){
           .vertex = names->order[i], .position = {(double)NAN}, .noise = noise};
     }
   }
@@ -105,10 +105,10 @@ supine_status supine_command_observed_names(const char *path, const supine_basis
     return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points: give 1 to %d", path, count,
                             (int)SUPINE_LOCATE_POINTS_MAX);
   }
-  sensors->inside = inside;
-  sensors->count = count;
-  sensors->space = calloc(supine_locate_space(count), sizeof *sensors->space);
-  return sensors->space != NULL
+  observed->inside = inside;
+  observed->count = count;
+  observed->space = calloc(supine_locate_space(count), sizeof *observed->space);
+  return observed->space != NULL
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
 }

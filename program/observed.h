@@ -24,12 +24,12 @@ supine_status supine_command_observed_load(const char *path, const supine_basis 
 
 /* List the single points, whose positions messages may set, as not seen yet.
  * @param noise    standard deviation of a coordinate, mm
- * @param sensors  zeroed; the caller frees its space
+ * @param observed  zeroed; the caller frees its space
  * @retval SUPINE_ERROR_FORMAT  none, or more than SUPINE_LOCATE_POINTS_MAX
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_observed_names(const char *path, const supine_basis *inside,
                                             const supine_command_names *names, double noise,
-                                            supine_stream_sensors *sensors, supine_error *error);
+                                            supine_stream_observed *observed, supine_error *error);
 
 void supine_command_observed_free(supine_command_observed *observed);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Puts the lung into a Unity scene: add it to an object with a MeshFilter, name the basis file and the
-// server of 'supine stream'. The object is the patient: its rotation is sent to the server whenever it
-// changes. Unity's axes are left-handed, in metres, y up: an object that is not turned is a standing
+// Shows the lung in a Unity scene: add this script to an object with a MeshFilter, and set the basis file
+// and the server of 'supine stream'. The object is the patient: its rotation is sent to the server whenever
+// it changes. Unity's axes are left-handed, in metres, y up: an object without rotation is a standing
 // patient who faces +z, with left, back and head at -x, -z and +y.
 using UnityEngine;
 using UnityEngine.Rendering;
@@ -23,7 +23,8 @@ public class LungBehaviour : MonoBehaviour
         return new Vector3(-1e-3f * left, 1e-3f * head, -1e-3f * back);
     }
 
-    /// <summary>Corners in the order that a left-handed engine takes for front faces.</summary>
+    /// <summary>Reverses each triangle, in place, so that its front faces outwards in left-handed axes.
+    /// </summary>
     public static int[] ToUnity(int[] corners)
     {
         for (int i = 0; i < corners.Length; i += 3)
@@ -35,8 +36,8 @@ public class LungBehaviour : MonoBehaviour
         return corners;
     }
 
-    /// <summary>Rows of the rotation from the body (left, back, head) to a world whose z points up, of
-    /// an object's rotation.</summary>
+    /// <summary>Converts an object's rotation to the rotation from the body (left, back, head) to a world
+    /// whose z points up, by rows.</summary>
     public static float[] Pose(Quaternion rotation)
     {
         Vector3[] axes = { rotation * new Vector3(-1, 0, 0), rotation * new Vector3(0, 0, -1),

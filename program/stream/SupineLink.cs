@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A peer of 'supine stream' for Unity, in one file: OpenIGTLink over a socket in a thread of its
-// own, of which the newest frame counts, and the run-time library by P/Invoke. Needs nothing but
-// .NET; LungBehaviour.cs puts it into a scene.
+// A peer of 'supine stream' for Unity, in one file: OpenIGTLink over a socket, read by another thread
+// that keeps the newest frame, and the run-time library by P/Invoke. Needs only .NET;
+// LungBehaviour.cs uses it in a scene.
 using System;
 using System.Net.Sockets;
 using System.Runtime.InteropServices;
@@ -24,7 +24,7 @@ namespace Supine
         ulong stamp;
         bool closing;
 
-        /// <summary>Connects; frames are read from then on.</summary>
+        /// <summary>Connects, and begins to read frames.</summary>
         public Link(string host, int port)
         {
             client = new TcpClient(host, port) { NoDelay = true, ReceiveBufferSize = 8192 };
@@ -33,11 +33,11 @@ namespace Supine
             reader.Start();
         }
 
-        /// <summary>Why reading has ended; null while it goes on.</summary>
+        /// <summary>Reason why reading ended; null while it continues.</summary>
         public Exception Failure { get; private set; }
 
-        /// <summary>The K weights of the newest frame and the gains x, y, z of each lung, once; null
-        /// where none has come since the last call.</summary>
+        /// <summary>Returns the newest frame: K weights, then the gains x, y, z of each lung; null if no
+        /// frame was received since the last call.</summary>
         public float[] TakeNewest(out ulong poseStamp)
         {
             lock (turn)
@@ -60,8 +60,8 @@ namespace Supine
             Send("TRANSFORM", device, body, poseStamp);
         }
 
-        /// <summary>Sets the volume: rest, full or scan, with +ML or -ML (rest+500), or an absolute
-        /// volume, 2600mL.</summary>
+        /// <summary>Sets the volume: rest, full or scan, also with +ML or -ML (rest+500), or an absolute
+        /// volume (2600mL).</summary>
         public void SetVolume(string volume)
         {
             byte[] text = Encoding.ASCII.GetBytes(volume);
@@ -117,7 +117,7 @@ namespace Supine
             for (int got = 0; got < bytes.Length;)
             {
                 int count = stream.Read(bytes, got, bytes.Length - got);
-                if (count == 0) throw new System.IO.EndOfStreamException("the server has gone");
+                if (count == 0) throw new System.IO.EndOfStreamException("the server closed the connection");
                 got += count;
             }
         }
@@ -183,7 +183,7 @@ namespace Supine
         }
     }
 
-    /// <summary>A basis file, by the run-time library (libsupine_runtime). Little-endian 64-bit
+    /// <summary>A basis file, read by the run-time library (libsupine_runtime), on little-endian 64-bit
     /// machines.</summary>
     public sealed class Basis : IDisposable
     {
@@ -212,7 +212,7 @@ namespace Supine
         public Basis(string path)
         {
             int status = supine_basis_open(path, out handle, IntPtr.Zero);
-            if (status != 0) throw new ArgumentException(path + ": no basis file (status " + status + ")");
+            if (status != 0) throw new ArgumentException(path + ": not a readable basis file (status " + status + ")");
             Info info = (Info)Marshal.PtrToStructure(supine_basis_get_info(handle), typeof(Info));
             VertexCount = (int)info.Vertices;
             TriangleCount = (int)info.Triangles;
@@ -227,25 +227,24 @@ namespace Supine
         public void Deform(float[] frame, float[] xyz)
         {
             if (frame.Length != modes + 3 * lungs || xyz.Length != 3 * VertexCount)
-                throw new ArgumentException("a frame of another basis");
+                throw new ArgumentException("the frame belongs to another basis: give the file of the server");
             for (int i = 0; i < frame.Length; ++i) pose[PoseIndex(i)] = frame[i];
             supine_deform(handle, pose, xyz);
         }
 
-        /// <summary>The frame of a state, "left:rest+500", as the server makes it: for a lung without
-        /// a server.</summary>
+        /// <summary>Computes the frame of a state, such as "left:rest+500", without a server.</summary>
         public float[] Frame(string text)
         {
             byte[] state = new byte[StateSize];
             if (supine_state_parse(text, state, IntPtr.Zero) != 0 ||
                 supine_basis_pose(handle, state, pose, IntPtr.Zero) != 0)
-                throw new ArgumentException(text + ": no state of this basis");
+                throw new ArgumentException(text + ": not a state that this basis can show");
             float[] frame = new float[modes + 3 * lungs];
             for (int i = 0; i < frame.Length; ++i) frame[i] = (float)pose[PoseIndex(i)];
             return frame;
         }
 
-        // Where a number of a frame is in supine_pose.
+        // Returns the index in supine_pose of number i of a frame.
         int PoseIndex(int i)
         {
             return i < modes ? i : ModesMax + i - modes;

@@ -20,7 +20,9 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
     const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
     if (length == 0 || length >= sizeof address->host) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "'%s' has no host before its port: give HOST:PORT", text);
+                              "'%s' has no host, or one of more than 255 characters, before the "
+                              "port: give HOST:PORT",
+                              text);
     }
     memcpy(host, text + (bracketed ? 1 : 0), length);
     host[length] = '\0';
@@ -37,7 +39,7 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   const int failure = getaddrinfo(host, port, &wanted, &found);
   if (failure != 0) {
     return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT, "%s: %s: give %s", host, gai_strerror(failure),
+        error, SUPINE_ERROR_ARGUMENT, "'%s': %s: give %s", host, gai_strerror(failure),
         numeric ? "a numeric address, as 127.0.0.1" : "the name or the numeric address of a host");
   }
   memcpy(&address->where, found->ai_addr, found->ai_addrlen);
@@ -56,7 +58,8 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
   if (s < 0 || setsockopt(s, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
       bind(s, (const struct sockaddr *)&address->where, address->size) != 0 || listen(s, 64) != 0 ||
       getsockname(s, (struct sockaddr *)&given, &size) != 0) {
-    (void)supine_error_set(error, SUPINE_ERROR_WRITE, "cannot listen on the port: %s. Give another",
+    (void)supine_error_set(error, SUPINE_ERROR_WRITE,
+                           "cannot listen on port %d: %s: give another port", address->port,
                            strerror(errno));
     if (s >= 0) {
       (void)close(s);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute CRC-64 by carry-less multiplication, 64 bytes per step, where the processor supports it;
- * else byte by byte. */
+/* Compute CRC-64: 64 bytes per step if the processor has carry-less multiplication, else byte by
+ * byte. */
 #include <pthread.h>
 
 #if defined(__x86_64__)
@@ -67,7 +67,7 @@ static uint64_t by_bytes(uint64_t crc, const unsigned char *at, size_t size) {
 }
 
 #ifdef CRC64_CARRY_LESS
-typedef __m128i lane; /* 16 bytes of the message, the first most significant */
+typedef __m128i lane; /* 16 bytes of the message; the first byte is the most significant */
 
 #define CARRY_LESS __attribute__((target("pclmul,ssse3")))
 
@@ -76,7 +76,7 @@ CARRY_LESS static lane take(const unsigned char *at) {
   return _mm_shuffle_epi8(_mm_loadu_si128((const lane *)(const void *)at), front);
 }
 
-/* Fold `a` onto `next`: a_high x^(n + 64) + a_low x^n + next. */
+/* Compute a_high x^(n + 64) + a_low x^n + next, with powers = (x^(n + 64), x^n). */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
@@ -100,10 +100,10 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   for (; size != 0; at += 16, size -= 16) {
     sum = fold(sum, near, take(at));
   }
-  unsigned char rest[16]; /* congruent to the whole message mod P */
+  unsigned char remainder[16]; /* congruent to the whole message mod P */
   const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  _mm_storeu_si128((lane *)(void *)rest, _mm_shuffle_epi8(sum, front));
-  return by_bytes(0, rest, sizeof rest);
+  _mm_storeu_si128((lane *)(void *)remainder, _mm_shuffle_epi8(sum, front));
+  return by_bytes(0, remainder, sizeof remainder);
 }
 #endif
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute frames, and build their messages. */
+/* Compute the positions of a frame, and build its messages. */
 #include <endian.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,8 +17,8 @@
 /* clang-format on */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
-/* PIECE: number of vertices whose positions, bytes and checksum are computed together, within the
- * L1 cache. GRAIN: least number of vertices for which a thread is worth starting. */
+/* PIECE: number of vertices computed together, so that they stay in the L1 cache. GRAIN: smallest
+ * number of vertices for which a thread is worth starting. */
 enum { PIECE = 1024, GRAIN = 64 * PIECE, THREADS_MAX = 256 };
 
 struct supine_stream_frames {
@@ -26,19 +26,20 @@ struct supine_stream_frames {
   const supine_basis_info *info;
   char device[21];
   bool ras;
-  uint64_t number;
-  uint32_t *strips;    /* big-endian: the number of corners of each triangle strip, its corners */
+  uint64_t number;     /* of the newest frame */
+  uint32_t *strips;    /* big-endian, for each triangle strip: number of corners, then corners */
   size_t strips_size;  /* bytes */
   size_t strips_count; /* number of strips */
   uint64_t strips_crc;
-  uint64_t strips_power, points_power; /* supine_stream_crc64_power of their sizes */
-  supine_stream_frame *unused;         /* list of frames without users */
+  uint64_t strips_power,
+      points_power;            /* supine_stream_crc64_power of the sizes of strips and points */
+  supine_stream_frame *unused; /* list of frames without users */
 };
 
-const char *const supine_stream_what_names[] = {"weights", "points", "surface", "nothing", NULL};
+const char *const supine_stream_content_names[] = {"weights", "points", "surface", "nothing", NULL};
 
-/* Make strips of the triangles. Corners i, i + 1, i + 2 of a strip are a triangle, of the opposite
- * orientation where i is odd, or two of them are equal. */
+/* Convert the triangles to strips. Corners i, i + 1, i + 2 of a strip are a triangle, reversed if i
+ * is odd, or a degenerate one that joins two triangles. */
 static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
   static const uint32_t restart = UINT32_MAX; /* separates strips */
   const size_t corners = 3 * f->info->triangle_count;
@@ -81,8 +82,8 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
   f->points_power = supine_stream_crc64_power(12 * f->info->vertex_count);
-  /* Compute the strips now: at the first request of a surface, their 0.1 s for a million triangles
-   * would delay every peer. */
+  /* Compute the strips now: it takes 0.1 s for a million triangles, a delay for every peer if done
+   * at the first request for a surface. */
   const supine_status status = make_strips(f, error);
   if (status != SUPINE_OK) {
     supine_stream_frames_destroy(f);
@@ -109,8 +110,8 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
   free(frames);
 }
 
-supine_stream_frame *supine_stream_frame_take(supine_stream_frames *frames,
-                                              const supine_stream_moment *moment) {
+supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
+                                                 const supine_stream_snapshot *snapshot) {
   supine_stream_frame *frame = frames->unused;
   if (frame != NULL) {
     frames->unused = frame->next;
@@ -122,21 +123,21 @@ supine_stream_frame *supine_stream_frame_take(supine_stream_frames *frames,
   }
   frame->users = 1;
   frame->number = ++frames->number;
-  frame->moment = *moment;
+  frame->snapshot = *snapshot;
   frame->points_crc = 0;
   frame->next = NULL;
   return frame;
 }
 
-void supine_stream_frame_leave(supine_stream_frames *frames, supine_stream_frame *frame) {
+void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_frame *frame) {
   if (frame != NULL && --frame->users == 0) {
-    frame->placed = false;
+    frame->has_points = false;
     frame->next = frames->unused;
     frames->unused = frame;
   }
 }
 
-/* Write points, in RAS where that is wanted; xyz is overwritten. */
+/* Write points as sent, in RAS if the frames are in RAS; xyz is overwritten. */
 static void put_points(const supine_stream_frames *f, size_t count, float *xyz,
                        unsigned char *bytes) {
   for (size_t i = 0; f->ras && i < count; ++i) {
@@ -146,10 +147,10 @@ static void put_points(const supine_stream_frames *f, size_t count, float *xyz,
   supine_stream_put_floats(3 * count, xyz, bytes);
 }
 
-/* Compute positions and expected errors of lungs located from observed points. Where that fails,
- * clear the location: the caller then computes the positions of the pose. Return false where memory
- * is short. */
-static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
+/* Compute positions and expected errors of lungs located from observed points. If that fails, clear
+ * the location: the caller then computes the positions of the pose. Return false if out of memory.
+ */
+static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *xyz = malloc(3 * count * sizeof *xyz + 1);
   float *sigma = malloc(count * sizeof *sigma + 1);
@@ -158,43 +159,43 @@ static bool place_located(supine_stream_frames *f, supine_stream_frame *frame) {
   }
   const bool good = xyz != NULL && sigma != NULL && frame->errors != NULL;
   if (good &&
-      supine_locate_positions(frame->moment.location, f->basis, xyz, sigma, NULL) == SUPINE_OK) {
+      supine_locate_positions(frame->snapshot.location, f->basis, xyz, sigma, NULL) == SUPINE_OK) {
     put_points(f, count, xyz, frame->points);
     const size_t head = supine_stream_attribute_head(count, frame->errors);
     supine_stream_put_floats(count, sigma, frame->errors + head);
     frame->points_crc = supine_stream_crc64(0, frame->points, 12 * count);
-    frame->placed = true;
+    frame->has_points = true;
   } else {
-    frame->moment.location = NULL;
+    frame->snapshot.location = NULL;
   }
   free(xyz);
   free(sigma);
   return good;
 }
 
-/* Checksum and size of the part of the points that each thread computes. */
-typedef struct placing {
+/* Work of the threads that compute points: each writes the checksum and size of its part. */
+typedef struct points_work {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
   uint64_t crc[THREADS_MAX];
-  size_t size[THREADS_MAX]; /* bytes of the part; 0 after the last */
-} placing;
+  size_t size[THREADS_MAX]; /* bytes; 0 after the last part */
+} points_work;
 
-static void place_range(void *context, size_t begin, size_t end, size_t thread) {
-  placing *p = context;
+static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
+  points_work *p = context;
   _Alignas(64) float xyz[3 * PIECE];
   p->size[thread] = 12 * (end - begin);
   for (; begin < end; begin += PIECE) {
     const size_t next = begin + PIECE < end ? begin + PIECE : end;
     unsigned char *bytes = p->frame->points + 12 * begin;
-    supine_deform_range(p->frames->basis, &p->frame->moment.pose, begin, next, xyz);
+    supine_deform_range(p->frames->basis, &p->frame->snapshot.pose, begin, next, xyz);
     put_points(p->frames, next - begin, xyz, bytes);
     p->crc[thread] = supine_stream_crc64(p->crc[thread], bytes, 12 * (next - begin));
   }
 }
 
-/* Compute the points of a frame, once for all peers; false where memory is short. */
-static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
+/* Compute the points of a frame, once for all peers; return false if out of memory. */
+static bool compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   if (frame->points == NULL) {
     frame->points = aligned_alloc(64, (12 * count + 64) / 64 * 64); /* padded for 64-byte stores */
@@ -202,78 +203,78 @@ static bool place_points(supine_stream_frames *f, supine_stream_frame *frame) {
       return false;
     }
   }
-  if (frame->moment.location != NULL && !frame->placed && !place_located(f, frame)) {
+  if (frame->snapshot.location != NULL && !frame->has_points && !compute_located_points(f, frame)) {
     return false;
   }
-  if (!frame->placed) {
-    placing p = {.frames = f, .frame = frame};
-    supine_parallel_for(count, GRAIN, 0, place_range, &p);
+  if (!frame->has_points) {
+    points_work p = {.frames = f, .frame = frame};
+    supine_parallel_for(count, GRAIN, 0, compute_range, &p);
     for (size_t t = 0; t < THREADS_MAX && p.size[t] > 0; ++t) {
       frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t],
                                                    supine_stream_crc64_power(p.size[t]));
     }
-    frame->placed = true;
+    frame->has_points = true;
   }
   return true;
 }
 
-/* Write weights and gains as an array of floats; return its size in bytes. */
-static size_t put_weights(const supine_stream_frames *f, const supine_stream_moment *moment,
+/* Write the NDARRAY of weights and gains; return its size in bytes. */
+static size_t put_weights(const supine_stream_frames *f, const supine_stream_snapshot *snapshot,
                           unsigned char *bytes) {
   const size_t modes = f->info->mode_count;
   const size_t count = modes + 3 * f->info->lung_count;
   const size_t head = supine_stream_ndarray_head(count, bytes);
   float values[SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX];
   for (size_t i = 0; i < count; ++i) {
-    values[i] = (float)(i < modes ? moment->pose.weights[i]
-                                  : moment->pose.gains[(i - modes) / 3][(i - modes) % 3]);
+    values[i] = (float)(i < modes ? snapshot->pose.weights[i]
+                                  : snapshot->pose.gains[(i - modes) / 3][(i - modes) % 3]);
   }
   supine_stream_put_floats(count, values, bytes + head);
   return head + 4 * count;
 }
 
-static void add_piece(supine_stream_parcel *parcel, void *bytes, size_t size) {
-  parcel->piece[parcel->count++] = (struct iovec){bytes, size};
-  parcel->size += size;
+static void add_piece(supine_stream_packet *packet, void *bytes, size_t size) {
+  packet->piece[packet->count++] = (struct iovec){bytes, size};
+  packet->size += size;
 }
 
-bool supine_stream_frame_wrap(supine_stream_frames *frames, supine_stream_frame *frame,
-                              supine_stream_what what, bool triangles,
-                              supine_stream_parcel *parcel) {
-  const bool weights = what == SUPINE_STREAM_WEIGHTS;
-  if (!weights && !place_points(frames, frame)) {
+bool supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
+                              supine_stream_content content, bool triangles,
+                              supine_stream_packet *packet) {
+  const bool weights = content == SUPINE_STREAM_WEIGHTS;
+  if (!weights && !compute_points(frames, frame)) {
     return false;
   }
-  const bool located = !weights && frame->moment.location != NULL;
-  unsigned char *body = parcel->front + SUPINE_STREAM_HEADER;
-  const size_t size = weights ? put_weights(frames, &frame->moment, body)
+  const bool located = !weights && frame->snapshot.location != NULL;
+  unsigned char *body = packet->front + SUPINE_STREAM_HEADER;
+  const size_t size = weights ? put_weights(frames, &frame->snapshot, body)
                               : supine_stream_polydata_head(frames->info->vertex_count,
                                                             triangles ? frames->strips_count : 0,
                                                             triangles ? frames->strips_size : 0,
                                                             located ? 1 : 0, body);
-  parcel->first = parcel->count = 0;
-  parcel->size = 0;
-  add_piece(parcel, parcel->front, SUPINE_STREAM_HEADER + size);
+  packet->first = packet->count = 0;
+  packet->size = 0;
+  add_piece(packet, packet->front, SUPINE_STREAM_HEADER + size);
   uint64_t crc = supine_stream_crc64(0, body, size);
   if (!weights) {
-    add_piece(parcel, frame->points, 12 * frames->info->vertex_count);
+    add_piece(packet, frame->points, 12 * frames->info->vertex_count);
     crc = supine_stream_crc64_join(crc, frame->points_crc, frames->points_power);
   }
   if (!weights && triangles) {
-    add_piece(parcel, frames->strips, frames->strips_size);
+    add_piece(packet, frames->strips, frames->strips_size);
     crc = supine_stream_crc64_join(crc, frames->strips_crc, frames->strips_power);
   }
   if (located) {
     const size_t bytes = SUPINE_STREAM_ATTRIBUTE + 4 * frames->info->vertex_count;
-    add_piece(parcel, frame->errors, bytes);
+    add_piece(packet, frame->errors, bytes);
     crc = supine_stream_crc64(crc, frame->errors, bytes);
   }
   supine_stream_header header = {.version = 1,
-                                 .stamp = frame->moment.stamp,
-                                 .size = parcel->size - SUPINE_STREAM_HEADER,
+                                 .stamp = frame->snapshot.stamp,
+                                 .size = packet->size - SUPINE_STREAM_HEADER,
                                  .crc = crc};
   (void)snprintf(header.type, sizeof header.type, "%s", weights ? "NDARRAY" : "POLYDATA");
   memcpy(header.device, frames->device, sizeof header.device);
-  supine_stream_header_write(&header, parcel->front);
+  supine_stream_header_write(&header, packet->front);
   return true;
 }

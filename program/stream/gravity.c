@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the direction of gravity in the body from the pose of a tracker. */
+/* Compute the direction of gravity in body axes from the pose of a tracker. */
 #include <math.h>
 #include <string.h>
 
@@ -8,10 +8,10 @@
 #include "program/options/breath_frames.h"
 #include "program/stream/gravity.h"
 
-/* Largest deviation from a rotation that is accepted without a warning: 32-bit floats cause 1e-6,
- * trackers' own arithmetic up to about 1e-4. */
+/* Largest deviation from a rotation that counts as exact: 32-bit floats cause 1e-6, the arithmetic
+ * of trackers up to about 1e-4. */
 static const double slack = 1e-3;
-static const double uneven_max = 0.1; /* largest stretch that is repaired */
+static const double uneven_max = 0.1; /* largest deviation that is repaired, after scaling */
 
 supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -42,12 +42,12 @@ static void apply_transpose(const double m[9], const double v[3], double out[3])
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why) {
-  double product[9]; /* M^T M, a multiple of 1 for a rotation of any scale */
+  double product[9]; /* M^T M: the square of the scale times 1 for a scaled rotation */
   for (int i = 0; i < 3; ++i) {
     const double column[3] = {rotation[i], rotation[3 + i], rotation[6 + i]};
     apply_transpose(rotation, column, product + 3 * i);
   }
-  const double square = (product[0] + product[4] + product[8]) / 3.0; /* of the scale */
+  const double square = (product[0] + product[4] + product[8]) / 3.0; /* square of the scale */
   *why = "its matrix is zero or not finite; send a rotation";
   if (!(square > 1e-12) || !isfinite(square)) {
     return SUPINE_STREAM_REFUSED;
@@ -64,9 +64,9 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
   if (supine_triple(rotation, rotation + 3, rotation + 6) < 0.0) {
     return SUPINE_STREAM_REFUSED;
   }
-  double falls[3];
-  apply_transpose(rotation, setup->down, falls);
-  const supine_stream_verdict verdict = supine_stream_gravity_down(setup, falls, gravity, why);
+  double down[3]; /* in the tracker's axes */
+  apply_transpose(rotation, setup->down, down);
+  const supine_stream_verdict verdict = supine_stream_gravity_down(setup, down, gravity, why);
   if (verdict != SUPINE_STREAM_EXACT || (uneven <= slack && fabs(sqrt(square) - 1.0) <= slack)) {
     return verdict;
   }
@@ -78,7 +78,7 @@ supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why) {
   double rotation[9];
-  double square = 0.0; /* of its length */
+  double square = 0.0; /* of the quaternion's length */
   for (int i = 0; i < 4; ++i) {
     square += quaternion[i] * quaternion[i];
   }

@@ -92,17 +92,17 @@ SUPINE_CLONES void supine_stream_put_floats(size_t count, const float *values,
 
 /* --- reading ---------------------------------------------------------------------------------- */
 
-/* The unread part of a body. Reading beyond its end returns zeros and sets `short_of`. */
+/* The unread part of a body. Reading beyond its end returns zeros and sets `overrun`. */
 typedef struct cursor {
   const unsigned char *at;
   size_t left;
-  int short_of;
+  int overrun;
 } cursor;
 
 static const unsigned char *pass(cursor *c, size_t size) {
   static const unsigned char nothing[32];
   if (size > c->left) {
-    c->short_of = 1;
+    c->overrun = 1;
     c->left = 0;
     return nothing;
   }
@@ -140,7 +140,7 @@ static void quaternion(cursor *c, supine_stream_message *m) {
 }
 
 static void transform(cursor *c, const char *device, int ours, supine_stream_message *m) {
-  m->kind = ours ? SUPINE_STREAM_ROTATION : SUPINE_STREAM_PLACE;
+  m->kind = ours ? SUPINE_STREAM_ROTATION : SUPINE_STREAM_POSITION;
   memcpy(m->text, device, strlen(device) + 1);
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) {
@@ -156,10 +156,10 @@ static void transform(cursor *c, const char *device, int ours, supine_stream_mes
 enum { POINT_NAME = 64, POINT_PLACE = 100, POINT_SIZE = 136 };
 
 static void points(cursor *c, supine_stream_message *m) {
-  m->kind = SUPINE_STREAM_PLACES;
+  m->kind = SUPINE_STREAM_POINT_LIST;
   m->point_count = c->left / POINT_SIZE;
   m->points = pass(c, m->point_count * POINT_SIZE);
-  c->short_of |= c->left > 0;
+  c->overrun |= c->left > 0;
 }
 
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
@@ -173,12 +173,12 @@ void supine_stream_message_point(const supine_stream_message *message, size_t po
   }
 }
 
-/* Read the quaternion of the instrument `device`, or of any where the message itself is of that
- * device; the last where there are several. */
+/* Read the quaternion of the instrument `device`; if `device` is NULL or the sender of the message,
+ * that of the last instrument. */
 static void instruments(cursor *c, const char *device, const supine_stream_header *header,
                         supine_stream_message *m) {
   const int all = device == NULL || strcmp(header->device, device) == 0;
-  while (c->left != 0 && c->short_of == 0) {
+  while (c->left != 0 && c->overrun == 0) {
     char name[21] = {0};
     memcpy(name, pass(c, 20), 20);
     (void)pass(c, 2 + 12); /* type, reserved, position */
@@ -190,7 +190,7 @@ static void instruments(cursor *c, const char *device, const supine_stream_heade
   }
 }
 
-/* Read an array of `expected` numbers, and ignore any other. */
+/* Read an array of `expected` floats; ignore arrays of another length or type. */
 static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, uint64_t expected) {
   const uint64_t type = whole(c, 1);
   const uint64_t dimension = whole(c, 1);
@@ -209,10 +209,10 @@ static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, 
 }
 
 static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind) {
-  (void)pass(c, 2); /* encoding: ASCII words are the same in all */
+  (void)pass(c, 2); /* encoding: valid text is ASCII, which is the same in all */
   const size_t length = (size_t)whole(c, 2);
   const unsigned char *text = pass(c, length);
-  if (c->short_of == 0 && length < sizeof m->text) {
+  if (c->overrun == 0 && length < sizeof m->text) {
     memcpy(m->text, text, length);
     m->kind = kind;
   }
@@ -230,17 +230,17 @@ static int type_of(const supine_stream_header *header) {
   return type;
 }
 
-int supine_stream_message_wanted(const supine_stream_header *header) {
+int supine_stream_message_is_known(const supine_stream_header *header) {
   return type_of(header) != TYPES;
 }
 
-/* Remove extension and metadata from a body of version 2; return 0 where their sizes are wrong. */
+/* Remove extension and metadata from a body of version 2; return 0 if their sizes are wrong. */
 static int unwrap(cursor *c) {
   const size_t all = c->left;
   const uint64_t extension = whole(c, 2);
   const uint64_t metadata = whole(c, 2) + whole(c, 4);
   (void)pass(c, 4);
-  if (c->short_of != 0 || extension < SUPINE_STREAM_EXTENSION || extension + metadata > all) {
+  if (c->overrun != 0 || extension < SUPINE_STREAM_EXTENSION || extension + metadata > all) {
     return 0;
   }
   (void)pass(c, (size_t)extension - SUPINE_STREAM_EXTENSION);
@@ -254,13 +254,15 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
   *message = (supine_stream_message){0};
   const size_t size = (size_t)header->size;
   if (supine_stream_crc64(0, body, size) != header->crc) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: the checksum is wrong", header->type);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: the checksum is wrong: send it again",
+                            header->type);
   }
   cursor c = {body, size, 0};
   if (header->version == 2 && !unwrap(&c)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the sizes of extension and metadata do not match that of the body",
-                            header->type);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: the sizes of extension and metadata exceed the body: correct the sender",
+        header->type);
   }
   const int type = type_of(header);
   const int ours = device == NULL || strcmp(header->device, device) == 0;
@@ -283,11 +285,12 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
   } else if (type == NDARRAY && ours) {
     array(&c, message, SUPINE_STREAM_DOWN, 3);
   }
-  if (c.short_of != 0) {
+  if (c.overrun != 0) {
     message->kind = SUPINE_STREAM_NOTHING;
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: a body of size %zu is too short for its content", header->type,
-                            size);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: a body of size %zu is too short for its content: correct the sender", header->type,
+        size);
   }
   return SUPINE_OK;
 }

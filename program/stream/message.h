@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Read OpenIGTLink messages from untrusted bytes, and write them. Fields, with their sizes in
- * bytes:
+ * bytes, big-endian:
  *
- *     header 58   version 2, type 12, device 20, time 8, body's size 8, body's CRC 8; big-endian
+ *     header      58: version 2, type 12, device 20, time 8, body size 8, body CRC 8
  *     body        version 1: content. Version 2: extension, content, metadata
- *     extension   its size 2 (>= 12), metadata index's size 2, metadata's size 4, message number 4
+ *     extension   12 or more: its size 2, metadata index size 2, metadata size 4, message number 4
  *
- * The extension is as the protocol's public library sends it, which differs from the text of the
- * protocol. Lengths in messages are checked against the bytes received before anything is read; the
- * library's own unpackers do not check them. */
+ * The extension has the layout that the protocol's public library sends, not that of the protocol's
+ * text. Lengths in messages are checked against the bytes received before anything is read. */
 #ifndef SUPINE_STREAM_MESSAGE_H
 #define SUPINE_STREAM_MESSAGE_H
 
@@ -21,7 +20,7 @@
 enum {
   SUPINE_STREAM_HEADER = 58,
   SUPINE_STREAM_EXTENSION = 12,
-  SUPINE_STREAM_BODY_MAX = 65536 /* of messages that are read: poses, volumes, requests */
+  SUPINE_STREAM_BODY_MAX = 65536 /* largest body that is read; larger ones are skipped */
 };
 
 typedef struct supine_stream_header {
@@ -34,8 +33,8 @@ typedef struct supine_stream_header {
 } supine_stream_header;
 
 /** Read a header.
- * @retval SUPINE_ERROR_FORMAT  not version 1 or 2, or a type that is not text: the messages that
- *                              follow cannot be found */
+ * @retval SUPINE_ERROR_FORMAT  not version 1 or 2, or a type that is not text; no message can be
+ *                              read after this one */
 supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_HEADER],
                                         supine_stream_header *header, supine_error *error);
 void supine_stream_header_write(const supine_stream_header *header,
@@ -46,50 +45,56 @@ typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< ignored: another type or device */
   SUPINE_STREAM_ROTATION,    /**< number [9]: rows of the matrix from tracker to world axes, then
                                   [3]: position, mm; text: device */
-  SUPINE_STREAM_PLACE,       /**< as ROTATION, of another device than the one followed */
-  SUPINE_STREAM_PLACES,      /**< points: supine_stream_message_point */
+  SUPINE_STREAM_POSITION,    /**< number and text as ROTATION, of a device that is not followed */
+  SUPINE_STREAM_POINT_LIST,  /**< points: supine_stream_message_point */
   SUPINE_STREAM_QUATERNION,  /**< number [4]: the rotation as W, X, Y, Z */
   SUPINE_STREAM_DOWN,        /**< number [3]: direction of gravity in the tracker's axes */
   SUPINE_STREAM_VOLUME,      /**< number [1]: mL above the posture's rest */
   SUPINE_STREAM_VOLUME_TEXT, /**< text: a volume as the command line takes it */
-  SUPINE_STREAM_REQUEST      /**< text: what to send to this peer */
+  SUPINE_STREAM_REQUEST      /**< text: content that the peer wants to receive */
 } supine_stream_kind;
 
 typedef struct supine_stream_message {
   supine_stream_kind kind;
   double number[12];
   char text[64];
-  const unsigned char *points; /**< [point_count] in the body */
+  const unsigned char *points; /**< [point_count] encoded points, inside the body */
   size_t point_count;
 } supine_stream_message;
 
-/** Read the name and position, mm, of a point of PLACES. The body must still exist. */
+/** Read the name and the position, mm, of a point of a POINT_LIST. The body must still exist. */
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]);
 
-/** Return whether the type of a message is one of those that supine_stream_message_read reads. */
-int supine_stream_message_wanted(const supine_stream_header *header);
+/** Return whether supine_stream_message_read reads messages of this type. */
+int supine_stream_message_is_known(const supine_stream_header *header);
 
-/** Read a body: TRANSFORM, QTDATA, POSITION, POINT; NDARRAY [3] (the direction of gravity), all of
- * device `device`
- * (QTDATA: of that instrument; TRANSFORM and POINT also of other devices, as places); NDARRAY [1]
- * and STRING of device "VOLUME"; STRING of device "SEND". Numbers may be not-a-number.
- * @param device  NULL: any
+/** Read a body. Numbers may be not-a-number.
+ *
+ *     from `device`        POSITION, TRANSFORM, NDARRAY [3] (direction of gravity)
+ *     instrument `device`  QTDATA
+ *     any device           TRANSFORM and POINT: positions of observed points
+ *     "VOLUME"             NDARRAY [1], STRING
+ *     "SEND"               STRING
+ *
+ * @param device  device whose poses are followed; NULL: any
  * @retval SUPINE_ERROR_FORMAT  a wrong CRC, or lengths that contradict each other */
 supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
                                          supine_stream_message *message, supine_error *error);
 
-/** Write the beginning of an NDARRAY of `count` 32-bit floats; return its size, 4. */
+/** Write the beginning of an NDARRAY of `count` 32-bit floats; return the size of the beginning, 4
+ * bytes. */
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 
-/** Write the beginning of a POLYDATA of points and `size` bytes of triangle strips; return its
- * size, 40.
- * @param attributes  1: a number per point follows the triangles; else 0 */
+/** Write the beginning of a POLYDATA; return the size of the beginning, 40 bytes.
+ * @param size        of the triangle strips, bytes
+ * @param attributes  1: an attribute follows the triangles; else 0 */
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes);
 
-/** Write the beginning of that attribute, "expected_error_mm"; return its size, 24. */
+/** Write the beginning of the attribute "expected_error_mm", one float for each point; return the
+ * size of the beginning, SUPINE_STREAM_ATTRIBUTE bytes. */
 enum { SUPINE_STREAM_ATTRIBUTE = 24 };
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 
@@ -100,12 +105,12 @@ void supine_stream_put_floats(size_t count, const float *values, unsigned char *
  *
  *     crc(M) = M(x) x^64 mod P,     P = x^64 + 0x42F0E1EBA9EA3693
  *
- * It is linear, so that the checksums of two parts give that of the whole. */
+ * It is linear: the checksums of two parts give the checksum of the whole. */
 
-/** Continue from `crc` (0 at first) over more bytes. Thread-safe. */
+/** Continue the checksum `crc` (0 for the first bytes) over more bytes. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
 
-/** Compute x^(8 size) mod P, by which `size` further bytes multiply a checksum. */
+/** Compute x^(8 size) mod P, the factor of a checksum when `size` bytes follow. */
 uint64_t supine_stream_crc64_power(size_t size);
 
 /** Join checksums: crc(A B) = crc(A) x^(8 |B|) + crc(B).

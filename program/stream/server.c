@@ -16,10 +16,10 @@
 #include "sh/base/clock.h"
 
 /* Intervals, s. */
-static const double frame_time = 15e-3; /* between frames while the lungs move without new poses */
-static const double retry_time = 20e-3; /* until a socket that still holds a frame is tried again */
-static const double again_time = 1.0;   /* until connecting or accepting is tried again */
-static const double asked_time = 0.1;   /* between checks whether to stop */
+static const double frame_interval = 15e-3; /* between frames while the lungs move without poses */
+static const double send_interval = 20e-3;  /* between checks whether a socket's queue is empty */
+static const double connect_interval = 1.0; /* between attempts to connect or accept */
+static const double stop_interval = 0.1;    /* between checks whether to stop */
 
 struct supine_stream_server {
   const supine_stream_options *options;
@@ -27,36 +27,36 @@ struct supine_stream_server {
   supine_stream_patient patient;
   supine_stream_frames *frames;
   supine_stream_frame *latest;
-  double framed; /* s of the clock, when `latest` was made */
-  int listener;  /* -1: none */
+  double frame_time; /* when `latest` was made, s of the clock */
+  int listener;      /* -1: none */
   int port;
   supine_stream_address target;
-  double connect_at; /* when to connect next, s of the clock; INFINITY: not */
-  double accept_at;  /* when to accept peers again, s of the clock */
-  supine_stream_peer *connected;
+  double connect_at;              /* when to connect next, s of the clock; INFINITY: never */
+  double accept_at;               /* when to accept peers again, s of the clock */
+  supine_stream_peer *connected;  /* peer of --connect; NULL: none */
   supine_stream_peer *peer;       /* [options->peers] */
   struct pollfd *polled;          /* [peers + 2] */
-  supine_stream_peer **owner;     /* [peers + 2] of each polled socket; NULL: none */
-  size_t replayed;                /* number of recorded poses taken so far */
-  double replay_begun;            /* s of the clock; < 0: not yet */
+  supine_stream_peer **owner;     /* [peers + 2] peer of each polled socket; NULL: none */
+  size_t replayed;                /* number of recorded poses followed so far */
+  double replay_begun;            /* when the replay began, s of the clock; < 0: not yet */
   double waited;                  /* when poll() was last called, s of the clock */
-  double woke;                    /* when it returned, s of the clock */
-  supine_stream_latency *latency; /* [2] of weights, of surfaces */
+  double woke;                    /* when poll() last returned, s of the clock */
+  supine_stream_latency *latency; /* [2] of weights, of POLYDATA */
 };
 
-static bool lagging(const supine_stream_server *s, const supine_stream_peer *peer) {
+/* Return whether the newest frame is to be sent to a peer. */
+static bool needs_frame(const supine_stream_server *s, const supine_stream_peer *peer) {
   return peer->socket >= 0 && !peer->connecting && peer->frame == NULL &&
-         peer->what != SUPINE_STREAM_SILENCE && s->latest != NULL &&
-         peer->begun != s->latest->number;
+         peer->content != SUPINE_STREAM_SILENCE && s->latest != NULL &&
+         peer->last_frame != s->latest->number;
 }
 
 static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (peer == s->connected) {
     s->connected = NULL;
-    s->connect_at = s->woke + again_time;
+    s->connect_at = s->woke + connect_interval;
   }
   supine_stream_peer_end(peer, s->frames);
-  --s->counts.present;
 }
 
 /* Find a slot for a socket; where none is free, close the socket and return NULL. */
@@ -64,18 +64,17 @@ static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool 
   supine_error error;
   for (size_t i = 0; i < s->options->peers; ++i) {
     supine_stream_peer *peer = &s->peer[i];
-    if (peer->socket < 0 && supine_stream_peer_begin(peer, socket, connecting, s->options->what,
+    if (peer->socket < 0 && supine_stream_peer_begin(peer, socket, connecting, s->options->content,
                                                      s->woke, &error) == SUPINE_OK) {
-      ++s->counts.present;
       s->counts.peers += connecting ? 0 : 1;
       return peer;
     }
   }
   (void)close(socket);
   ++s->counts.turned_away;
-  supine_stream_patient_warn(&s->patient, s->woke,
-                             "a peer is turned away: %zu is the most; raise --peers",
-                             s->options->peers);
+  supine_stream_patient_warn(
+      &s->patient, s->woke,
+      "a peer is refused: the number of peers is limited to %zu; raise --peers", s->options->peers);
   return NULL;
 }
 
@@ -84,7 +83,7 @@ static void accept_peers(supine_stream_server *s) {
     const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket < 0) {
       if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
-        s->accept_at = s->woke + again_time; /* no descriptor is free, for example: wait */
+        s->accept_at = s->woke + connect_interval; /* no descriptor is free, for example: wait */
       }
       return;
     }
@@ -95,7 +94,7 @@ static void accept_peers(supine_stream_server *s) {
 static void connect_peer(supine_stream_server *s) {
   const int socket = supine_stream_address_connect(&s->target);
   s->connected = socket < 0 ? NULL : begin_peer(s, socket, true);
-  s->connect_at = s->connected == NULL ? s->woke + again_time : (double)INFINITY;
+  s->connect_at = s->connected == NULL ? s->woke + connect_interval : (double)INFINITY;
 }
 
 /* Handle a connecting socket that became writable: it is connected, or it failed. */
@@ -111,11 +110,11 @@ static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
 }
 
 static void take_request(supine_stream_server *s, supine_stream_peer *peer, const char *text) {
-  for (int what = 0; what < SUPINE_STREAM_WHAT_COUNT; ++what) {
-    if (strcmp(text, supine_stream_what_names[what]) == 0) {
-      peer->what = (supine_stream_what)what;
+  for (int what = 0; what < SUPINE_STREAM_CONTENT_COUNT; ++what) {
+    if (strcmp(text, supine_stream_content_names[what]) == 0) {
+      peer->content = (supine_stream_content)what;
       peer->knows_triangles = false;
-      peer->begun = 0;
+      peer->last_frame = 0;
       return;
     }
   }
@@ -137,9 +136,9 @@ static void receive(void *context, supine_stream_peer *peer) {
     take_request(s, peer, message.text);
     return;
   }
-  /* Where poll() did not wait, the message may have been there since the socket was last empty. */
+  /* If poll() did not wait, the message may have arrived at any time since the socket was empty. */
   const bool waited = s->woke - s->waited > 50e-6;
-  supine_stream_patient_receive(&s->patient, &message, waited ? s->woke : peer->heard,
+  supine_stream_patient_receive(&s->patient, &message, waited ? s->woke : peer->emptied,
                                 peer->header.stamp);
 }
 
@@ -149,7 +148,7 @@ static void read_peer(supine_stream_server *s, supine_stream_peer *peer) {
       SUPINE_STREAM_LOST) {
     if (error.status != SUPINE_OK) {
       ++s->counts.lost;
-      supine_stream_patient_warn(&s->patient, s->woke, "a peer is lost: %s", error.message);
+      supine_stream_patient_warn(&s->patient, s->woke, "a peer is disconnected: %s", error.message);
     }
     end_peer(s, peer);
   }
@@ -173,33 +172,33 @@ static void replay_poses(supine_stream_server *s) {
   }
 }
 
-/* Return the time of the next frame; INFINITY where nothing moves. */
+/* Return when to make the next frame, s of the clock; INFINITY if the lungs do not move. */
 static double frame_due(const supine_stream_server *s) {
-  const double soonest = s->latest == NULL ? 0.0 : s->framed + 1.0 / s->options->rate;
-  if (s->patient.fresh || s->latest == NULL) {
+  const double soonest = s->latest == NULL ? 0.0 : s->frame_time + 1.0 / s->options->rate;
+  if (s->patient.pending || s->latest == NULL) {
     return soonest;
   }
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* While poses are received at this rate, they trigger the frames. */
-  const bool posed = s->woke - s->patient.received < 2.0 * frame_time;
-  return fmax(soonest, s->framed + (posed ? 2.0 : 1.0) * frame_time);
+  /* While poses arrive at this rate, they trigger the frames. */
+  const bool driven = s->woke - s->patient.received < 2.0 * frame_interval;
+  return fmax(soonest, s->frame_time + (driven ? 2.0 : 1.0) * frame_interval);
 }
 
 static bool make_frame(supine_stream_server *s) {
-  supine_stream_moment moment;
-  supine_stream_patient_moment(&s->patient, s->woke, &moment);
-  supine_stream_frame *frame = supine_stream_frame_take(s->frames, &moment);
+  supine_stream_snapshot snapshot;
+  supine_stream_patient_snapshot(&s->patient, s->woke, &snapshot);
+  supine_stream_frame *frame = supine_stream_frame_acquire(s->frames, &snapshot);
   if (frame == NULL) {
     return false;
   }
-  supine_stream_frame_leave(s->frames, s->latest);
+  supine_stream_frame_release(s->frames, s->latest);
   s->latest = frame;
-  s->framed = s->woke;
+  s->frame_time = s->woke;
   ++s->counts.frames;
   if (s->options->web != NULL) {
-    supine_stream_web_send(s->options->web, &moment);
+    supine_stream_web_send(s->options->web, &snapshot);
   }
   return true;
 }
@@ -211,7 +210,7 @@ static void add_latency(supine_stream_latency *latency, double seconds) {
   latency->worst = fmax(latency->worst, seconds);
 }
 
-double supine_stream_latency_share(const supine_stream_latency *latency, double share) {
+double supine_stream_latency_quantile(const supine_stream_latency *latency, double share) {
   const double wanted = ceil(share * (double)latency->count);
   double passed = 0.0;
   for (size_t i = 0; i + 1 < SUPINE_STREAM_LATENCY_BINS; ++i) {
@@ -223,9 +222,10 @@ double supine_stream_latency_share(const supine_stream_latency *latency, double 
   return latency->worst;
 }
 
-/* Send a peer the newest frame where it is ready, or the rest of an older one. */
+/* Send a peer the rest of its frame, or the newest frame if it is ready; return false if out of
+ * memory. */
 static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
-  if (lagging(s, peer) && supine_stream_peer_ready(peer) &&
+  if (needs_frame(s, peer) && supine_stream_peer_ready(peer) &&
       !supine_stream_peer_give(peer, s->frames, s->latest)) {
     return false;
   }
@@ -236,13 +236,13 @@ static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (outcome == SUPINE_STREAM_LOST) {
     end_peer(s, peer);
   } else if (outcome == SUPINE_STREAM_DONE) {
-    const double received = peer->frame->moment.received;
+    const double received = peer->frame->snapshot.received;
     if (received >= 0.0) {
-      add_latency(&s->latency[peer->what != SUPINE_STREAM_WEIGHTS],
+      add_latency(&s->latency[peer->content != SUPINE_STREAM_WEIGHTS],
                   supine_clock_seconds() - received);
     }
     ++s->counts.sent;
-    supine_stream_frame_leave(s->frames, peer->frame);
+    supine_stream_frame_release(s->frames, peer->frame);
     peer->frame = NULL;
   }
   return true;
@@ -253,7 +253,7 @@ static bool send_peers(supine_stream_server *s) {
     for (size_t i = 0; i < s->options->peers; ++i) {
       supine_stream_peer *peer = &s->peer[i];
       const bool surface =
-          peer->what == SUPINE_STREAM_SURFACE || peer->what == SUPINE_STREAM_POINTS;
+          peer->content == SUPINE_STREAM_SURFACE || peer->content == SUPINE_STREAM_POINTS;
       if (peer->socket >= 0 && surface == (surfaces == 1) && !send_peer(s, peer)) {
         return false;
       }
@@ -262,19 +262,19 @@ static bool send_peers(supine_stream_server *s) {
   return true;
 }
 
-/* Compute the timeout of poll. */
+/* Compute the timeout of ppoll(). */
 static struct timespec find_timeout(const supine_stream_server *s, double end) {
   const supine_stream_poses *poses = s->options->replay;
-  double next = fmin(fmin(s->woke + asked_time, end), fmin(s->connect_at, frame_due(s)));
+  double next = fmin(fmin(s->woke + stop_interval, end), fmin(s->connect_at, frame_due(s)));
   if (poses != NULL && s->replay_begun >= 0.0 && s->replayed < poses->count) {
     next = fmin(next, s->replay_begun + poses->pose[s->replayed].seconds);
   }
   for (size_t i = 0; i < s->options->peers; ++i) {
-    if (lagging(s, &s->peer[i])) {
-      next = fmin(next, s->woke + retry_time);
+    if (needs_frame(s, &s->peer[i])) {
+      next = fmin(next, s->woke + send_interval);
     }
   }
-  const double left = fmax(0.0, next - supine_clock_seconds()); /* at most asked_time, below 1 s */
+  const double left = fmax(0.0, next - supine_clock_seconds()); /* stop_interval at most */
   return (struct timespec){0, (long)(1e9 * left)};
 }
 
@@ -299,7 +299,8 @@ static nfds_t gather(supine_stream_server *s) {
   return count;
 }
 
-static void listen_round(supine_stream_server *s, nfds_t count) {
+/* Read from all sockets that poll() reported, and follow due poses of a replay. */
+static void receive_all(supine_stream_server *s, nfds_t count) {
   for (nfds_t i = 0; i + 2 < count; ++i) {
     if (s->polled[i].revents != 0) {
       if (s->owner[i]->connecting) {
@@ -326,7 +327,7 @@ static void listen_round(supine_stream_server *s, nfds_t count) {
 static bool replay_over(const supine_stream_server *s) {
   const supine_stream_poses *poses = s->options->replay;
   return poses != NULL && s->replayed == poses->count &&
-         s->woke > s->replay_begun + poses->pose[poses->count - 1].seconds + 2.0 * asked_time;
+         s->woke > s->replay_begun + poses->pose[poses->count - 1].seconds + 2.0 * stop_interval;
 }
 
 supine_status supine_stream_server_run(supine_stream_server *server, supine_error *error) {
@@ -340,10 +341,11 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     const struct timespec timeout = find_timeout(s, end);
     s->waited = supine_clock_seconds();
     if (ppoll(s->polled, count, &timeout, NULL) < 0 && errno != EINTR) {
-      return supine_error_set(error, SUPINE_ERROR_WRITE, "poll: %s", strerror(errno));
+      return supine_error_set(error, SUPINE_ERROR_WRITE, "cannot wait for the sockets: %s",
+                              strerror(errno));
     }
     s->woke = supine_clock_seconds();
-    if (s->woke - asked >= asked_time) {
+    if (s->woke - asked >= stop_interval) {
       asked = s->woke;
       if (options->stop(options->context)) {
         break;
@@ -352,7 +354,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
     if (s->woke >= s->connect_at) {
       connect_peer(s);
     }
-    listen_round(s, count);
+    receive_all(s, count);
     if ((s->woke >= frame_due(s) && !make_frame(s)) || !send_peers(s)) {
       return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     }
@@ -417,7 +419,7 @@ void supine_stream_server_destroy(supine_stream_server *server) {
     (void)close(server->listener);
   }
   if (server->frames != NULL) {
-    supine_stream_frame_leave(server->frames, server->latest);
+    supine_stream_frame_release(server->frames, server->latest);
   }
   supine_stream_frames_destroy(server->frames);
   free(server->latency);
@@ -436,6 +438,6 @@ const supine_stream_counts *supine_stream_server_counts(const supine_stream_serv
 }
 
 const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
-                                                          supine_stream_what what) {
-  return &server->latency[what != SUPINE_STREAM_WEIGHTS];
+                                                          supine_stream_content content) {
+  return &server->latency[content != SUPINE_STREAM_WEIGHTS];
 }

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """3D Slicer: the lung follows a transform node.
 
-Start the server with the options of SERVER_OPTIONS:
+Start the server with SERVER_OPTIONS:
 
     supine stream lungs.safetensors --send points --space ras --world-down 0,-1,0 --body-from-tracker 0,0,0,1
 
@@ -9,11 +9,11 @@ then, in Slicer's Python console:
 
     import sys; sys.path.append("/path/to/samples")   # the folder of this file and supine_link.py
     from slicer_lung import Follow
-    follow = Follow("PatientToRoom")   # a linear transform node: how the patient lies
+    follow = Follow("PatientToRoom")   # a linear transform node with the patient's orientation
     follow.stop()
 
-Slicer's axes are right, front, head (RAS): the patient's, and the room's as long as nobody has turned. So
-a patient who lies on the back has the identity, and things fall along -y."""
+Slicer's axes are right, front, head (RAS). The identity is a patient who lies on the back; gravity points
+along -y of the room."""
 from supine_link import Link, corners, unpack
 
 SERVER_OPTIONS = ["--send", "points", "--space", "ras", "--world-down", "0,-1,0",
@@ -22,12 +22,12 @@ DEVICE = "Patient"
 
 
 def rotation_of(matrix):
-    """Rows of the rotation of a 4 x 4 matrix, given as 16 numbers by rows."""
+    """Return the rows of the 3 x 3 rotation of a 4 x 4 matrix, given as 16 numbers by rows."""
     return [[matrix[4 * row + column] for column in range(3)] for row in range(3)]
 
 
 class Surface:
-    """Receives the lung: the newest points, and the triangles of the first frame."""
+    """Receives the newest points, and the triangles of the first frame."""
 
     def __init__(self, host="localhost", port=18944):
         self.link = Link(host, port)
@@ -38,7 +38,7 @@ class Surface:
         self.link.send_pose(rotation_of(matrix), DEVICE)
 
     def newest(self, timeout=0.0):
-        """Return (stamp, flat points) of the newest frame since the last call, or None."""
+        """Return (stamp, flat array of points) of the newest frame; None if there is no new frame."""
         last = None
         self.link.receive(timeout)
         while True:
@@ -55,7 +55,7 @@ class Surface:
 
 
 class Follow:
-    """Sends the node's rotation whenever it changes, and shows what comes back."""
+    """Sends the node's rotation whenever it changes, and shows the lungs received."""
 
     def __init__(self, node, host="localhost", port=18944, interval=15):
         import qt

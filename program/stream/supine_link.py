@@ -14,7 +14,7 @@ import sys
 import time
 
 HEADER = struct.Struct(">H12s20sQQQ")
-EXTENSION = struct.Struct(">HHII")  # its size, metadata index's size, metadata's size, number
+EXTENSION = struct.Struct(">HHII")  # extension size, metadata index size, metadata size, message number
 
 
 def _crc_table():
@@ -32,14 +32,14 @@ _TABLE = _crc_table()
 
 
 def crc64(data, crc=0):
-    """CRC-64 of ECMA-182, most significant bit first, from 0."""
+    """Return the CRC-64 of ECMA-182, most significant bit first, from 0."""
     for byte in data:
         crc = ((crc << 8) & 0xFFFFFFFFFFFFFFFF) ^ _TABLE[(crc >> 56) ^ byte]
     return crc
 
 
 def pack(kind, device, content, stamp=0, version=1, number=0):
-    """A whole message; one of version 2 has an extension before and metadata behind its content."""
+    """Return a whole message. Version 2 has an extension before the content, and metadata after it."""
     if version == 2:
         content = EXTENSION.pack(12, 2, 0, number) + content + b"\0\0"
     return HEADER.pack(version, kind.encode(), device.encode(), stamp, len(content),
@@ -47,35 +47,35 @@ def pack(kind, device, content, stamp=0, version=1, number=0):
 
 
 def transform(rotation, position=(0, 0, 0)):
-    """Content of a TRANSFORM: the columns of the matrix, then the position."""
+    """Return the content of a TRANSFORM: the columns of the matrix, then the position."""
     columns = [rotation[row][column] for column in range(3) for row in range(3)]
     return struct.pack(">12f", *columns, *position)
 
 
 def quaternion(wxyz, position=(0, 0, 0)):
-    """Content of a POSITION."""
+    """Return the content of a POSITION."""
     w, x, y, z = wxyz
     return struct.pack(">7f", *position, x, y, z, w)
 
 
 def instruments(poses):
-    """Content of a QTDATA: {name: (w, x, y, z)}."""
+    """Return the content of a QTDATA for {name: (w, x, y, z)}."""
     return b"".join(struct.pack(">20sBB", name.encode(), 2, 0) + quaternion(wxyz)
                     for name, wxyz in poses.items())
 
 
 def array(values):
-    """Content of an NDARRAY of one dimension, float64."""
+    """Return the content of an NDARRAY of one dimension, float64."""
     return struct.pack(f">BBH{len(values)}d", 11, 1, len(values), *values)
 
 
 def string(text):
-    """Content of a STRING, US-ASCII."""
+    """Return the content of a STRING, US-ASCII."""
     return struct.pack(">HH", 3, len(text)) + text.encode("ascii")
 
 
 def _numbers(kind, content):
-    """Big-endian numbers as an array of this machine's."""
+    """Convert big-endian numbers to an array in this machine's byte order."""
     numbers = arrays.array(kind, content)
     if sys.byteorder == "little":
         numbers.byteswap()
@@ -83,20 +83,20 @@ def _numbers(kind, content):
 
 
 def corners(words):
-    """Yield the corners of the triangles of strips: the length of each strip, then its corners."""
+    """Yield three corners for each triangle. `words` has the length of each strip, then its corners."""
     begin = 0
     while begin < len(words):
         strip = words[begin + 1:begin + 1 + words[begin]]
         begin += 1 + len(strip)
-        for i in range(len(strip) - 2):  # every other one has the opposite orientation
+        for i in range(len(strip) - 2):  # every other triangle is reversed
             triangle = (strip[i], strip[i + 1 + i % 2], strip[i + 2 - i % 2])
-            if len(set(triangle)) == 3:  # others only turn the strip
+            if len(set(triangle)) == 3:  # degenerate triangles only join others
                 yield from triangle
 
 
 def unpack(kind, content):
     """Decode the content of a message. NDARRAY: a tuple of floats. POLYDATA: (flat array of x, y, z,
-    array of its strips for `corners`). STRING: text. Others: the bytes."""
+    array of strips for `corners`). STRING: text. Other types: the bytes."""
     if kind == "NDARRAY":
         scalar, dimension = content[0], content[1]
         count = 1
@@ -114,13 +114,13 @@ def unpack(kind, content):
 
 
 class Link:
-    """A connection. Frames that are not fetched in time are passed over: `newest` is the last."""
+    """A connection. `newest` returns the last frame received; earlier ones are dropped."""
 
     def __init__(self, host="localhost", port=18944, version=1, check=False):
         self.socket = socket.create_connection((host, port), timeout=10)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.version = version
-        self.check = check  # checksums, which plain Python is slow at
+        self.check = check  # verify checksums, which is slow in plain Python
         self.bytes = bytearray()
 
     def close(self):
@@ -135,15 +135,15 @@ class Link:
         self.send("TRANSFORM", device, transform(rotation), stamp)
 
     def ask_for(self, what):
-        """weights, points, surface or nothing."""
+        """Choose what the server sends: weights, points, surface or nothing."""
         self.send("STRING", "SEND", string(what))
 
     def set_volume(self, text):
-        """rest, full or scan, with +ML or -ML (rest+500), or an absolute volume: 2600mL."""
+        """Set the volume: rest, full or scan, also with +ML or -ML (rest+500), or absolute (2600mL)."""
         self.send("STRING", "VOLUME", string(text))
 
     def message(self):
-        """The next whole message that has come: (kind, device, stamp, content); None: not yet."""
+        """Return the next complete message, (kind, device, stamp, content); None if there is none yet."""
         if len(self.bytes) < HEADER.size:
             return None
         version, kind, device, stamp, size, crc = HEADER.unpack_from(self.bytes)
@@ -152,24 +152,24 @@ class Link:
         body = bytes(self.bytes[HEADER.size:HEADER.size + size])
         del self.bytes[:HEADER.size + size]
         if self.check and crc64(body) != crc:
-            raise ValueError("a wrong checksum")
+            raise ValueError("a message has a wrong checksum")
         if version == 2:
             extension, index, metadata, _ = EXTENSION.unpack_from(body)
             body = body[extension:len(body) - index - metadata]
         return kind.rstrip(b"\0").decode(), device.rstrip(b"\0").decode(), stamp, body
 
     def receive(self, timeout=0.0):
-        """Takes in what has come; False where nothing does in that time."""
+        """Receive bytes; return False if none arrive within the timeout."""
         if not select.select([self.socket], [], [], timeout)[0]:
             return False
         data = self.socket.recv(1 << 20)
         if not data:
-            raise ConnectionError("the server has gone")
+            raise ConnectionError("the server closed the connection")
         self.bytes += data
         return True
 
     def newest(self, timeout=1.0):
-        """(stamp, content unpacked) of the newest message; None where none comes in that time."""
+        """Return (stamp, unpacked content) of the newest message; None if none arrives in time."""
         end = time.monotonic() + timeout
         last = None
         while True:
@@ -183,7 +183,7 @@ class Link:
 
 
 class Basis:
-    """A scalar basis file, for peers that are sent weights: x_j = p_j + A_j (w . c) d_j."""
+    """A scalar basis file, for peers that receive weights: x_j = p_j + A_j (w . c) d_j."""
 
     def __init__(self, path):
         with open(path, "rb") as file:
@@ -206,7 +206,7 @@ class Basis:
         return memoryview(self._data[begin:end]).cast(kind)
 
     def deform(self, frame):
-        """Positions, flat, of an NDARRAY frame: K weights, then the gains A of each lung along x, y, z."""
+        """Return the positions, flat, of a frame: K weights, then the gains A of each lung on x, y, z."""
         weights, gains = frame[:self.modes], frame[self.modes:]
         positions = []
         for i, lung in enumerate(self.lung):

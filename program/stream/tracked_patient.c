@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Take posture and volume from messages, and compute the state of the lungs. */
+/* Store posture, volume and observed points from messages, and compute the state of the lungs. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
   const double start = 0.0;
   double above = 0.0;
   const supine_status status =
-      supine_breath_evaluate(pv, breath, 1, &start, &above, NULL, error); /* checks both */
+      supine_breath_evaluate(pv, breath, 1, &start, &above, NULL, error); /* checks the arguments */
   if (status == SUPINE_OK) {
     *volume = (supine_stream_volume){.breathes = true, .pv = *pv, .breath = *breath};
   }
@@ -35,7 +35,7 @@ supine_state supine_stream_volume_at(const supine_stream_volume *volume, const s
   double above = 0.0;
   if (volume->breathes) {
     (void)supine_breath_evaluate(&volume->pv, &volume->breath, 1, &time, &above, NULL,
-                                 NULL); /* was checked */
+                                 NULL); /* succeeded in supine_stream_volume_breathe */
     return supine_breath_state(basis, gravity, above);
   }
   supine_state state = volume->fixed;
@@ -53,7 +53,7 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
                                  .gravity = {0, 1, 0},
                                  .smooth = {0, 1, 0},
                                  .smoothed = now,
-                                 .posed = -1.0,
+                                 .pose_received = -1.0,
                                  .received = -1.0,
                                  .warned = now - 1.0};
 }
@@ -72,33 +72,34 @@ void supine_stream_patient_warn(supine_stream_patient *patient, double now, cons
   patient->options->warn(patient->options->context, text);
 }
 
-/* Note that a message of the patient was received: the next frame answers it. */
-static void refresh(supine_stream_patient *p, double received) {
-  p->fresh = true;
+/* Mark a message as received, to be shown by the next frame. */
+static void note_message(supine_stream_patient *p, double received) {
+  p->pending = true;
   p->received = received;
 }
 
-static void take_pose(supine_stream_patient *p, const double gravity[3], double received,
-                      uint64_t stamp) {
+static void store_pose(supine_stream_patient *p, const double gravity[3], double received,
+                       uint64_t stamp) {
   memcpy(p->gravity, gravity, sizeof p->gravity);
-  if (p->posed < 0.0) { /* first pose: nothing to smooth from */
+  if (p->pose_received < 0.0) { /* first pose: nothing to smooth from */
     memcpy(p->smooth, gravity, sizeof p->smooth);
     p->smoothed = received;
-    p->first = received;
+    p->first_pose = received;
   }
-  refresh(p, received);
-  p->posed = received;
+  note_message(p, received);
+  p->pose_received = received;
   p->stamp = stamp;
   ++p->counts->poses;
   if (p->options->record != NULL) {
-    const supine_stream_pose pose = {fmax(0.0, received - p->first),
+    const supine_stream_pose pose = {fmax(0.0, received - p->first_pose),
                                      {gravity[0], gravity[1], gravity[2]}};
     supine_stream_poses_add(p->options->record, &pose);
   }
 }
 
-static void judge(supine_stream_patient *p, supine_stream_verdict verdict, const char *why,
-                  const double gravity[3], double received, uint64_t stamp) {
+/* Store a pose unless it is refused; warn unless it is exact. */
+static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict, const char *why,
+                        const double gravity[3], double received, uint64_t stamp) {
   if (verdict == SUPINE_STREAM_REFUSED) {
     ++p->counts->refused;
     supine_stream_patient_warn(p, received, "a pose is refused: %s", why);
@@ -108,39 +109,39 @@ static void judge(supine_stream_patient *p, supine_stream_verdict verdict, const
     ++p->counts->repaired;
     supine_stream_patient_warn(p, received, "a pose is not a rotation, but used: %s", why);
   }
-  take_pose(p, gravity, received, stamp);
+  store_pose(p, gravity, received, stamp);
 }
 
-/* Store the position of a sensor, not-a-number where it is not seen; return false where no sensor
+/* Store the position of an observed point, not-a-number if it is not seen; return false if no point
  * has that name. */
-static bool place(supine_stream_patient *p, const char *name, const double position[3],
-                  double received, uint64_t stamp) {
-  supine_stream_sensors *sensors = p->options->sensors;
+static bool store_position(supine_stream_patient *p, const char *name, const double position[3],
+                           double received, uint64_t stamp) {
+  supine_stream_observed *observed = p->options->observed;
   size_t at = 0;
-  while (sensors != NULL && at < sensors->count && strcmp(sensors->name[at], name) != 0) {
+  while (observed != NULL && at < observed->count && strcmp(observed->name[at], name) != 0) {
     ++at;
   }
-  if (sensors == NULL || at == sensors->count) {
+  if (observed == NULL || at == observed->count) {
     return false;
   }
   for (size_t i = 0; i < 3; ++i) {
-    sensors->last[at].position[i] = sensors->ras && i < 2 ? -position[i] : position[i];
+    observed->last[at].position[i] = observed->ras && i < 2 ? -position[i] : position[i];
   }
-  refresh(p, received);
-  p->posed = received;
+  note_message(p, received);
+  p->pose_received = received;
   p->stamp = stamp;
-  ++p->counts->places;
+  ++p->counts->positions;
   return true;
 }
 
-static void place_all(supine_stream_patient *p, const supine_stream_message *message,
-                      double received, uint64_t stamp) {
+static void store_positions(supine_stream_patient *p, const supine_stream_message *message,
+                            double received, uint64_t stamp) {
   for (size_t i = 0; i < message->point_count; ++i) {
     char name[65];
     double position[3];
     supine_stream_message_point(message, i, name, position);
-    if (!place(p, name, position, received, stamp) && p->options->sensors != NULL) {
-      supine_stream_patient_warn(p, received, "no point '%s' in the file of --points", name);
+    if (!store_position(p, name, position, received, stamp) && p->options->observed != NULL) {
+      supine_stream_patient_warn(p, received, "the file of --points has no point '%s'", name);
     }
   }
 }
@@ -155,41 +156,42 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
   double gravity[3];
   const char *why = NULL;
   switch (message->kind) {
-  case SUPINE_STREAM_PLACE:
-    (void)place(patient, message->text, message->number + 9, received, stamp);
+  case SUPINE_STREAM_POSITION:
+    (void)store_position(patient, message->text, message->number + 9, received, stamp);
     break;
-  case SUPINE_STREAM_PLACES:
-    place_all(patient, message, received, stamp);
+  case SUPINE_STREAM_POINT_LIST:
+    store_positions(patient, message, received, stamp);
     break;
   case SUPINE_STREAM_ROTATION:
-    if (place(patient, message->text, message->number + 9, received, stamp)) {
+    if (store_position(patient, message->text, message->number + 9, received, stamp)) {
       break;
     }
     verdict = supine_stream_gravity_rotation(setup, message->number, gravity, &why);
-    judge(patient, verdict, why, gravity, received, stamp);
+    accept_pose(patient, verdict, why, gravity, received, stamp);
     break;
   case SUPINE_STREAM_QUATERNION:
     verdict = supine_stream_gravity_quaternion(setup, message->number, gravity, &why);
-    judge(patient, verdict, why, gravity, received, stamp);
+    accept_pose(patient, verdict, why, gravity, received, stamp);
     break;
   case SUPINE_STREAM_DOWN:
     verdict = supine_stream_gravity_down(setup, message->number, gravity, &why);
-    judge(patient, verdict, why, gravity, received, stamp);
+    accept_pose(patient, verdict, why, gravity, received, stamp);
     break;
   case SUPINE_STREAM_VOLUME:
     if (isfinite(message->number[0])) {
       *volume =
           (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_REST, message->number[0]}}};
-      refresh(patient, received);
+      note_message(patient, received);
     } else {
-      supine_stream_patient_warn(patient, received, "a volume is refused: it is not finite");
+      supine_stream_patient_warn(patient, received,
+                                 "a volume is refused: it is not finite; send mL");
     }
     break;
   case SUPINE_STREAM_VOLUME_TEXT:
     if (supine_stream_volume_fix(volume, message->text, &error) != SUPINE_OK) {
-      supine_stream_patient_warn(patient, received, "%s", error.message);
+      supine_stream_patient_warn(patient, received, "a volume is refused: %s", error.message);
     } else {
-      refresh(patient, received);
+      note_message(patient, received);
     }
     break;
   case SUPINE_STREAM_NOTHING:
@@ -204,7 +206,7 @@ void supine_stream_patient_pose(supine_stream_patient *patient, const double gra
   double unit[3];
   const char *why = NULL;
   const supine_stream_verdict verdict = supine_stream_gravity_down(&body, gravity, unit, &why);
-  judge(patient, verdict, why, unit, received, 0);
+  accept_pose(patient, verdict, why, unit, received, 0);
 }
 
 bool supine_stream_patient_moves(const supine_stream_patient *patient) {
@@ -217,7 +219,7 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
-static double held(const supine_basis *basis, const supine_pose *pose) {
+static double total_volume(const supine_basis *basis, const supine_pose *pose) {
   double volumes[SUPINE_LUNGS_MAX];
   double sum = 0.0;
   supine_basis_volumes(basis, pose, volumes);
@@ -227,83 +229,87 @@ static double held(const supine_basis *basis, const supine_pose *pose) {
   return sum;
 }
 
-/* Compute the gains of the state, or keep the last ones that could be computed, and the volumes. */
-static void find_gains(supine_stream_patient *patient, double now, supine_stream_moment *moment) {
+/* Compute the gains of the current volume, or keep the last gains if it is out of reach; compute
+ * the volumes that they give. */
+static void find_gains(supine_stream_patient *patient, double now,
+                       supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;
   const supine_state state = supine_stream_volume_at(patient->options->volume, basis,
-                                                     moment->gravity, now - patient->begun);
-  const supine_state rest = supine_breath_state(basis, moment->gravity, 0.0);
+                                                     snapshot->gravity, now - patient->begun);
+  const supine_state rest = supine_breath_state(basis, snapshot->gravity, 0.0);
   supine_error error;
-  if (supine_basis_gains(basis, &rest, &moment->pose, NULL) == SUPINE_OK) {
-    moment->above = -held(basis, &moment->pose);
+  if (supine_basis_gains(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
+    snapshot->above = -total_volume(basis, &snapshot->pose);
   }
-  if (supine_basis_gains(basis, &state, &moment->pose, &error) == SUPINE_OK) {
-    memcpy(patient->gains, moment->pose.gains, sizeof patient->gains);
+  if (supine_basis_gains(basis, &state, &snapshot->pose, &error) == SUPINE_OK) {
+    memcpy(patient->gains, snapshot->pose.gains, sizeof patient->gains);
   } else {
     char text[96];
     ++patient->counts->unreachable;
     (void)supine_state_describe(&state, text, sizeof text);
-    supine_stream_patient_warn(patient, now, "%s cannot be shown: %s", text, error.message);
+    supine_stream_patient_warn(patient, now, "the state %s cannot be shown: %s", text,
+                               error.message);
   }
-  memcpy(moment->pose.gains, patient->gains, sizeof patient->gains);
-  moment->volume = held(basis, &moment->pose);
-  moment->above += moment->volume;
+  memcpy(snapshot->pose.gains, patient->gains, sizeof patient->gains);
+  snapshot->volume = total_volume(basis, &snapshot->pose);
+  snapshot->above += snapshot->volume;
 }
 
-/* Fit the lungs to the observed points, where any is seen; the volume too unless it is fixed. */
+/* Fit the pose to the observed points, if any is seen; fit the volume too unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
-                          supine_stream_moment *moment) {
+                          supine_stream_snapshot *snapshot) {
   const supine_stream_volume *volume = patient->options->volume;
-  supine_stream_sensors *sensors = patient->options->sensors;
+  supine_stream_observed *observed = patient->options->observed;
   supine_observation seen[SUPINE_LOCATE_POINTS_MAX];
   supine_locate_residual residuals[SUPINE_LOCATE_POINTS_MAX];
-  supine_locate_task task = {.inside = sensors->inside, .observed = seen};
-  supine_pose pose = moment->pose;
+  supine_locate_task task = {.inside = observed->inside, .observed = seen};
+  supine_pose pose = snapshot->pose;
   supine_error error;
   if (!volume->breathes) {
     task.state = volume->fixed;
   }
-  memcpy(task.state.gravity, moment->gravity, sizeof task.state.gravity);
-  for (size_t i = 0; i < sensors->count; ++i) {
-    const double *p = sensors->last[i].position;
+  memcpy(task.state.gravity, snapshot->gravity, sizeof task.state.gravity);
+  for (size_t i = 0; i < observed->count; ++i) {
+    const double *p = observed->last[i].position;
     if (isfinite(p[0] + p[1] + p[2])) {
-      seen[task.count++] = sensors->last[i];
+      seen[task.count++] = observed->last[i];
     }
   }
   if (task.count == 0) {
     return;
   }
   supine_status status =
-      supine_locate(&task, residuals, sensors->space, &sensors->location, &error);
+      supine_locate(&task, residuals, observed->space, &observed->location, &error);
   if (status == SUPINE_OK) {
-    status = supine_basis_gains(patient->basis, &sensors->location.state, &pose, &error);
+    status = supine_basis_gains(patient->basis, &observed->location.state, &pose, &error);
   }
   if (status != SUPINE_OK) {
-    supine_stream_patient_warn(patient, now, "no lungs fit the points: %s", error.message);
+    supine_stream_patient_warn(
+        patient, now, "the lungs cannot be fitted to the observed points: %s", error.message);
   } else {
-    moment->location = &sensors->location;
-    moment->pose = pose;
-    moment->above += moment->location->volume - moment->volume;
-    moment->volume = moment->location->volume;
+    snapshot->location = &observed->location;
+    snapshot->pose = pose;
+    snapshot->above += snapshot->location->volume - snapshot->volume;
+    snapshot->volume = snapshot->location->volume;
   }
 }
 
-void supine_stream_patient_moment(supine_stream_patient *patient, double now,
-                                  supine_stream_moment *moment) {
-  const double left =
+void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
+                                    supine_stream_snapshot *snapshot) {
+  const double angle =
       supine_stream_gravity_smooth(patient->gravity, fmax(0.0, now - patient->smoothed),
                                    patient->options->smooth, patient->smooth);
-  *moment = (supine_stream_moment){0};
+  *snapshot = (supine_stream_snapshot){0};
   patient->smoothed = now;
-  patient->turning = left > 1e-6; /* a smaller angle moves points by less than 1 um */
-  memcpy(moment->gravity, patient->smooth, sizeof moment->gravity);
-  moment->received = patient->fresh ? patient->received : -1.0;
-  moment->posed = patient->posed;
-  moment->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
-  (void)supine_basis_weights(patient->basis, moment->gravity, moment->pose.weights);
-  find_gains(patient, now, moment);
-  if (patient->options->sensors != NULL) {
-    find_location(patient, now, moment);
+  patient->turning = angle > 1e-6; /* a smaller angle moves points by less than 1 um */
+  memcpy(snapshot->gravity, patient->smooth, sizeof snapshot->gravity);
+  snapshot->received = patient->pending ? patient->received : -1.0;
+  snapshot->pose_received = patient->pose_received;
+  snapshot->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();
+  (void)supine_basis_weights(patient->basis, snapshot->gravity, snapshot->pose.weights);
+  find_gains(patient, now, snapshot);
+  if (patient->options->observed != NULL) {
+    find_location(patient, now, snapshot);
   }
-  patient->fresh = false;
+  patient->pending = false;
 }

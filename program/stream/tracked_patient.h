@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Store the newest pose and volume of the patient, and compute the state of the lungs from them. */
+ * Store the newest pose, volume and observed points, and compute the state of the lungs from them.
+ */
 #ifndef SUPINE_STREAM_PATIENT_H
 #define SUPINE_STREAM_PATIENT_H
 
@@ -9,19 +10,18 @@
 
 /** How the volume is determined. */
 struct supine_stream_volume {
-  bool breathes;      /**< else the volume of `fixed` */
-  supine_state fixed; /**< its gravity is ignored */
+  bool breathes;      /**< true: by `pv` and `breath`; false: the volume of `fixed` */
+  supine_state fixed; /**< gravity is ignored */
   supine_pv pv;
   supine_pv_breath breath;
 };
 
-/** Set the volume to that of a breath, which starts at time 0. Statuses as supine_breath_evaluate.
- */
+/** Let the volume follow a breath that starts at time 0. Statuses as supine_breath_evaluate. */
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error);
 
 /** Set a fixed volume, in the form of supine_state_parse_volume: rest+500, full-300, 2600mL.
- * @retval SUPINE_ERROR_ARGUMENT  none of these; `volume` is unchanged */
+ * @retval SUPINE_ERROR_ARGUMENT  another form; `volume` is unchanged */
 supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
                                        supine_error *error);
 
@@ -33,21 +33,22 @@ typedef struct supine_stream_patient {
   const supine_basis *basis;
   const supine_stream_options *options;
   supine_stream_counts *counts;
-  double begun;                      /* s of the clock; time 0 of the breath */
-  bool fresh;                        /* no frame has the newest message yet */
-  double first;                      /* s of the clock, of the first pose: time 0 of a record */
-  double posed;                      /* s of the clock, of the newest pose; < 0: none */
-  double received;                   /* s of the clock, of the newest message */
-  uint64_t stamp;                    /* of the newest pose; 0: none */
-  double gravity[3];                 /* of the newest pose */
-  double smooth[3];                  /* smoothed gravity, as shown */
-  double smoothed;                   /* when `smooth` was computed, s of the clock */
-  bool turning;                      /* `smooth` has not reached the pose yet */
-  double warned;                     /* s of the clock, of the last warning */
+  /* Times are in s of the clock. */
+  double begun;                      /* time 0 of the breath */
+  double first_pose;                 /* when the first pose was received: time 0 of a recording */
+  double pose_received;              /* when the newest pose was received; < 0: no pose yet */
+  double received;                   /* when the newest message was received */
+  bool pending;                      /* no frame shows the newest message yet */
+  uint64_t stamp;                    /* time stamp in the newest pose's header; 0: none */
+  double gravity[3];                 /* direction of gravity of the newest pose */
+  double smooth[3];                  /* smoothed direction, which frames show */
+  double smoothed;                   /* when `smooth` was computed */
+  bool turning;                      /* `smooth` has not reached `gravity` yet */
+  double warned;                     /* when the last warning was given */
   double gains[SUPINE_LUNGS_MAX][3]; /* gains of the last volume that could be reached */
 } supine_stream_patient;
 
-/* Begin supine, until a pose is received. */
+/* Return a patient who lies supine until a pose is received. */
 supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
                                                   const supine_stream_options *options,
                                                   supine_stream_counts *counts, double now);
@@ -61,15 +62,16 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
                                    const supine_stream_message *message, double received,
                                    uint64_t stamp);
 
-/* Take a direction of gravity in body axes, of any length but 0, from a file or a phone. */
+/* Store a pose from a file or a phone: the direction of gravity in body axes, of any length. A
+ * vector that is zero or not finite is refused. */
 void supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
                                 double received);
 
-/* Return whether the lungs move without new poses. */
+/* Return whether the lungs move without new messages. */
 bool supine_stream_patient_moves(const supine_stream_patient *patient);
 
-/* Compute the state of the lungs at `now`, and mark the pose as shown. */
-void supine_stream_patient_moment(supine_stream_patient *patient, double now,
-                                  supine_stream_moment *moment);
+/* Compute the state of the lungs at `now`, and mark the newest message as shown. */
+void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
+                                    supine_stream_snapshot *snapshot);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Serve the page and its WebSocket by libwebsockets, in a thread of their own. */
+/* Serve the page and its WebSocket by libwebsockets, in another thread. */
 #include <fcntl.h>
 #include <jansson.h>
 #include <libwebsockets.h>
@@ -30,6 +30,7 @@
  * loops. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
+/* Sizes in bytes: of a state as JSON, of the largest message received, of a part of the page. */
 enum { TEXT = 256, RECEIVED = 512, CHUNK = 65536 };
 
 struct supine_stream_web {
@@ -42,9 +43,9 @@ struct supine_stream_web {
   atomic_bool ending;
   atomic_size_t viewers;
   pthread_mutex_t lock; /* for the fields below */
-  uint64_t number;      /* of the state in `text` */
-  char text[TEXT];      /* JSON of the state; its age and the final brace are added when sent */
-  double posed_at;      /* s of the clock, when the newest pose was received; < 0: none */
+  uint64_t number;      /* number of the state in `text`: 1, 2, ... */
+  char text[TEXT];      /* state as JSON; age and the final brace are added when it is sent */
+  double pose_received; /* when the newest pose was received, s of the clock; < 0: none */
 };
 
 /* A pose in the pipe. */
@@ -55,17 +56,17 @@ typedef struct web_pose {
 
 /* A connection: of a browser that loads the page, or of a viewer. */
 typedef struct session {
-  size_t sent;     /* bytes of the page */
-  uint64_t number; /* of the last state sent */
-  bool counted;    /* it is one of the viewers */
+  size_t sent;     /* bytes of the page sent so far */
+  uint64_t number; /* number of the last state sent */
+  bool counted;    /* included in `viewers` */
 } session;
 
 static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
 
-/* Return whether a socket was opened by our own page, whose Origin header names this host, or by a
- * program that is not a browser and sends no Origin. */
+/* Return whether a WebSocket was opened by the page of this server, so that its Origin header names
+ * this host, or by a program that is not a browser and sends no Origin. */
 static bool is_ours(struct lws *wsi) {
   char origin[256] = "";
   char host[256] = "";
@@ -92,18 +93,18 @@ static void receive(supine_stream_web *web, const char *bytes, size_t size) {
     good = json_is_number(value) && isfinite(taken.gravity[i]);
   }
   json_decref(pose);
-  if (good) { /* where the pipe is full, newer poses follow */
+  if (good) { /* a full pipe loses this pose, but newer poses follow */
     (void)!write(web->poses[1], &taken, sizeof taken);
   }
 }
 
-/* Send the newest state to a viewer that has not received it; return 0, or -1 to disconnect it. */
+/* Send the newest state to a viewer unless it has it; return 0, or -1 to disconnect the viewer. */
 static int send_state(supine_stream_web *web, struct lws *wsi, session *s) {
   enum { AGE = 32 };
   unsigned char bytes[LWS_PRE + TEXT + AGE];
   (void)pthread_mutex_lock(&web->lock);
   const uint64_t number = web->number;
-  const double age = web->posed_at >= 0 ? supine_clock_seconds() - web->posed_at : -1;
+  const double age = web->pose_received >= 0 ? supine_clock_seconds() - web->pose_received : -1;
   const int size =
       snprintf((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
   (void)pthread_mutex_unlock(&web->lock);
@@ -232,7 +233,7 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   info.gid = -1;
   info.uid = -1;
   info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
-  /* With IPv6 enabled, it would listen on every address instead of an IPv4 one. */
+  /* With IPv6 enabled, libwebsockets would listen on every address instead of the IPv4 one. */
   if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
@@ -250,8 +251,8 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   if (!w->running) {
     supine_stream_web_destroy(w);
     return supine_error_set(error, SUPINE_ERROR_WRITE,
-                            "cannot serve a page at %s, port %d: give a free port with --web, "
-                            "and check --certificate and --key",
+                            "cannot serve a page at address %s, port %d: give a free port with "
+                            "--web, and check --certificate and --key",
                             info.iface, site->port);
   }
   *web = w;
@@ -296,12 +297,13 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
   return posed;
 }
 
-void supine_stream_web_send(supine_stream_web *web, const supine_stream_moment *moment) {
+void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot *snapshot) {
   (void)pthread_mutex_lock(&web->lock);
   (void)snprintf(web->text, sizeof web->text,
-                 "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g", moment->gravity[0],
-                 moment->gravity[1], moment->gravity[2], moment->volume, moment->above);
-  web->posed_at = moment->posed;
+                 "{\"gravity\":[%.9g,%.9g,%.9g],\"volume\":%.9g,\"above\":%.9g",
+                 snapshot->gravity[0], snapshot->gravity[1], snapshot->gravity[2], snapshot->volume,
+                 snapshot->above);
+  web->pose_received = snapshot->pose_received;
   ++web->number;
   (void)pthread_mutex_unlock(&web->lock);
   if (atomic_load(&web->viewers) > 0) {

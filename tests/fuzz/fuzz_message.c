@@ -27,7 +27,7 @@ static void read_message(const uint8_t *bytes, size_t size, bool mend) {
     header.crc = supine_stream_crc64(0, bytes + SUPINE_STREAM_HEADER, left);
   }
   if (header.size > left || header.size > SUPINE_STREAM_BODY_MAX ||
-      !supine_stream_message_wanted(&header)) {
+      !supine_stream_message_is_known(&header)) {
     return;
   }
   const supine_status status =

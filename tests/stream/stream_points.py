@@ -94,5 +94,5 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
         said = server.communicate(timeout=30)[0]
     print(said, end="")
     assert server.returncode == 0
-    assert said.startswith("80 positions of observed points\n"), said
-    assert "2 messages malformed" in said, said
+    assert said.startswith("positions of observed points: 80\n"), said
+    assert "malformed messages: 2;" in said, said

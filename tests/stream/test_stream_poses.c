@@ -43,20 +43,20 @@ TEST(test_poses_bad_files_refused) {
 
 TEST(test_latency_added_values_have_percentiles) {
   supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
-  assert_true(supine_stream_latency_share(latency, 0.5) == 0.0);
+  assert_true(supine_stream_latency_quantile(latency, 0.5) == 0.0);
   for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us: centres of bins */
     ++latency->bin[10 * i];
   }
   latency->count = 1000;
   latency->worst = 10000.5e-6;
-  assert_true(fabs(supine_stream_latency_share(latency, 0.5) - 5001e-6) < 1e-12);
-  assert_true(fabs(supine_stream_latency_share(latency, 0.99) - 9901e-6) < 1e-12);
-  assert_true(supine_stream_latency_share(latency, 1.0) == latency->worst);
+  assert_true(fabs(supine_stream_latency_quantile(latency, 0.5) - 5001e-6) < 1e-12);
+  assert_true(fabs(supine_stream_latency_quantile(latency, 0.99) - 9901e-6) < 1e-12);
+  assert_true(supine_stream_latency_quantile(latency, 1.0) == latency->worst);
   ++latency->count;
   ++latency->bin[SUPINE_STREAM_LATENCY_BINS - 1];
   latency->worst = 3.0;
-  assert_true(supine_stream_latency_share(latency, 1.0) == 3.0);
-  assert_true(supine_stream_latency_share(latency, 0.99) < 0.01);
+  assert_true(supine_stream_latency_quantile(latency, 1.0) == 3.0);
+  assert_true(supine_stream_latency_quantile(latency, 0.99) < 0.01);
   free(latency);
 }
 

@@ -798,11 +798,11 @@ TEST(test_server_small_socket_buffer_frame_whole) {
     assert_int_equal(setsockopt(ends[0], SOL_SOCKET, SO_SNDBUF, &rooms[r], sizeof rooms[r]), 0);
     peer.socket = ends[0];
     size_t begin = 0;
-    for (; peer.parcel.count < 3; begin += sizes[peer.parcel.count++]) {
-      peer.parcel.piece[peer.parcel.count] =
-          (struct iovec){bytes + begin, sizes[peer.parcel.count]};
+    for (; peer.packet.count < 3; begin += sizes[peer.packet.count++]) {
+      peer.packet.piece[peer.packet.count] =
+          (struct iovec){bytes + begin, sizes[peer.packet.count]};
     }
-    peer.parcel.size = size;
+    peer.packet.size = size;
     size_t arrived = 0;
     supine_stream_outcome outcome = SUPINE_STREAM_MORE;
     for (int pass = 0; arrived < size && pass < 100000; ++pass) {
@@ -810,7 +810,7 @@ TEST(test_server_small_socket_buffer_frame_whole) {
         outcome = supine_stream_peer_send(&peer);
       }
       assert_int_not_equal(outcome, SUPINE_STREAM_LOST);
-      assert_int_equal(outcome == SUPINE_STREAM_DONE, peer.parcel.first == peer.parcel.count);
+      assert_int_equal(outcome == SUPINE_STREAM_DONE, peer.packet.first == peer.packet.count);
       const ssize_t more = recv(ends[1], got + arrived, size + 1 - arrived, MSG_DONTWAIT);
       arrived += more > 0 ? (size_t)more : 0;
     }
@@ -819,7 +819,7 @@ TEST(test_server_small_socket_buffer_frame_whole) {
     assert_memory_equal(got, bytes, size);
     assert_int_equal(recv(ends[1], got, 1, MSG_DONTWAIT), -1);
     (void)close(ends[1]);
-    peer.parcel.piece[--peer.parcel.first] = (struct iovec){bytes, 1};
+    peer.packet.piece[--peer.packet.first] = (struct iovec){bytes, 1};
     assert_int_equal(supine_stream_peer_send(&peer), SUPINE_STREAM_LOST);
     (void)close(ends[0]);
   }

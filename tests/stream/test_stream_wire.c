@@ -108,7 +108,7 @@ TEST(test_read_transform_of_library) {
   }
   /* A transform of another device gives its position, for observed points. */
   const supine_stream_message place = read_ok(&header, body, "Probe");
-  assert_int_equal(place.kind, SUPINE_STREAM_PLACE);
+  assert_int_equal(place.kind, SUPINE_STREAM_POSITION);
   assert_string_equal(place.text, "Patient");
   for (int k = 0; k < 3; ++k) {
     assert_true(place.number[9 + k] == (double)(k + 10));
@@ -269,7 +269,7 @@ TEST(test_read_points_of_library) {
   unsigned char *body = (unsigned char *)list;
   supine_stream_header header = header_of("POINT", "Tracker", 1, body, sizeof list);
   const supine_stream_message m = read_ok(&header, body, "Patient");
-  assert_int_equal(m.kind, SUPINE_STREAM_PLACES);
+  assert_int_equal(m.kind, SUPINE_STREAM_POINT_LIST);
   assert_int_equal(m.point_count, 3);
   for (size_t i = 0; i < 3; ++i) {
     char name[65];
@@ -334,14 +334,14 @@ TEST(test_header_invalid_refused) {
 }
 
 /* Join the pieces of a message. */
-static unsigned char *gathered(const supine_stream_parcel *parcel) {
-  unsigned char *bytes = fixture_allocate(parcel->size, 1);
+static unsigned char *gathered(const supine_stream_packet *packet) {
+  unsigned char *bytes = fixture_allocate(packet->size, 1);
   size_t at = 0;
-  for (int i = 0; i < parcel->count; ++i) {
-    memcpy(bytes + at, parcel->piece[i].iov_base, parcel->piece[i].iov_len);
-    at += parcel->piece[i].iov_len;
+  for (int i = 0; i < packet->count; ++i) {
+    memcpy(bytes + at, packet->piece[i].iov_base, packet->piece[i].iov_len);
+    at += packet->piece[i].iov_len;
   }
-  assert_int_equal(at, parcel->size);
+  assert_int_equal(at, packet->size);
   return bytes;
 }
 
@@ -349,7 +349,7 @@ typedef struct sample {
   fixture *made;
   unsigned char *bytes;
   supine_basis *basis;
-  supine_stream_moment moment;
+  supine_stream_snapshot moment;
 } sample;
 
 static sample sample_open(fixture *made) {
@@ -358,7 +358,7 @@ static sample sample_open(fixture *made) {
   supine_error error;
   s.bytes = fixture_bytes(s.made, &size);
   assert_int_equal(supine_basis_open_memory(s.bytes, size, &s.basis, &error), SUPINE_OK);
-  s.moment = (supine_stream_moment){.gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu};
+  s.moment = (supine_stream_snapshot){.gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu};
   assert_int_equal(supine_basis_weights(s.basis, s.moment.gravity, s.moment.pose.weights),
                    SUPINE_OK);
   for (size_t i = 0; i < 3 * made->lungs; ++i) { /* each axis of each lung has its gain */
@@ -393,7 +393,7 @@ static void expect_message(const unsigned char *bytes, const char *type, uint64_
 static void expect_weights_frame(sample s) {
   supine_stream_frames *frames = NULL;
   supine_error error;
-  supine_stream_parcel parcel;
+  supine_stream_packet packet;
   const size_t modes = s.made->modes;
   const size_t count = modes + 3 * s.made->lungs;
   double values[SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX];
@@ -403,13 +403,13 @@ static void expect_weights_frame(sample s) {
   const size_t size = make_array(IGTL_NDARRAY_STYPE_TYPE_FLOAT32, count, values, body);
   assert_int_equal(supine_stream_frames_create(s.basis, "SUPINE", false, &frames, &error),
                    SUPINE_OK);
-  supine_stream_frame *frame = supine_stream_frame_take(frames, &s.moment);
-  assert_true(supine_stream_frame_wrap(frames, frame, SUPINE_STREAM_WEIGHTS, false, &parcel));
-  unsigned char *bytes = gathered(&parcel);
-  assert_int_equal(parcel.size, SUPINE_STREAM_HEADER + size);
+  supine_stream_frame *frame = supine_stream_frame_acquire(frames, &s.moment);
+  assert_true(supine_stream_frame_pack(frames, frame, SUPINE_STREAM_WEIGHTS, false, &packet));
+  unsigned char *bytes = gathered(&packet);
+  assert_int_equal(packet.size, SUPINE_STREAM_HEADER + size);
   expect_message(bytes, "NDARRAY", s.moment.stamp, body, size);
   free(bytes);
-  supine_stream_frame_leave(frames, frame);
+  supine_stream_frame_release(frames, frame);
   supine_stream_frames_destroy(frames);
   sample_destroy(&s);
 }
@@ -483,29 +483,29 @@ TEST(test_surface_written_equals_polydata_of_library) {
     supine_stream_frames *frames = NULL;
     assert_int_equal(supine_stream_frames_create(s.basis, "SUPINE", ras == 1, &frames, &error),
                      SUPINE_OK);
-    supine_stream_frame *frame = supine_stream_frame_take(frames, &s.moment);
+    supine_stream_frame *frame = supine_stream_frame_acquire(frames, &s.moment);
     for (int triangles = 0; triangles < 2; ++triangles) {
       size_t size = 0;
-      supine_stream_parcel parcel;
+      supine_stream_packet packet;
       assert_true(
-          supine_stream_frame_wrap(frames, frame, SUPINE_STREAM_SURFACE, triangles == 1, &parcel));
-      unsigned char *bytes = gathered(&parcel);
+          supine_stream_frame_pack(frames, frame, SUPINE_STREAM_SURFACE, triangles == 1, &packet));
+      unsigned char *bytes = gathered(&packet);
       unsigned char *body =
-          make_polydata(&s, triangles == 1 ? &parcel.piece[2] : NULL,
+          make_polydata(&s, triangles == 1 ? &packet.piece[2] : NULL,
                         word_at(bytes + SUPINE_STREAM_HEADER + 28), ras == 1 ? -1.0 : 1.0, &size);
-      assert_int_equal(parcel.size, SUPINE_STREAM_HEADER + size);
+      assert_int_equal(packet.size, SUPINE_STREAM_HEADER + size);
       expect_message(bytes, "POLYDATA", s.moment.stamp, body, size);
       free(bytes);
       free(body);
     }
-    supine_stream_frame_leave(frames, frame);
+    supine_stream_frame_release(frames, frame);
     /* A frame that is used again holds the points of the new pose. */
-    supine_stream_moment other = s.moment;
+    supine_stream_snapshot other = s.moment;
     other.pose.gains[0][1] = -0.1;
-    supine_stream_frame *again = supine_stream_frame_take(frames, &other);
-    supine_stream_parcel parcel;
+    supine_stream_frame *again = supine_stream_frame_acquire(frames, &other);
+    supine_stream_packet packet;
     assert_ptr_equal(again, frame);
-    assert_true(supine_stream_frame_wrap(frames, again, SUPINE_STREAM_POINTS, false, &parcel));
+    assert_true(supine_stream_frame_pack(frames, again, SUPINE_STREAM_POINTS, false, &packet));
     float first[3];
     supine_deform_range(s.basis, &other.pose, 0, 1, first);
     unsigned char wanted[12];
@@ -514,7 +514,7 @@ TEST(test_surface_written_equals_polydata_of_library) {
     }
     supine_stream_put_floats(3, first, wanted);
     assert_memory_equal(again->points, wanted, sizeof wanted);
-    supine_stream_frame_leave(frames, again);
+    supine_stream_frame_release(frames, again);
     supine_stream_frames_destroy(frames);
   }
   sample_destroy(&s);
@@ -556,15 +556,15 @@ TEST(test_strips_of_surface_hold_each_triangle_once) {
   const uint32_t *corner = supine_basis_triangles(s.basis);
   supine_stream_frames *frames = NULL;
   supine_error error;
-  supine_stream_parcel parcel;
+  supine_stream_packet packet;
   assert_int_equal(supine_stream_frames_create(s.basis, "SUPINE", false, &frames, &error),
                    SUPINE_OK);
-  supine_stream_frame *frame = supine_stream_frame_take(frames, &s.moment);
-  assert_true(supine_stream_frame_wrap(frames, frame, SUPINE_STREAM_SURFACE, true, &parcel));
-  const unsigned char *at = parcel.piece[2].iov_base;
-  const unsigned char *end = at + parcel.piece[2].iov_len;
+  supine_stream_frame *frame = supine_stream_frame_acquire(frames, &s.moment);
+  assert_true(supine_stream_frame_pack(frames, frame, SUPINE_STREAM_SURFACE, true, &packet));
+  const unsigned char *at = packet.piece[2].iov_base;
+  const unsigned char *end = at + packet.piece[2].iov_len;
   triangle *wanted = fixture_allocate(count, sizeof *wanted);
-  triangle *made = fixture_allocate(parcel.piece[2].iov_len / 4, sizeof *made);
+  triangle *made = fixture_allocate(packet.piece[2].iov_len / 4, sizeof *made);
   size_t wanted_count = 0;
   size_t made_count = 0;
   uint32_t strips = 0;
@@ -579,7 +579,7 @@ TEST(test_strips_of_surface_hold_each_triangle_once) {
     at += 4 + 4 * length;
   }
   assert_ptr_equal(at, end);
-  assert_int_equal(strips, word_at(parcel.front + SUPINE_STREAM_HEADER + 28));
+  assert_int_equal(strips, word_at(packet.front + SUPINE_STREAM_HEADER + 28));
   for (size_t i = 0; i < count; ++i) {
     add(wanted, &wanted_count, corner[3 * i], corner[3 * i + 1], corner[3 * i + 2]);
   }
@@ -589,7 +589,7 @@ TEST(test_strips_of_surface_hold_each_triangle_once) {
   assert_memory_equal(made, wanted, made_count * sizeof *made);
   free(wanted);
   free(made);
-  supine_stream_frame_leave(frames, frame);
+  supine_stream_frame_release(frames, frame);
   supine_stream_frames_destroy(frames);
   sample_destroy(&s);
 }
