@@ -3,12 +3,11 @@
  *
  * Total lung capacity of adults by height H in m (ECSC: Quanjer et al., Eur Respir J 6
  * Suppl 16, 1993): men 7.99 H - 7.08 L, women 6.60 H - 5.79 L, standard deviation 0.7 and 0.6 L;
- * measured upright, so less SUPINE_FULL_UPRIGHT_GAIN; and 0.86 L of tissue (Denison 1986, Thorax
- * 41:620, n 12: 431 mL in each lung). The paper of the ECSC was not at hand: an implementation of
- * its table in R (getQuanjerPred, getQuanjerLLN; lower limits 1.15 and 0.99 L below the prediction,
- * 1.645 standard deviations) confirms the coefficients. At 40 years they agree within 5 %, for men
- * of 1.60 to 1.95 m and women of 1.50 to 1.80 m, with the medians of Hall et al. (Eur Respir J 57:
- * 2000289, 2021), their splines left out. */
+ * measured upright, so divided by 1 + SUPINE_FULL_UPRIGHT_GAIN here; plus 0.86 L of tissue (Denison
+ * 1986, Thorax 41:620, n 12: 431 mL in each lung). The coefficients were checked against an
+ * implementation of the ECSC table in R (getQuanjerPred, getQuanjerLLN), not against the paper. At
+ * 40 years they agree within 5 %, for men of 1.60 to 1.95 m and women of 1.50 to 1.80 m, with the
+ * medians of Hall et al. (Eur Respir J 57: 2000289, 2021), without their splines. */
 #include <math.h>
 #include <stdio.h>
 
@@ -17,16 +16,14 @@
 
 static const double tissue = 860.0; /* volume of the tissue of both lungs, mL */
 
-/* Smallest share of the expected full volume, and smallest and largest full volume of an adult, mL:
- * beyond these limits the stated scan state is doubtful. */
+/* Limits of the full volume of both lungs, beyond which the stated scan state is doubtful: smallest
+ * share of the expected volume, and smallest and largest volume in mL. */
 static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 
-static const double left_part = 0.45; /* left lung's share of both lungs' volume */
-
 /* Largest relative difference of two volumes at rest that still agree. */
-static const double contradicts = 0.05;
+static const double agreement = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
   static const struct {
@@ -49,9 +46,11 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* Find the share of both lungs' volume that the reference's lungs hold. */
+/* Return the usual share of both lungs' volume that is in the lungs of the reference. */
 static double part_of_pair(const supine_reference *reference) {
-  return reference->lung_count == 2 ? 1.0 : reference->side[0] > 0 ? left_part : 1.0 - left_part;
+  return reference->lung_count == 2 ? 1.0
+         : reference->side[0] > 0   ? SUPINE_LEFT_SHARE
+                                    : 1.0 - SUPINE_LEFT_SHARE;
 }
 
 void supine_reference_compare(const supine_reference *reference, const supine_person *person,
@@ -82,25 +81,25 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
   for (size_t axis = 0; axis < 6 && state->volume.kind == SUPINE_VOLUME_REST; ++axis) {
     const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
     const double ml = given->ml[axis] + state->volume.ml;
-    if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > contradicts * ml) {
+    if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
       supine_text_add(
           text, size,
           "the scan holds %.0f mL, but --resting and --scanned say %.0f mL: change one of them",
           held, ml);
     }
   }
-  const char *also = text[0] == '\0' ? "" : "; ";
+  const char *separator = text[0] == '\0' ? "" : "; ";
   if (full < part * fmax(least_share * range[0], least_ml)) {
     supine_text_add(
         text, size,
         "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was not at full "
         "inflation, say what it shows, as --scanned supine:rest or full-1000",
-        also, full, expected);
+        separator, full, expected);
   } else if (full > part * most_ml) {
     supine_text_add(
         text, size,
         "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was fuller than "
         "rest, say so, as --scanned full or supine:rest+1000, or change --resting",
-        also, full, expected);
+        separator, full, expected);
   }
 }

@@ -22,16 +22,16 @@
 
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
-/* TOGETHER: number of right-hand sides that are solved together; it bounds the work space. LARGE:
- * vertices of a part above which only one part has a factor at a time, to save memory. */
-enum { TOGETHER = 8, LARGE = 100000 };
+/* BATCH: largest number of right-hand sides that are solved together, which limits the work space.
+ * LARGE: number of vertices above which the factor of a part is freed after each solve. */
+enum { BATCH = 8, LARGE = 100000 };
 
-/* Largest relative residual of a solve; double precision reaches about 1e-16 (R / h)^2, h the
- * length of a link. */
+/* Largest relative residual of a solve. Double precision reaches about 1e-16 (R / h)^2 on edges of
+ * length h. */
 static const double residual_limit = 1e-8;
 
-/* A part of the mesh that no edge links to the rest, such as one lung. Each part is solved in its
- * own thread, unless it is large. */
+/* A part of the mesh without edges to other parts, such as one lung. Each part is solved in its own
+ * thread, unless the first part is large. */
 typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and their number */
   size_t edge, edge_count;
@@ -45,11 +45,11 @@ struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
   double reach;    /* mm */
-  double *area;    /* [N] area of a vertex over the mean; NULL: the paper's springs */
-  double *link;    /* [edges] with a reach: w / 2; without: D(mass, spring) in mm */
+  double *area;    /* [N] area of a vertex over the mean; NULL: no reach */
+  double *link;    /* [edges] D(mass, spring) in mm; with a reach: w / 2 */
   double *lesions; /* [N] factors on the normalised stiffness; NULL: 1 */
-  double *give;    /* [N] S of the matrix: a = 1/E; with a reach: 1 */
-  double *load;    /* [N] right-hand side per unit force: 1; with a reach: area / E */
+  double *mass_s;  /* [N] S in the matrix: a = 1/E; with a reach: 1 */
+  double *load;    /* [N] right-hand side for a unit force: 1; with a reach: area / E */
   size_t part_count;
   part parts[2];
 };
@@ -65,7 +65,7 @@ void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium) {
     free(equilibrium->area);
     free(equilibrium->link);
     free(equilibrium->lesions);
-    free(equilibrium->give);
+    free(equilibrium->mass_s);
     free(equilibrium->load);
     free(equilibrium);
   }
@@ -87,7 +87,7 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
   for (size_t i = 0; i < count; ++i) {
     if (!(stiffness[i] > 0.0) || !isfinite(stiffness[i])) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "stiffness of vertex %zu is %g: it must be positive and finite", i,
+                              "the stiffness of vertex %zu is %g: give a positive number", i,
                               stiffness[i]);
     }
     logarithms += log(stiffness[i]);
@@ -99,12 +99,12 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
   return SUPINE_OK;
 }
 
-/* Split the vertices in two between indices that no edge spans, as near to the middle as possible;
- * one part if there is no such place. */
+/* Split the vertices into two ranges of indices without edges between them, as equal in size as
+ * possible; one range if that is impossible. */
 static void split(supine_equilibrium *eq) {
   const size_t n = eq->vertex_count;
   const supine_topology *topology = eq->topology;
-  size_t last = 0;  /* highest index that an edge links to a vertex before i */
+  size_t last = 0;  /* highest neighbour of the vertices before i */
   size_t least = n; /* size of the larger part so far */
   part *first = &eq->parts[0];
   *first = (part){.vertex_count = n, .edge_count = topology->edge_count};
@@ -125,8 +125,8 @@ static void split(supine_equilibrium *eq) {
                         .edge_count = topology->edge_count - first->edge_count};
 }
 
-/* Lay out the matrix: topology->edges is sorted, so that edge e is entry e + i + 1 of column i,
- * all counted within the part. */
+/* Create the matrix of a part, without values. As topology->edges is sorted, edge e is entry
+ * e + i + 1 of column i, with indices counted within the part. */
 static bool create_matrix(const supine_topology *topology, part *p) {
   const size_t entries = p->vertex_count + p->edge_count;
   const uint32_t *edges = topology->edges + 2 * p->edge;
@@ -235,9 +235,9 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
   made->area = reach > 0.0 ? malloc(n * sizeof *made->area) : NULL;
   made->link = malloc((topology->edge_count + 1) * sizeof *made->link);
   made->lesions = lesions != NULL ? malloc(n * sizeof *made->lesions) : NULL;
-  made->give = malloc(n * sizeof *made->give);
+  made->mass_s = malloc(n * sizeof *made->mass_s);
   made->load = malloc(n * sizeof *made->load);
-  if (made->link == NULL || made->give == NULL || made->load == NULL ||
+  if (made->link == NULL || made->mass_s == NULL || made->load == NULL ||
       (lesions != NULL && made->lesions == NULL) || (reach > 0.0 && made->area == NULL) ||
       !create_matrices(made)) {
     supine_physics_equilibrium_destroy(made);
@@ -255,8 +255,8 @@ static void set_values(const supine_equilibrium *eq, part *p) {
   const int *begin = p->matrix->p;
   double *value = p->matrix->x;
   for (size_t i = 0; i < p->vertex_count; ++i) {
-    const double give = eq->give[p->vertex + i];
-    value[begin[i]] = (eq->area != NULL ? eq->area[p->vertex + i] : 1.0) * give * give;
+    const double s = eq->mass_s[p->vertex + i];
+    value[begin[i]] = (eq->area != NULL ? eq->area[p->vertex + i] : 1.0) * s * s;
   }
   for (size_t e = 0; e < p->edge_count; ++e) {
     const uint32_t *edge = eq->topology->edges + 2 * (p->edge + e);
@@ -265,10 +265,10 @@ static void set_values(const supine_equilibrium *eq, part *p) {
     double c = eq->link[p->edge + e];
     if (eq->area == NULL) {
       const double d = eq->link[p->edge + e];
-      const double s[2] = {eq->give[edge[0]], eq->give[edge[1]]};
+      const double s[2] = {eq->mass_s[edge[0]], eq->mass_s[edge[1]]};
       const double wide = d + 2.0 * s[0] * s[1];
       c = s[0] * s[1] / (d * wide);
-      *first += (s[0] + s[1]) / (2.0 * s[1] * wide); /* caught by the spring */
+      *first += (s[0] + s[1]) / (2.0 * s[1] * wide); /* kept by the spring */
       *second += (s[0] + s[1]) / (2.0 * s[0] * wide);
     }
     *first += c;
@@ -286,7 +286,7 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
       supine_physics_stiffness_normalise(eq->vertex_count, stiffness, eq->load, error);
   for (size_t i = 0; status == SUPINE_OK && i < eq->vertex_count; ++i) {
     const double a = 1.0 / (eq->load[i] * (eq->lesions != NULL ? eq->lesions[i] : 1.0));
-    eq->give[i] = eq->area != NULL ? 1.0 : a;
+    eq->mass_s[i] = eq->area != NULL ? 1.0 : a;
     eq->load[i] = eq->area != NULL ? eq->area[i] * a : 1.0;
   }
   for (size_t k = 0; k < eq->part_count && status == SUPINE_OK; ++k) {
@@ -343,17 +343,17 @@ static supine_status factorise(part *p) {
   return SUPINE_OK;
 }
 
-/* Solve a part for right-hand sides r to r + count - 1, and raise the part's residual to the
- * largest of theirs. */
+/* Solve a part for right-hand sides r to r + count - 1, and include their residuals in the largest
+ * residual of the part. */
 static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   part *p = &s->eq->parts[k];
   const size_t n = p->vertex_count;
   const double *load = s->eq->load + p->vertex;
-  const double *give = s->eq->give + p->vertex;
+  const double *mass_s = s->eq->mass_s + p->vertex;
   const double *force = s->force + p->vertex * s->count + r;
   double *catch_ = s->catch_ + p->vertex * s->count + r;
-  double norm[TOGETHER] = {0.0};
-  double square[TOGETHER] = {0.0};
+  double norm[BATCH] = {0.0};
+  double square[BATCH] = {0.0};
   double one[2] = {1.0, 0.0};
   double minus[2] = {-1.0, 0.0};
   cholmod_dense *right = cholmod.allocate_dense(n, count, n, CHOLMOD_REAL, &p->common);
@@ -369,9 +369,9 @@ static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   const bool solved = t != NULL && cholmod.sdmult(p->matrix, 0, minus, one, t, right, &p->common);
   for (size_t i = 0; i < n && solved; ++i) {
     for (size_t c = 0; c < count; ++c) {
-      const double left = ((const double *)right->x)[c * n + i];
-      catch_[i * s->count + c] = give[i] * give[i] * ((const double *)t->x)[c * n + i];
-      square[c] += left * left;
+      const double residual = ((const double *)right->x)[c * n + i];
+      catch_[i * s->count + c] = mass_s[i] * mass_s[i] * ((const double *)t->x)[c * n + i];
+      square[c] += residual * residual;
     }
   }
   for (size_t c = 0; c < count && solved; ++c) {
@@ -389,9 +389,9 @@ static void solve_parts(void *context, size_t begin, size_t end, size_t thread) 
   for (size_t k = begin; k < end; ++k) {
     part *p = &s->eq->parts[k];
     s->status[k] = factorise(p);
-    for (size_t r = 0; r < s->count && s->status[k] == SUPINE_OK; r += TOGETHER) {
-      const size_t left = s->count - r;
-      s->status[k] = solve_columns(s, k, r, left < TOGETHER ? left : TOGETHER);
+    for (size_t r = 0; r < s->count && s->status[k] == SUPINE_OK; r += BATCH) {
+      const size_t count = s->count - r < BATCH ? s->count - r : BATCH;
+      s->status[k] = solve_columns(s, k, r, count);
     }
     if (p->vertex_count > LARGE) {
       cholmod.free_factor(&p->factor, &p->common);
@@ -416,10 +416,12 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
                               equilibrium->vertex_count);
     }
     if (s.status[k] != SUPINE_OK || !(s.residual[k] <= residual_limit)) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "equilibrium: the relative residual is %.3g, above %.3g: check that "
-                              "forces and stiffnesses are finite, or give a shorter --reach",
-                              s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
+      return supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "the equilibrium was not solved: the relative residual is %.3g, above "
+          "%.3g. Check that forces and stiffnesses are finite, or give a "
+          "shorter --reach",
+          s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
     }
   }
   return SUPINE_OK;
@@ -437,7 +439,7 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   for (size_t i = 0; i < n; ++i) {
-    t[i] = catch_[i] / (eq->give[i] * eq->give[i]);
+    t[i] = catch_[i] / (eq->mass_s[i] * eq->mass_s[i]);
   }
   for (size_t k = 0; k < eq->part_count; ++k) {
     part *p = &eq->parts[k];

@@ -17,7 +17,7 @@ typedef struct force_work {
   const supine_force_law *law;
   const supine_gravities *gravities;
   const size_t *vertices; /* NULL: all */
-  double middle[3];       /* mean position of all vertices, where h equals its mean */
+  double middle[3];       /* mean position of all vertices; computed only with softening */
   double *force;
 } force_work;
 
@@ -34,11 +34,11 @@ static void force_range(void *context, size_t begin, size_t end, size_t thread) 
     double *restrict out = work->force + k * gravities->count;
     double box[3];
     supine_lungs_box_coordinates(work->lungs, vertex, box);
-    const double still = law->base + supine_dot(law->box, box);
+    const double fixed = law->base + supine_dot(law->box, box);
     for (size_t d = 0; d < gravities->count; ++d) {
       const double *g = gravities->directions + 3 * d;
       const double height = gravities->maximum[d] - gravities->minimum[d];
-      out[d] = still + law->gain * (supine_dot(g, p) - gravities->minimum[d]) / height; /* (18) */
+      out[d] = fixed + law->gain * (supine_dot(g, p) - gravities->minimum[d]) / height; /* (18) */
       if (law->soften != 0.0) {
         out[d] *= exp(law->soften * supine_dot(g, from_middle) / height);
       }
@@ -73,7 +73,7 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
     if (!isfinite(law->c[k]) || (k % 2 == 1 && !(law->c[k] > 0.0))) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "direction constant c%zu is %g: %s",
                               k + 1, law->c[k],
-                              k % 2 == 1 ? "exponents must be positive" : "it must be finite");
+                              k % 2 == 1 ? "give a positive exponent" : "give a finite number");
     }
   }
   for (size_t i = 0; i < n && law->vectors == NULL; ++i) {
@@ -88,6 +88,5 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
     }
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "no vertex would move, as every direction is zero: change the direction "
-                          "constants");
+                          "no vertex would move, as every direction is zero: change --constants");
 }

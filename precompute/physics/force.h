@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file The force that gravity and breath apply to the mass nodes, (18) for any orientation,
- * and the direction in which these move, (15)-(17).
+/** @file Compute the force that gravity and breath apply to the mass nodes, (18) for any
+ * orientation, and the directions of displacement of the nodes, (15)-(17).
  *
  *     h_i(g) = (g.p_i - min_j g.p_j) / (max_j g.p_j - min_j g.p_j)      1 where most dependent
  *     f_i(g) = (base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i) exp(soften (h_i(g) - mean h(g)))
  *
- * with X, Y, Z the box coordinates of lungs.h, and min and max over all lungs of the model. With
- * soften, dependent tissue is more expandable: the exponential is a factor on a = 1/E of
- * geometric mean 1 and multiplies the force in the equilibrium (equilibrium.h). */
+ * with X, Y, Z the box coordinates of lungs.h, and min and max over all lungs. If soften > 0,
+ * dependent tissue is more expandable: the exponential, whose geometric mean is 1, is a factor of
+ * a = 1/E, which multiplies the force in the equilibrium (equilibrium.h). */
 #ifndef SUPINE_FORCE_H
 #define SUPINE_FORCE_H
 
@@ -16,11 +16,11 @@
 /** Constants of the force f, without unit. */
 typedef struct supine_force_law {
   double base;
-  double gain;   /**< factor of the height h: the gravity-dependent part */
-  double box[3]; /**< cx, cy, cz: fixed to the body */
+  double gain;   /**< factor of h, the part that depends on gravity */
+  double box[3]; /**< cx, cy, cz */
   double soften; /**< softening of dependent tissue; needs a reach (model.h) */
-  bool pair;     /**< true: heights of a single lung are those of a pair, the lung and its mirror
-                  * image in the midline, so that it moves as if beside the other lung */
+  bool pair;     /**< true: min and max for a single lung include its mirror image in the midline,
+                  * so that the lung moves as if beside the other lung */
 } supine_force_law;
 
 /** Find the smallest and largest g.p over all vertices, in mm, for each of `count` directions g
@@ -46,17 +46,17 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
                           const supine_gravities *gravities, size_t vertex_count,
                           const size_t *vertices, double *force);
 
-/** The direction of displacement: (15)-(17), d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm, or a
- * patient's own. */
+/** The direction of displacement: (15)-(17), d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm, or directions
+ * fitted to a patient. */
 typedef struct supine_direction_law {
   double c[6];           /**< c1 to c6 (model.h) */
-  const double *vectors; /**< [N, 3] mm, used instead of c; NULL: c; owned by the caller */
+  const double *vectors; /**< [N, 3] mm, used instead of c unless NULL; owned by the caller */
 } supine_direction_law;
 
 /** Compute d [N, 3], mm, not normalised.
  * @retval SUPINE_ERROR_ARGUMENT  a constant that is not finite, or an exponent that is not
  *   positive
- * @retval SUPINE_ERROR_MESH      no vertex would move */
+ * @retval SUPINE_ERROR_MESH      every direction is zero */
 supine_status supine_physics_directions(const supine_lungs *lungs, const supine_direction_law *law,
                                         double *directions, supine_error *error);
 

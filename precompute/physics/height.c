@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the extent of the lungs along many directions: the min and max of the heights in (18). */
+/* Find the range of g.p over all vertices for many directions g: the min and max in (18). */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -11,9 +11,9 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells, cut into blocks of
- * neighbours, and blocks into groups. Each block and group has a bounding box, so that most of them
- * are skipped. LANES directions are searched together. */
+/* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells and divided into
+ * blocks of BLOCK neighbours, and blocks into groups of GROUP. Bounding boxes of blocks and groups
+ * let the search skip most of them. LANES directions are searched together. */
 enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS), LANES = 8 };
 
 typedef struct block_box {
@@ -25,7 +25,7 @@ typedef struct range_work {
   size_t count;            /* vertices */
   const double *vertices;  /* [count, 3] sorted */
   const block_box *boxes;  /* [box_count] */
-  const block_box *groups; /* bounding boxes of GROUP blocks each */
+  const block_box *groups; /* boxes of GROUP blocks each */
   size_t box_count;
   size_t direction_count;
   const double *directions;
@@ -56,8 +56,8 @@ static block_box box_of(const double *vertices, size_t count) {
   return box;
 }
 
-/* Report whether a box rises above the best of any lane. */
-static inline bool rises(const block_box *box, const lanes *at) {
+/* Return whether a box may hold a vertex above the best height of any lane. */
+static inline bool may_improve(const block_box *box, const lanes *at) {
   const block_box b = *box;
   int64_t any = 0;
 #pragma GCC unroll 1 /* full unrolling would prevent vectorisation */
@@ -71,7 +71,7 @@ static inline bool rises(const block_box *box, const lanes *at) {
 }
 
 /* Raise the best height of each lane to that of a block's vertices. */
-static inline void look_into(const range_work *work, size_t block, lanes *at) {
+static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   const size_t end = (block + 1) * BLOCK < work->count ? (block + 1) * BLOCK : work->count;
   for (size_t i = block * BLOCK; i < end; ++i) {
     const double x = work->vertices[3 * i];
@@ -85,16 +85,16 @@ static inline void look_into(const range_work *work, size_t block, lanes *at) {
   }
 }
 
-/* Find the greatest heights, beginning in block `seed`; return the last block that was searched, as
- * the seed for the next directions. */
+/* Find the greatest heights, beginning in block `seed`; return the last block searched, a good seed
+ * for the next directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
-  look_into(work, seed, at);
+  raise_best(work, seed, at);
   for (size_t first = 0; first < work->box_count; first += GROUP) {
-    for (size_t block = first; rises(&work->groups[first / GROUP], at) && block < first + GROUP &&
-                               block < work->box_count;
+    for (size_t block = first; may_improve(&work->groups[first / GROUP], at) &&
+                               block < first + GROUP && block < work->box_count;
          ++block) {
-      if (rises(&work->boxes[block], at)) {
-        look_into(work, block, at);
+      if (may_improve(&work->boxes[block], at)) {
+        raise_best(work, block, at);
         seed = block;
       }
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Move a scan to full inflation by Anderson's acceleration (D. G. Anderson, J. ACM 12, 1965) of the
- * iteration p_j -> scan_j - A_j F(g; p) d_j(p). The next step starts from the combination of the
- * last images that has the smallest residual. */
+/* Move a scan to full inflation by Anderson acceleration (D. G. Anderson, J. ACM 12, 1965) of the
+ * iteration p_j -> scan_j - A_j F(g; p) d_j(p), whose result for p is called the image of p. The
+ * next p is the combination of the last images whose residual, image - p, is smallest. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,9 +17,9 @@
 
 enum { SOLVES_MAX = 30, DEPTH = 4 };
 
-/* RMS residual, mm, that ends the iteration, and a larger one that ends it once a step no longer
- * halves the residual: near an almost degenerate triangle a few vertices oscillate by about
- * 0.03 mm. */
+/* RMS residual, mm, that ends the iteration, and a larger limit that ends it if a step does not
+ * halve the residual: near a nearly degenerate triangle a few vertices oscillate by about 0.03 mm.
+ */
 static const double converged = 5e-4;
 static const double stalled = 5e-3;
 static const double folded_share = 0.01; /* largest share of folded triangles in a valid surface */
@@ -30,15 +30,15 @@ typedef struct ascent {
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
-  supine_solution field; /* of the current estimate */
-  size_t size;           /* 3 N */
-  double *image;     /* [size] positions that the iteration gives for the current estimate, mm */
-  double *last;      /* [size] the previous image */
-  double *residual;  /* [size] the previous residual, mm */
-  double rms;        /* of the residual, mm */
-  double *images;    /* [DEPTH, size] differences of successive images */
-  double *residuals; /* [DEPTH, size] differences of successive residuals */
-  size_t begun, history; /* number of differences stored so far, and of those in use */
+  supine_solution field;  /* solution for the current estimate */
+  size_t size;            /* 3 N */
+  double *image;          /* [size] image of the current estimate, mm */
+  double *last;           /* [size] the previous image, mm */
+  double *residual;       /* [size] the previous residual, mm */
+  double rms;             /* RMS residual of the current estimate, mm */
+  double *images;         /* [DEPTH, size] differences of successive images */
+  double *residuals;      /* [DEPTH, size] differences of successive residuals */
+  size_t stored, history; /* number of differences stored so far; number in use */
 } ascent;
 
 /* Fail if too many triangles turn over between the scan and full inflation. */
@@ -48,30 +48,32 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                                 "the scan folds on its way up to full inflation: %.3g %% of its "
-                                "triangles turn over. If it is fuller than --scanned says, change "
-                                "that or --resting; --scanned none takes it as it is",
+                                "triangles turn over. If the scan is fuller than --scanned says, "
+                                "change --scanned or --resting; --scanned none uses the scan as it "
+                                "is",
                                 100.0 * share);
 }
 
-/* Find the gains of one lung's scan, A = s (sigma + 2 bend e(sigma)), with the field's form on
- * the scan: gains of -A add `lacks` (full inflation), gains of s - A add `to_rest` (rest). The
- * first equation gives s for any sigma; secant steps on the second give sigma. */
+/* Find the gains A = s (sigma + 2 bend e(sigma)) of one lung's scan. Applied to the scan, gains of
+ * -A add `to_full` mL (full inflation) and gains of s - A add `to_rest` mL (rest). The first
+ * equation gives s for any sigma; secant steps on the second give sigma.
+ * @param form  of the field on the scan */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
-                                     bool at_rest, double lacks, double to_rest, double gains[3],
+                                     bool at_rest, double to_full, double to_rest, double gains[3],
                                      supine_error *error) {
   enum { STEPS = 50 };
-  static const double met = 1e-9; /* tolerance of volumes, mL */
+  static const double tolerance = 1e-9; /* mL */
   const bool straight = at_rest || (bend[0] == 0.0 && bend[1] == 0.0 && bend[2] == 0.0);
-  double sigma = straight ? 1.0 : lacks / (lacks - to_rest);
+  double sigma = straight ? 1.0 : to_full / (to_full - to_rest);
   double last_sigma = 0.0;
-  double last = 0.0;
+  double last_miss = 0.0;
   for (int i = 0; i < STEPS; ++i) {
     double ratio[3];
     double cubic[3];
     double scale = 0.0;
     supine_volume_bend(bend, sigma, ratio);
     supine_volume_form_along(form, ratio, cubic);
-    const supine_status status = supine_volume_scale(cubic, lacks, &scale, error);
+    const supine_status status = supine_volume_scale(cubic, to_full, &scale, error);
     if (status != SUPINE_OK) {
       return status;
     }
@@ -80,13 +82,14 @@ static supine_status find_lung_gains(const supine_volume_form *form, const doubl
       gains[axis] = -scale * ratio[axis];
       beyond[axis] = -scale - gains[axis];
     }
-    const double off = supine_volume_form_at(form, beyond) - to_rest;
-    if (straight || fabs(off) <= met) {
+    const double miss = supine_volume_form_at(form, beyond) - to_rest;
+    if (straight || fabs(miss) <= tolerance) {
       return SUPINE_OK;
     }
-    const double next = i == 0 ? 1.01 * sigma : sigma - off * (sigma - last_sigma) / (off - last);
+    const double next =
+        i == 0 ? 1.01 * sigma : sigma - miss * (sigma - last_sigma) / (miss - last_miss);
     last_sigma = sigma;
-    last = off;
+    last_miss = miss;
     sigma = next;
   }
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
@@ -111,8 +114,8 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* Apply the field of the current estimate to the scan, with the gains that give each lung its
- * reference volume. */
+/* Compute the image of the current estimate: apply its field to the scan, with the gains that give
+ * each lung its reference volume. */
 static supine_status find_image(ascent *a, supine_error *error) {
   supine_solution *field = &a->field;
   a->rms = 0.0;
@@ -145,9 +148,10 @@ static double product(const double *a, const double *b, size_t size) {
   return sum;
 }
 
-static void remember(ascent *a) {
-  double *images = a->images + a->begun % DEPTH * a->size;
-  double *residuals = a->residuals + a->begun % DEPTH * a->size;
+/* Store the image and residual, and their differences from the previous ones. */
+static void store_differences(ascent *a) {
+  double *images = a->images + a->stored % DEPTH * a->size;
+  double *residuals = a->residuals + a->stored % DEPTH * a->size;
   const bool first = a->found->solves == 1;
   for (size_t i = 0; i < a->size; ++i) {
     const double residual = a->image[i] - a->lungs.mesh.vertices[i];
@@ -157,11 +161,12 @@ static void remember(ascent *a) {
     a->residual[i] = residual;
   }
   if (!first) {
-    ++a->begun;
+    ++a->stored;
     a->history = a->history < DEPTH ? a->history + 1 : DEPTH;
   }
 }
 
+/* Replace the estimate by the combination of images whose residual is smallest. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
@@ -180,9 +185,9 @@ static supine_status advance(ascent *a, supine_error *error) {
     if (gsl_linalg_HH_svx(&system.matrix, &right.vector) != 0) {
       return supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
-          "no full surface was found: successive steps are equal. If the scan is "
-          "fuller than --scanned says, change that or --resting; --scanned none "
-          "takes it as it is");
+          "no surface at full inflation was found: successive steps are equal. If the scan is "
+          "fuller than --scanned says, change --scanned or --resting; --scanned none uses the scan "
+          "as it is");
     }
   }
   double *to = a->lungs.mesh.vertices;
@@ -207,22 +212,24 @@ static supine_status iterate(ascent *a, supine_error *error) {
       return SUPINE_OK;
     }
     if (status == SUPINE_OK) {
-      remember(a);
+      store_differences(a);
       status = advance(a, error);
     } else if (status == SUPINE_ERROR_NUMERICAL && a->history > 0) {
       /* The step was too long: restart from the last image. */
       a->history = 0;
-      a->begun = 0;
+      a->stored = 0;
       memcpy(a->lungs.mesh.vertices, a->last, a->size * sizeof(double));
       status = SUPINE_OK;
     }
   }
   return status == SUPINE_OK
-             ? supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "no full surface was found: after %d steps it still moves by %.3g "
-                                "mm RMS. If the scan is fuller than --scanned says, change that or "
-                                "--resting; --scanned none takes it as it is",
-                                SOLVES_MAX, a->rms)
+             ? supine_error_set(
+                   error, SUPINE_ERROR_NUMERICAL,
+                   "no surface at full inflation was found: after %d steps it still "
+                   "changes by %.3g mm RMS. If the scan is fuller than --scanned says, "
+                   "change --scanned or --resting; --scanned none uses the scan as it "
+                   "is",
+                   SOLVES_MAX, a->rms)
              : status;
 }
 

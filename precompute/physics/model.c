@@ -32,8 +32,7 @@ supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const 
                             "stiffness, so it would change with gravity. Give --reach 10, or "
                             "leave --soften out");
   }
-  /* A longer reach spreads every force evenly over the lungs; the matrix is then nearly singular.
-   */
+  /* Limit the reach: a longer one spreads every force evenly, and makes the matrix singular. */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);
   const double reach = fmin(model->reach, longest);
   if (*equilibrium != NULL) {

@@ -1,32 +1,31 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the Pitcher/Catcher iteration, (5)-(14), as the paper states it: the reference of the direct
- * solve. */
+/* Run the Pitcher/Catcher iteration, (5)-(14), as the paper states it. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "precompute/physics/equilibrium.h"
 
-/* Nodes 0 to N - 1 are the masses, N + e the spring of edge e. A binary heap keeps the node that
- * holds most on top. */
+/* Nodes 0 to N - 1 are the masses, node N + e is the spring of edge e. A binary heap keeps the node
+ * with the largest Pitcher on top. */
 typedef struct iteration {
   size_t node_count;
-  size_t *clique_begin; /* [nodes + 2] node j's first index in `clique` */
+  size_t *clique_begin; /* [nodes + 2] index in `clique` of the first neighbour of a node */
   size_t *clique;       /* neighbours of each node, without itself */
   double *te;           /* Te[j->i] of each neighbour in `clique` */
-  double *kept;         /* Te[j->j] */
-  double *held;         /* the Pitcher, may be negative */
-  double *caught;       /* the Catcher */
-  size_t *heap;         /* nodes; the largest |held| on top */
-  size_t *place;        /* index of each node in the heap */
+  double *te_self;      /* [nodes] Te[j->j] */
+  double *pitcher;      /* [nodes] may be negative */
+  double *catcher;      /* [nodes] */
+  size_t *heap;         /* [nodes] nodes; the largest |pitcher| on top */
+  size_t *place;        /* [nodes] index of each node in the heap */
 } iteration;
 
 static void iteration_free(iteration *it) {
   free(it->clique_begin);
   free(it->clique);
   free(it->te);
-  free(it->kept);
-  free(it->held);
-  free(it->caught);
+  free(it->te_self);
+  free(it->pitcher);
+  free(it->catcher);
   free(it->heap);
   free(it->place);
 }
@@ -40,7 +39,7 @@ static void heap_swap(iteration *it, size_t a, size_t b) {
 }
 
 static double heap_key(const iteration *it, size_t at) {
-  return fabs(it->held[it->heap[at]]);
+  return fabs(it->pitcher[it->heap[at]]);
 }
 
 static void heap_up(iteration *it, size_t at) {
@@ -75,16 +74,16 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
   it->clique_begin = calloc(nodes + 2, sizeof *it->clique_begin);
   it->clique = malloc((4 * topology->edge_count + 1) * sizeof *it->clique);
   it->te = malloc((4 * topology->edge_count + 1) * sizeof *it->te);
-  it->kept = malloc(nodes * sizeof *it->kept);
-  it->held = calloc(nodes, sizeof *it->held);
-  it->caught = calloc(nodes, sizeof *it->caught);
+  it->te_self = malloc(nodes * sizeof *it->te_self);
+  it->pitcher = calloc(nodes, sizeof *it->pitcher);
+  it->catcher = calloc(nodes, sizeof *it->catcher);
   it->heap = calloc(nodes, sizeof *it->heap);
   it->place = calloc(nodes, sizeof *it->place);
-  if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->kept == NULL ||
-      it->held == NULL || it->caught == NULL || it->heap == NULL || it->place == NULL) {
+  if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->te_self == NULL ||
+      it->pitcher == NULL || it->catcher == NULL || it->heap == NULL || it->place == NULL) {
     return false;
   }
-  /* Offset by one: filling advances each entry to where the next node begins. */
+  /* Offset by one: filling advances each entry to the beginning of the next node. */
   size_t *begin = it->clique_begin + 1;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];
@@ -116,22 +115,22 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
     for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
       it->te[c] /= z;
     }
-    it->kept[j] = s / z;
+    it->te_self[j] = s / z;
   }
   return true;
 }
 
-/* Distribute all that node j holds over its clique, (5)-(7). */
+/* Distribute the Pitcher of node j over its clique, (5)-(7). */
 static void distribute(iteration *it, size_t j) {
-  const double held = it->held[j];
-  it->caught[j] += it->kept[j] * held;
-  it->held[j] = 0.0;
+  const double held = it->pitcher[j];
+  it->catcher[j] += it->te_self[j] * held;
+  it->pitcher[j] = 0.0;
   heap_down(it, it->place[j]);
   for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
     const size_t i = it->clique[c];
-    const double before = fabs(it->held[i]);
-    it->held[i] += it->te[c] * held;
-    if (fabs(it->held[i]) > before) {
+    const double before = fabs(it->pitcher[i]);
+    it->pitcher[i] += it->te[c] * held;
+    if (fabs(it->pitcher[i]) > before) {
       heap_up(it, it->place[i]);
     } else {
       heap_down(it, it->place[i]);
@@ -145,7 +144,7 @@ supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,
                                double *masses,
-                               void (*progress)(void *context, size_t steps, double held),
+                               void (*progress)(void *context, size_t steps, double remaining),
                                void *context, supine_error *error) {
   const size_t n = mesh->vertex_count;
   iteration it = {0};
@@ -166,7 +165,7 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
   double largest = 0.0;
   double sum = 0.0;
   for (size_t i = 0; i < n; ++i) {
-    it.held[i] = force[i];
+    it.pitcher[i] = force[i];
     largest = fmax(largest, fabs(force[i]));
     sum += fabs(force[i]);
   }
@@ -178,16 +177,16 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
   }
   for (size_t steps = 0; heap_key(&it, 0) > tolerance * largest; ++steps) {
     if (progress != NULL && steps % n == 0) {
-      double held = 0.0;
+      double remaining = 0.0;
       for (size_t j = 0; j < it.node_count; ++j) {
-        held += fabs(it.held[j]);
+        remaining += fabs(it.pitcher[j]);
       }
-      progress(context, steps, held / sum);
+      progress(context, steps, remaining / sum);
     }
     distribute(&it, it.heap[0]);
   }
   for (size_t i = 0; i < n; ++i) {
-    masses[i] = it.caught[i];
+    masses[i] = it.catcher[i];
   }
 cleanup:
   iteration_free(&it);

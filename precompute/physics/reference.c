@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the reference volumes from a scan's state, and move its lungs to full inflation. */
+/* Find the reference volumes from the state of a scan, and move the lungs to full inflation. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 
 #include "precompute/physics/reference.h"
 
-static const double tissue_share = 0.1; /* least share of the full volume: tissue without gas */
+static const double tissue_share = 0.1; /* volume of the tissue as a share of the full volume */
 
 supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
                                           supine_error *error) {
@@ -25,17 +25,16 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
   const supine_volume_kind kind = read.state.volume.kind;
   if (read.state.lung_count > 0 || (kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s' is no state of a scan, as the mesh has its volume: give full or "
-                            "POSTURE:rest, either with +ML or -ML for both lungs together, or none",
+                            "'%s' is not the state of a scan: give full or POSTURE:rest, also with "
+                            "+ML or -ML for both lungs together, or none",
                             text);
   }
   *scan = read;
   return SUPINE_OK;
 }
 
-/* Compute a lung's volume at t from those at rest and at full inflation, by the lines of resting.h.
- */
-static double line(double rest, double full, double t) {
+/* Compute the volume of a lung at t from its volumes at rest and at full inflation (resting.h). */
+static double volume_at(double rest, double full, double t) {
   return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
 }
 
@@ -67,12 +66,12 @@ void supine_reference_share_out(const supine_reference *reference, const double 
   const double t =
       total < at_rest ? total / at_rest - 1.0 : (total - at_rest) / (at_full - at_rest);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
-    ml[lung] = line(rest[lung], full[lung], t);
+    ml[lung] = volume_at(rest[lung], full[lung], t);
   }
 }
 
-/* Find the reference volumes F of lungs that hold `volume` [lung_count] mL in the scan: those for
- * the t of resting.h at which the scan is as many mL from rest, or from full inflation, as its
+/* Find the reference volumes F of lungs that hold `volume` [lung_count] mL in the scan. Bisect t of
+ * resting.h, which gives F, until the scan is as many mL from rest, or from full inflation, as its
  * state says. */
 static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
   const supine_state *state = &found->scan.state;
@@ -86,7 +85,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
     for (size_t lung = 0; lung < found->lung_count; ++lung) {
       const double rest =
           supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);
-      found->full_volume[lung] = volume[lung] / line(rest, full, t);
+      found->full_volume[lung] = volume[lung] / volume_at(rest, full, t);
       beyond += volume[lung] - found->full_volume[lung] * (from_rest ? rest : full);
     }
     if (state->volume.ml == 0.0) {
@@ -108,8 +107,8 @@ static supine_status find_full(supine_reference *found, const double *volume, su
     (void)supine_state_print(state, text, sizeof text);
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "a scan of %.0f mL cannot be '%s': %s. Change --scanned", held, text,
-                            beyond_full ? "that is beyond full inflation"
-                                        : "that leaves less than the tissue alone, 10 % of full");
+                            beyond_full ? "that is more than full inflation"
+                                        : "that is less than the tissue, 10 % of full inflation");
   }
   return SUPINE_OK;
 }
@@ -127,7 +126,7 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
   if (!lungs->topology.closed && scan->known && !full) {
     return supine_error_set(
         error, SUPINE_ERROR_OPEN_SURFACE,
-        "an open surface has no volume: close it, or give --scanned full or none");
+        "an open surface has no volume: close the mesh, or give --scanned full or none");
   }
   if (!lungs->topology.closed || !scan->known) {
     return SUPINE_OK;

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Move a scan to full inflation, the reference of every posture.
+ * Move a scan to full inflation, the reference surface of every posture.
  *
- * A lung at full inflation has nearly the same shape in every posture; below it the lowest regions
- * are the emptiest (Milic-Emili 1966; Glazier 1967 found alveoli of one size at 30 cmH2O). So
- * displacements are counted from full inflation, down to rest and beyond:
+ * A lung at full inflation has nearly the same shape in every posture; at smaller volumes the
+ * lowest regions are the emptiest (Milic-Emili 1966; Glazier 1967 found alveoli of one size at 30
+ * cmH2O). So displacements are counted from full inflation, down to rest and beyond:
  *
  *     x_ij(g) = p_ij + A_j F_i(g) d_ij     p: the surface at full inflation; A: gains of each
  *                                          lung, from its volume (supine_volume_form_gains)
  *
- * A scan is one such state with unknown p. F and d are those of p, so p is a fixed point,
+ * A scan is one such state with unknown p. As F and d depend on p, p is the fixed point of
  *
  *     p_j = scan_j - A_j F(g_scan; p) d_j(p)       A from the volume between the scan and full
  *                                                  inflation
  *
- * and a person's reference is nearly the same whatever state was scanned. */
+ * For one person, p is nearly the same whatever state was scanned. */
 #ifndef SUPINE_REFERENCE_H
 #define SUPINE_REFERENCE_H
 
@@ -25,7 +25,7 @@
 
 /** The state that a scan shows. */
 typedef struct supine_scan {
-  bool known; /**< false: the scan itself is the reference of every posture, and rest is unknown */
+  bool known;         /**< false: the scan itself is the reference surface, and rest is unknown */
   supine_state state; /**< rest or full inflation, and mL beyond it */
 } supine_scan;
 
@@ -40,19 +40,19 @@ typedef struct supine_scan_frame {
   double millimetres_per_unit;
 } supine_scan_frame;
 
-/** Volumes of each lung, as if healthy, and the gains of the scan. Volumes are gas and tissue, mL.
- */
+/** Volumes of each lung, as if healthy, and the gains of the scan. Volumes are in mL, gas and
+ * tissue. */
 typedef struct supine_reference {
-  bool known; /**< false: volumes count from the scan, and rest is unknown */
+  bool known; /**< false: volumes are relative to the scan, and rest is unknown */
   supine_scan scan;
   supine_resting resting; /**< as shares: volumes in mL are converted */
   size_t lung_count;
   int side[2];             /**< +1 left, -1 right */
   double full_volume[2];   /**< F, volume of the reference surface */
-  double scan_volume[2];   /**< volume of the scan less F: negative below full inflation */
+  double scan_volume[2];   /**< volume of the scan minus F: negative below full inflation */
   double scan_rest[2];     /**< volume at rest in the scan's posture; 0 if the scan is full */
   double scan_gains[2][3]; /**< A of the scan */
-  size_t solves;           /**< number of full solves to the fixed point */
+  size_t solves;           /**< number of solves to reach the fixed point */
   double moved;            /**< largest distance from the scan to the reference surface, mm */
 } supine_reference;
 
@@ -60,8 +60,7 @@ typedef struct supine_reference {
  * must be at full inflation or unknown, and rest stays unknown.
  * @param lungs  vertices and box change; the midline stays
  * @retval SUPINE_ERROR_OPEN_SURFACE  an open surface in a known state other than full
- * @retval SUPINE_ERROR_ARGUMENT      a scan with less volume than its tissue, or beyond full
- * inflation
+ * @retval SUPINE_ERROR_ARGUMENT      a scan below the volume of its tissue, or above full inflation
  * @retval SUPINE_ERROR_NUMERICAL     the surface folds on the way, or no fixed point is found
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_MESH */
 supine_status supine_reference_find(supine_lungs *lungs, const supine_model *model,
@@ -75,14 +74,13 @@ double supine_reference_rest(const supine_reference *reference, const double g[3
 /** Compute the same at full inflation. */
 double supine_reference_full(const supine_reference *reference, const double g[3], double *ml);
 
-/** Divide `total` mL between the lungs, at one t of resting.h, into ml [lung_count]. */
+/** Divide `total` mL between the lungs into ml [lung_count], with the same t of resting.h. */
 void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
                                 double *ml);
 
-/** Move scanned lungs to their reference volumes, in place: the fixed point above. `reference` has
- * the scan and the volumes; its gains, solves and largest distance are written, and lungs->scanned
- * takes the vertices of the scan. Statuses as
- * supine_reference_find. */
+/** Move scanned lungs to their reference volumes, in place, by solving for the fixed point above.
+ * lungs->scanned takes the vertices of the scan. Statuses as supine_reference_find.
+ * @param reference  has the scan and the volumes; scan_gains, solves and moved are written */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *reference, supine_error *error);
 
@@ -92,7 +90,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
  * @param directions  [N, 3] d, mm
  * @param amounts     [N] F along the scan's gravity
  * @param reference   has the volumes; scan_gains are written
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds on the way */
+ * @retval SUPINE_ERROR_NUMERICAL  no gains give these volumes */
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
                                           const double *directions, const double *amounts,
                                           supine_reference *reference, supine_error *error);
@@ -105,8 +103,8 @@ typedef struct supine_person {
   supine_sex sex;
 } supine_person;
 
-/** Find the volume of both lungs at full inflation, supine, gas and tissue, mL: the least and the
- * largest of usual adults if height or sex is unknown, else the same value twice. */
+/** Estimate the volume of both lungs at full inflation, supine, gas and tissue, in mL: the smallest
+ * and the largest of usual adults if height or sex is unknown, else the same value twice. */
 void supine_reference_capacity(const supine_person *person, double range[2]);
 
 /** Append the full volume, mL, expected of the reference's lungs to text [size]: "expected 6500",
@@ -114,8 +112,8 @@ void supine_reference_capacity(const supine_person *person, double range[2]);
 void supine_reference_compare(const supine_reference *reference, const supine_person *person,
                               char *text, size_t size);
 
-/** Warn if the full volume is implausible for the person, or if a scan at rest contradicts a given
- * volume at rest.
+/** Write a warning if the full volume is implausible for the person, or if a scan at rest
+ * contradicts a given volume at rest.
  * @param given  volumes at rest before supine_reference_resting_settle
  * @param text   [size] the warning; empty if there is none */
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,

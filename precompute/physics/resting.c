@@ -9,8 +9,8 @@
 
 #include "precompute/physics/resting.h"
 
-/* Sources of the shares, tissue included (gas + tissue over full gas + tissue, supine). Shares of
- * both lungs together:
+/* Shares of healthy people: gas and tissue, relative to gas and tissue at full inflation, supine.
+ * Sources, for both lungs together:
  *
  *   supine   functional residual capacity 3.39 L of 7.21 L upright (GLI 2021, Hall et al., Eur
  *            Respir J 57: 2000289, man of 45 years and 1.78 m), 0.86 L of tissue (Denison 1986,
@@ -18,21 +18,18 @@
  *            n 13): 0.43
  *   prone, on either side  0.35 L above supine (Lumb & Nimmo; one figure for all three): 0.47
  *   upright  15 % above supine (Yamada 2020, Sci Rep 10, n 100: 3.2 L seated, 2.7 L supine)
- *   head down  no volume in litres was found; end-expiratory volume follows the sine of a tilt feet
- *            down and is at or near its least when horizontal ("Effects of body tilting on
- *            respiratory mechanics", J Appl Physiol 1956): as supine
+ *   head down  as supine: no volume in litres was found; end-expiratory volume follows the sine of
+ *            a tilt feet down and is at or near its minimum when horizontal ("Effects of body
+ *            tilting on respiratory mechanics", J Appl Physiol 1956)
  *
- * They are divided between the lungs in the proportions tabulated after Svanberg 1957. The left
- * lung's 0.563 when lying on the right follows from the lower lung's part of a breath in that
- * posture; no other check of it was found. */
+ * The shares of each lung have the proportions tabulated after Svanberg 1957. The left lung's 0.563
+ * when lying on the right follows from the lower lung's part of a breath in that posture; no other
+ * source for it was found. */
 static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
                                                {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
 
-static const double least_share = 0.1; /* of tissue without gas */
+static const double least_share = 0.1; /* share of the tissue without gas */
 static const double most_share = 1.0;
-
-/* Left lung's share of both lungs' full volume, to split a value given for both. */
-static const double left_part = 0.45;
 
 supine_resting supine_reference_resting_default(void) {
   return usual;
@@ -62,7 +59,8 @@ static bool read_value(supine_resting *resting, size_t axis, const char *text) {
       return false;
     }
   } else {
-    const double both = left_part * usual.share[0][axis] + (1.0 - left_part) * usual.share[1][axis];
+    const double both =
+        SUPINE_LEFT_SHARE * usual.share[0][axis] + (1.0 - SUPINE_LEFT_SHARE) * usual.share[1][axis];
     share[0] *= usual.share[0][axis] / both;
     share[1] *= usual.share[1][axis] / both;
   }
@@ -78,16 +76,15 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
   supine_resting set = *resting;
   if (supine_posture_gravity(posture, g) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a volume at rest for '%s', which is no posture; did you mean '%s'?",
-                            posture, supine_posture_nearest(posture));
+                            "--resting: '%s' is not a posture; did you mean '%s'?", posture,
+                            supine_posture_nearest(posture));
   }
   for (size_t k = 0; k < 3; ++k) { /* named postures lie along the axes */
     if (g[k] != 0.0 && !read_value(&set, 2 * k + (g[k] < 0.0), value)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "%s at rest: '%s' is neither a share of the full volume above %g and "
-          "at most %g (0.43; left and right lung 0.42/0.44) nor a volume of gas "
-          "and tissue (2600mL): give one of them",
+          "--resting %s=%s: give a share of the full volume above %g and at most %g (0.43, or "
+          "0.42/0.44 for the left and the right lung) or a volume of gas and tissue (2600mL)",
           posture, value, least_share, most_share);
     }
   }
@@ -95,8 +92,9 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
   return SUPINE_OK;
 }
 
+static const char *const names[] = {"left", "right", "supine", "prone", "inverted", "upright"};
+
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size) {
-  static const char *const names[] = {"left", "right", "supine", "prone", "inverted", "upright"};
   size_t used = 0;
   for (size_t axis = 0; axis < 6 && used < size; ++axis) {
     used += (size_t)snprintf(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
@@ -107,32 +105,39 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error) {
-  double sum = 0.0;
+  double sum = 0.0; /* of the ratios of given to default volume */
   size_t known = 0;
-  double factor[6];
   for (size_t axis = 0; axis < 6; ++axis) {
     double rest = 0.0;
     for (size_t lung = 0; lung < count; ++lung) {
       rest += full[lung] * resting->share[side[lung] < 0][axis];
     }
-    factor[axis] = resting->ml[axis] / rest;
-    sum += factor[axis];
+    const double factor = resting->ml[axis] / rest;
+    sum += factor;
     known += resting->ml[axis] > 0.0;
-  }
-  for (size_t axis = 0; axis < 6 && known > 0; ++axis) {
-    for (size_t k = 0; k < 2; ++k) {
-      double *share = &resting->share[k][axis];
-      if (resting->ml[axis] > 0.0) {
-        *share *= factor[axis];
-      } else if (*share == usual.share[k][axis]) {
-        *share = fmin(*share * sum / (double)known, most_share);
+    for (size_t k = 0; k < 2 && resting->ml[axis] > 0.0; ++k) {
+      resting->share[k][axis] *= factor;
+      if (!is_share(resting->share[k][axis])) {
+        return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "lungs whose full volume is %.0f mL do not hold %.0f mL at rest, "
+                                "%s: change --resting or --scanned",
+                                full[0] + (count > 1 ? full[1] : 0.0), resting->ml[axis],
+                                names[axis]);
       }
     }
-    if (!is_share(resting->share[0][axis]) || !is_share(resting->share[1][axis])) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "lungs whose full volume is %.0f mL do not hold %.0f mL at rest: "
-                              "change --resting or --scanned",
-                              full[0] + (count > 1 ? full[1] : 0.0), resting->ml[axis]);
+  }
+  for (size_t axis = 0; axis < 6 && known > 0; ++axis) {
+    for (size_t k = 0; k < 2 && resting->ml[axis] == 0.0; ++k) {
+      double *share = &resting->share[k][axis];
+      if (*share == usual.share[k][axis]) {
+        *share = fmin(*share * sum / (double)known, most_share);
+      }
+      if (!is_share(*share)) {
+        return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "--resting scales the volume at rest, %s, to less than the tissue: "
+                                "give this volume too",
+                                names[axis]);
+      }
     }
     resting->ml[axis] = 0.0;
   }
@@ -144,8 +149,8 @@ double supine_reference_resting_share(const supine_resting *resting, int side, c
 }
 
 double supine_reference_resting_total(const supine_resting *resting, const double g[3]) {
-  return left_part * supine_reference_along_axes(resting->share[0], g) +
-         (1.0 - left_part) * supine_reference_along_axes(resting->share[1], g);
+  return SUPINE_LEFT_SHARE * supine_reference_along_axes(resting->share[0], g) +
+         (1.0 - SUPINE_LEFT_SHARE) * supine_reference_along_axes(resting->share[1], g);
 }
 
 double supine_reference_full_share(const double g[3]) {
@@ -163,10 +168,13 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
   return value;
 }
 
-/* With e the even parts, of mean m: sum of e_k g_k^2 = m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y)
- * / 2 (x^2 - y^2). The constants are those of Y at l <= 2. */
+/* With the even parts e and their mean m, the sum of e_k g_k^2 is
+ *
+ *     m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) / 2 (x^2 - y^2)
+ *
+ * Each term is divided by the factor that its harmonic Y has. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]) {
-  static const size_t axis_term[3] = {3, 1, 2}; /* of x, y, z: m = 1, -1, 0 */
+  static const size_t axis_term[3] = {3, 1, 2}; /* index of the harmonics x, y, z of band 1 */
   double even[3];
   for (size_t t = 0; t < 9; ++t) {
     harmonics[t] = 0.0;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Solve the full physics for one orientation: the reference that every basis is measured against.
- */
+/* Solve the full physics for one orientation, the reference for every basis. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,19 +72,18 @@ cleanup:
 double supine_physics_solution_largest(const supine_solution *solution) {
   double largest = 0.0;
   for (size_t i = 0; i < solution->vertex_count; ++i) {
-    const double *d = solution->directions + 3 * i;
-    const double length = supine_length(d);
-    largest = fmax(largest, fabs(solution->catch_[i]) * length);
+    largest =
+        fmax(largest, fabs(solution->catch_[i]) * supine_length(solution->directions + 3 * i));
   }
   return largest;
 }
 
-void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *rest,
+void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *reference,
                                    double scale, double *positions) {
   for (size_t i = 0; i < solution->vertex_count; ++i) {
     for (size_t k = 0; k < 3; ++k) {
-      positions[3 * i + k] =
-          rest->vertices[3 * i + k] + scale * solution->catch_[i] * solution->directions[3 * i + k];
+      positions[3 * i + k] = reference->vertices[3 * i + k] +
+                             scale * solution->catch_[i] * solution->directions[3 * i + k];
     }
   }
 }

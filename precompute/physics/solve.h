@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Solve the full physics for one orientation: the reference that every basis is measured against.
- */
+ * Solve the full physics for one orientation, the reference for every basis. */
 #ifndef SUPINE_SOLVE_H
 #define SUPINE_SOLVE_H
 
@@ -13,18 +12,19 @@
 /** Solution for one orientation, without harmonics: displacements u_i = s F_i d_i at scale s. */
 typedef struct supine_solution {
   size_t vertex_count;
-  supine_equilibrium *equilibrium; /**< of the same lungs, kept for another solve */
+  supine_equilibrium *equilibrium; /**< kept for another solve of the same lungs */
   double *catch_;                  /**< [N] F */
-  double *directions;              /**< [N, 3] d, mm, of the collapsed lungs' shape (disease.h) */
+  double *directions;              /**< [N, 3] d, mm; for collapsed lungs by
+                                      supine_tissue_rest_directions */
   bool has_volume;                 /**< the surface is closed, and cubic is set */
   double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
-  supine_volume_form form[2]; /**< volume that each lung gains, by its three gains */
-  double residual;            /**< relative, of the equilibrium */
+  supine_volume_form form[2]; /**< volume that each lung gains as a form of its three gains, mL */
+  double residual;            /**< relative residual of the equilibrium */
 } supine_solution;
 
 /** Solve for gravity along the unit vector `g`.
  * @param solution  zero-initialised, or a solution of the same lungs, whose vertices may have
- * moved: then its arrays and the factor's memory are reused. Empty after a failure; release with
+ *   moved: its memory is then reused. Empty after a failure; release with
  *   supine_physics_solution_free
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,
@@ -36,8 +36,8 @@ void supine_physics_solution_free(supine_solution *solution);
 double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Compute positions [N, 3], p + s F d, mm.
- * @param rest  p: the lungs' mesh; of collapsed lungs the surface of supine_tissue_collapse */
-void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *rest,
+ * @param reference  p: the lungs' mesh; for collapsed lungs the surface of supine_tissue_collapse */
+void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *reference,
                                    double scale, double *positions);
 
 #endif

@@ -9,11 +9,12 @@
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
-/* Each lung's triangles are summed in PARTS, BLOCK at a time; the number of parts is fixed, so that
- * the sum does not depend on the number of threads. */
+/* The triangles of each lung are summed in PARTS parts, BLOCK triangles at a time. The number of
+ * parts is fixed, so that the sum does not depend on the number of threads. FORM: number of terms
+ * of a supine_volume_form. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double sixth_ml = 1e-3 / 6.0; /* mL of a tetrahedron per mm^3 of its determinant */
+static const double sixth_ml = 1e-3 / 6.0; /* mL in a tetrahedron whose determinant is 1 mm^3 */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
@@ -22,28 +23,16 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   *forms = (supine_volume_forms){0};
 }
 
-static supine_status forms_allocate(size_t lungs, size_t count, supine_volume_forms *forms) {
-  *forms = (supine_volume_forms){.lung_count = lungs, .column_count = count};
-  forms->linear = calloc(3 * lungs * count, sizeof(double));
-  forms->quadratic = calloc(3 * lungs * count * count, sizeof(double));
-  forms->cubic = calloc(lungs * count * count * count, sizeof(double));
-  if (forms->linear == NULL || forms->quadratic == NULL || forms->cubic == NULL) {
-    supine_physics_volume_forms_free(forms);
-    return SUPINE_ERROR_MEMORY;
-  }
-  return SUPINE_OK;
-}
-
-/* The triangles of one lung, and the columns that move them. */
+/* Sums over the triangles of one lung. */
 typedef struct lung_work {
   const supine_lungs *lungs;
   const double *directions; /* [N, 3]; NULL: columns are vectors */
   const double *columns;    /* [N, K]; without directions [N, 3, K] */
   size_t count;             /* K */
   size_t lung;
-  double centre[3]; /* of the lungs' box, mm: origin of the corners */
+  double centre[3]; /* centre of the lungs' box, mm, origin of the corners */
   double *sums;     /* [PARTS, size] */
-  size_t size;      /* sums of one part */
+  size_t size;      /* number of sums of one part */
   double *space;    /* [threads, room] work space */
   size_t room;
 } lung_work;
@@ -77,7 +66,7 @@ static size_t part_begin(const lung_work *work, size_t part) {
 
 /* --- forms of columns ------------------------------------------------------------------------ */
 
-/* Find the index of the symmetric product of columns k and l. */
+/* Return the index of the product of columns k and l in a list without duplicates. */
 static size_t pair_of(size_t k, size_t l) {
   return k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
 }
@@ -128,9 +117,9 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
   }
 }
 
-/* Add the terms of det(p0 + u0, p1 + u1, p2 + u2) of up to BLOCK triangles, apart by power of u and
- * by axis: linear terms by the axis of u, quadratic terms by the axis of p. The rows of u, area and
- * at are the n first corners, then the n second, then the n third. */
+/* Add the terms of det(p0 + u0, p1 + u1, p2 + u2) of up to BLOCK triangles to separate sums for
+ * each power of u and each axis: linear terms by the axis of u, quadratic terms by the axis of p.
+ * The rows of u, area and at are the n first corners, then the n second, then the n third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;
@@ -192,7 +181,8 @@ static void forms_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Sum the parts, times `unit`, into one lung's forms and make these symmetric. */
+/* Add the sums of all parts, times `unit`, to the forms of one lung, and make the forms symmetric.
+ */
 static void forms_collect(const lung_work *work, double unit, supine_volume_forms *forms) {
   const size_t n = work->count;
   double *linear = forms->linear + 3 * work->lung * n;
@@ -227,8 +217,15 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
   const size_t room = BLOCK * (13 * count + pairs);
   double *sums = malloc(PARTS * size * sizeof *sums);
   double *space = malloc(supine_thread_count() * room * sizeof *space);
-  supine_status status = forms_allocate(lungs->lung_count, count, forms);
-  if (sums == NULL || space == NULL) {
+  supine_status status = SUPINE_OK;
+  *forms = (supine_volume_forms){
+      .lung_count = lungs->lung_count,
+      .column_count = count,
+      .linear = calloc(3 * lungs->lung_count * count, sizeof(double)),
+      .quadratic = calloc(3 * lungs->lung_count * count * count, sizeof(double)),
+      .cubic = calloc(lungs->lung_count * count * count * count, sizeof(double))};
+  if (sums == NULL || space == NULL || forms->linear == NULL || forms->quadratic == NULL ||
+      forms->cubic == NULL) {
     supine_physics_volume_forms_free(forms);
     status = supine_error_set(error, SUPINE_ERROR_MEMORY,
                               "no memory for volume forms of %zu columns", count);

@@ -12,7 +12,7 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** Largest number of functions of orientation in a basis that this program makes. */
+/** Largest number of modes of a basis that 'supine precompute' makes. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
 
 /** The forms of each of G lungs for K columns, mL. */
@@ -26,11 +26,11 @@ typedef struct supine_volume_forms {
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
-/** Find the forms of closed lungs. The caller frees them with supine_physics_volume_forms_free.
- * @param share       [G] each lung's share of its healthy volume (disease.h); NULL: 1
+/** Compute the forms of closed lungs; free them with supine_physics_volume_forms_free.
+ * @param share       [G] volume of each lung relative to healthy (disease.h); NULL: 1
  * @param directions  [N, 3] d of the healthy shape, mm; NULL: the columns are vectors,
  *                    u_ij = A_j sum over k of w_k c_ijk
- * @param columns     [N, count] c, or [N, 3, count]
+ * @param columns     [N, count] c; without directions [N, 3, count]
  * Cost: count^3 / 2 multiplications per triangle, three times as many without directions. Uses all
  * cores.
  * @retval SUPINE_ERROR_MEMORY */
@@ -42,8 +42,9 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
 /** Largest count of supine_physics_volume_of_fields. */
 enum { SUPINE_VOLUME_FIELDS = 16 };
 
-/** Find the forms of closed lungs for each of `count` fields u_ij = A_j f_i d_ij, at most
- * SUPINE_VOLUME_FIELDS. `share` and `directions` as above.
+/** Compute the forms of closed lungs for each of `count` fields u_ij = A_j f_i d_ij, at most
+ * SUPINE_VOLUME_FIELDS.
+ * @param share, directions  as above; directions are not NULL
  * @param fields  [N, count] f
  * @param forms   [G, count] */
 void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *share,
@@ -54,12 +55,12 @@ void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *sh
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form);
 
-/** Compute the volume of all lungs as a polynomial of one gain for all axes: the coefficients, mL,
- * of s, s^2 and s^3 into cubic [3]. */
+/** Compute the volume that all lungs gain as a polynomial of one gain s for all axes: cubic [3]
+ * receives the coefficients of s, s^2 and s^3, mL. */
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
-/** Add the coefficients [3] of that polynomial for one lung to `cubic`. */
+/** Add the coefficients of the same polynomial for one lung to `cubic`. */
 void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]);
 
 #endif
