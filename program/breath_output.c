@@ -11,7 +11,8 @@
 
 #include "program/breath_output.h"
 
-/* Quantum of positions, mm: half of it is less than the storage error (supine_basis_info). */
+/* Step to which positions are rounded, mm: half of it is less than the storage error
+ * (supine_basis_info). */
 static const double rounding = 1.0 / 256.0;
 
 enum { FIELDS = 2 };
@@ -19,13 +20,13 @@ enum { FIELDS = 2 };
 struct breath_output {
   breath_content content;
   const char *path;
-  supine_mesh mesh; /* of the frame: its own vertices, the triangles of the basis */
+  supine_mesh mesh; /* current frame: own vertices, triangles of the basis */
   supine_mesh_save_options save;
   supine_mesh_field fields[FIELDS];
   float *normals;             /* [N, 3] */
-  supine_mesh_series *series; /* of a .vtp file; else NULL */
-  float *positions;           /* [T, N, 3] mm, of a .safetensors file; else NULL */
-  size_t next;                /* number of the next frame of `positions` */
+  supine_mesh_series *series; /* NULL unless the output is a .vtp file */
+  float *positions;           /* [T, N, 3] mm; NULL unless the output is a .safetensors file */
+  size_t next;                /* index of the next frame in `positions` */
   char comment[512];
 };
 
@@ -77,7 +78,7 @@ static supine_status open_tensors(breath_output *made, supine_error *error) {
   if (made->positions == NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_MEMORY,
-        "%s: no memory for %zu frames of %zu vertices (%.1f GB): take fewer, or "
+        "%s: no memory for %zu frames of %zu vertices (%.1f GB): lower --seconds or --fps, or "
         "write a .vtp file",
         made->path, count, frame / 3, 4e-9 * (double)frame * (double)count);
   }

@@ -13,9 +13,9 @@ typedef struct breath_output breath_output;
 
 /* Content of an output. All of it must outlive the output. */
 typedef struct breath_content {
-  const supine_mesh *rest;               /* reference surface of the basis */
-  const double *origin;                  /* [N, 3] from which displacement is measured, mm */
-  const char *origin_name;               /* "the scan" */
+  const supine_mesh *rest; /* reference surface of the basis */
+  const double *origin;    /* [N, 3] positions from which displacement is measured, mm */
+  const char *origin_name; /* their name in comments, such as "the scan" */
   const supine_mesh_save_options *frame; /* axes and units of VTP files */
   const breath_frames *frames;
   const char *made_by; /* command line, for the metadata */
@@ -34,14 +34,14 @@ typedef struct breath_content {
 supine_status supine_command_breath_output_open(const char *path, const breath_content *content,
                                                 breath_output **output, supine_error *error);
 
-/* Add the next frame, [N, 3]. */
+/* Add the positions [N, 3] of the next frame, mm. */
 supine_status supine_command_breath_output_add(breath_output *output, const float *xyz,
                                                supine_error *error);
 
-/* Complete the output. */
+/* Complete the output file. */
 supine_status supine_command_breath_output_commit(breath_output *output, supine_error *error);
 
-/* Release the output, and remove its file where it was not completed. NULL is legal. */
+/* Release the output, and remove its file unless it is complete. NULL is legal. */
 void supine_command_breath_output_close(breath_output *output);
 
 #endif

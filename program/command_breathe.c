@@ -65,12 +65,12 @@ static const supine_option table[] = {
     {"rest-pressure", 0, "P", "cmH2O at the end of an exhalation; default 5",
      SUPINE_FILLS(request, breath.rest_pressure), .wants = "cmH2O", .more = true},
     {"course", 0, "NAME",
-     "pressure over time: cosine (default) or ramp; flow: constant flow in and out, whatever "
-     "the pressure",
+     "course of the breath: cosine (default) or ramp of the pressure; flow: constant flow in and "
+     "out",
      SUPINE_FILLS(request, breath.course), .choices = courses, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
-    {"fps", 0, "N", "frames per second; the default is one every 15 ms", SUPINE_FILLS(request, fps),
+    {"fps", 0, "N", "frames per second; by default one every 15 ms", SUPINE_FILLS(request, fps),
      SUPINE_ABOVE_ZERO, .standard = "66.66"},
     {"seconds", 0, "S", "duration; default: the turn, or one breath",
      SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
@@ -85,8 +85,8 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
   supine_pv_breath *breath = &wanted->breath;
   if (wanted->as_scanned && supine_text_ends_in_any_case(wanted->path, ".safetensors")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--as-scanned is for VTP files only (tensors are in LPS and mm): leave "
-                            "it out");
+                            "--as-scanned is for VTP files only: leave it out, as safetensors are "
+                            "in LPS and mm");
   }
   if (wanted->turns && wanted->orientation.given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
@@ -106,8 +106,8 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
   return frames <= FRAMES_MAX
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "%g s at %g frames a second exceed %d frames: lower --seconds or "
-                                "--fps",
+                                "%g s at %g frames a second is more than %d frames: lower "
+                                "--seconds or --fps",
                                 seconds, wanted->fps, FRAMES_MAX);
 }
 
@@ -123,10 +123,10 @@ static void report(const request *wanted, const breath_frames *frames, double *s
     least = fmin(least, sum);
     peak = fmax(peak, sum);
   }
-  (void)printf("%s: %zu frames, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-               wanted->path, frames->count, frames->time[frames->count - 1], wanted->fps, least,
-               peak);
-  (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, of %.0f ms\n",
+  (void)printf("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
+               wanted->path, frames->count, frames->count == 1 ? "" : "s",
+               frames->time[frames->count - 1], wanted->fps, least, peak);
+  (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
                1e3 * gsl_stats_median(seconds, 1, frames->count),
                1e3 * gsl_stats_max(seconds, 1, frames->count), 1e3 * budget);
 }
@@ -139,7 +139,8 @@ static supine_status play_frames(const breath_frames *frames, breath_output *out
   for (size_t t = 0; t < frames->count && status == SUPINE_OK; ++t) {
     supine_pose pose;
     const double start = supine_clock_seconds();
-    (void)supine_breath_frames_pose(frames, t, &pose, NULL); /* it succeeded in _create */
+    (void)supine_breath_frames_pose(frames, t, &pose,
+                                    NULL); /* succeeded in supine_breath_frames_create */
     supine_deform(frames->basis, &pose, xyz);
     seconds[t] = supine_clock_seconds() - start;
     status = supine_command_breath_output_add(output, xyz, error);
@@ -152,7 +153,7 @@ static supine_status play_frames(const breath_frames *frames, breath_output *out
   return status;
 }
 
-/* Check that the states at the ends of the breath are plausible. */
+/* Check the surfaces with the smallest and the largest volume: warn, or fail if they fold. */
 static supine_status check_ends(const request *wanted, const breath_frames *frames,
                                 supine_error *error) {
   size_t least = 0;
@@ -173,7 +174,7 @@ static supine_status check_ends(const request *wanted, const breath_frames *fram
   return status;
 }
 
-/* Compute and write the breath. Over 60 lines: all resources are made and freed here. */
+/* Compute and write the breath. Over 60 lines, as it makes and frees all resources. */
 static supine_status play(const supine_basis *basis, const request *wanted,
                           const supine_mesh_save_options *frame, size_t count, const char *made_by,
                           supine_error *error) {
@@ -272,7 +273,7 @@ const supine_command supine_command_breathe = {
     .about =
         "Computes breathing lungs from a basis file, in one posture or during a turn, and "
         "writes the surface of each frame. The volume follows the pressure-volume relation and is "
-        "exact in each frame. The computing time of a frame is printed; a smooth display allows 15 "
+        "exact in each frame. The compute time per frame is printed; a smooth display allows 15 "
         "ms.",
     .options = table,
     .notes =

@@ -26,8 +26,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, confidence), .standard = "0.95", .range = {0.0, 1.0}, .open = true,
      .wants = "a number between 0 and 1"},
     {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
-    {"step", 's', "CMH2O", "pressure step of show", SUPINE_FILLS(request, step), .standard = "1",
-     SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
+    {"step", 's', "CMH2O", "for show: step of pressure", SUPINE_FILLS(request, step),
+     .standard = "1", SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
     {.name = NULL}};
 
 /* Make a list of numbers; those that are not finite become null. */
@@ -59,13 +59,13 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     if (reports[limb].rms_percent > 1.0) {
-      supine_options_say(command, "note: the %s samples scatter %.2g %% about their curve",
+      supine_options_say(command, "note: the %s samples deviate from their curve by %.2g %% RMS",
                          supine_breath_limb_name((supine_pv_limb)limb), reports[limb].rms_percent);
     }
   }
   json_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    if (reports[limb].samples > 0) { /* else the curve is the other limb's */
+    if (reports[limb].samples > 0) { /* else this limb has the curve of the other limb */
       (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
                                 json_limb(&pv.limb[limb], &reports[limb]));
     }
@@ -107,7 +107,7 @@ static supine_status run_show(const char *path, const request *chosen, supine_er
   const double steps = (high - low) / chosen->step;
   if (!(steps < ROWS_MAX)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--step is too small for this range of pressures: give a larger one");
+                            "--step gives more than %d rows: give a larger step", ROWS_MAX);
   }
   (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
   for (size_t j = 0; status == SUPINE_OK && (double)j < steps * (1.0 - 1e-12); ++j) {

@@ -17,7 +17,7 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  supine_state state; /* its volume is rest where none was given */
+  supine_state state; /* volume: SUPINE_VOLUME_DEFAULT if none was given */
   bool has_scale, has_vertex, pitcher_catcher;
   double scale;
   size_t vertex;
@@ -29,8 +29,9 @@ static const supine_option table[] = {
     {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP, SUPINE_FILLS(request, state),
      .read = supine_options_read_volume, .rivals = "breath"},
     {"scale", 0, "MM",
-     "largest displacement instead of a volume, mm; negative: reversed. Default where rest is "
-     "unknown: F d, with F the share of the force on a vertex and d its direction in mm",
+     "largest displacement instead of a volume, mm; negative: reversed. Default if rest is "
+     "unknown: gain 1, displacements F d with the share F of the force that a vertex keeps and its "
+     "direction d in mm",
      SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
      .rivals = "breath"},
     {"unit-force", 0, "VERTEX",
@@ -40,8 +41,8 @@ static const supine_option table[] = {
      .more = true},
     {"pitcher-catcher", 0, NULL,
      "iterate as Santhanam 2008 does, always from the node with the largest remaining force; print "
-     "the share of the force that remains and the largest difference from the direct solve. Slow: "
-     "for small meshes. Needs --law paper",
+     "the share of the force that remains and the largest difference from the direct solve. Slow, "
+     "for small meshes; needs --law paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
@@ -81,7 +82,7 @@ cleanup:
   return status;
 }
 
-/* Compute the volume of each lung, mL, above that of its healthy reference surface. */
+/* Compute the volume of each lung relative to its healthy reference surface, mL. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -101,8 +102,10 @@ static supine_status find_volumes(const supine_reference *reference, const supin
     total += supine_reference_rest(reference, g, part);
   }
   if (state->lung_count > 0) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--volume: 'supine solve' takes the volume of all lungs together");
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "--volume: 'supine solve' takes one volume of all lungs together, not a "
+        "volume for each lung");
   }
   supine_reference_share_out(reference, g, total, ml);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
@@ -117,7 +120,7 @@ static void fill(double gains[2][3], double gain) {
   }
 }
 
-/* Find the gains of each lung: by --scale, by the volume of the state, or 1. */
+/* Find the gains of each lung from --scale or from the volume of the state; else set them to 1. */
 static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
@@ -127,19 +130,20 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   if (wanted->has_scale) {
     const double largest = supine_physics_solution_largest(solution);
     fill(gains, wanted->scale / largest);
-    return largest > 0.0 ? SUPINE_OK
-                         : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                            "nothing moves in this direction of gravity: give "
-                                            "another, or another --law");
+    return largest > 0.0
+               ? SUPINE_OK
+               : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                                  "no vertex moves in this posture: give another posture or "
+                                  "another --law");
   }
   if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
     return SUPINE_OK;
   }
   if (!solution->has_volume) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                            "--volume needs a closed surface: close it, or give --scale");
+                            "--volume needs a closed surface: close the mesh, or give --scale");
   }
-  if (!reference->known) { /* breaths are added to the scan, with one gain for both lungs */
+  if (!reference->known) { /* add the volume to the scan, with one gain for both lungs */
     const double held =
         volume->kind == SUPINE_VOLUME_ABSOLUTE ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
     double scale = 0.0;
@@ -147,8 +151,8 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
         volume->kind == SUPINE_VOLUME_SCAN || volume->kind == SUPINE_VOLUME_ABSOLUTE
             ? supine_volume_scale(solution->cubic, volume->ml - held, &scale, error)
             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                               "rest and full are unknown for a scan taken as it is (--scanned "
-                               "none): give scan+ML or an absolute volume, as 2600mL");
+                               "rest and full are unknown with --scanned none: give scan+ML or an "
+                               "absolute volume, as 2600mL");
     fill(gains, scale);
     return status;
   }
@@ -170,10 +174,11 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
 static const double pitcher_tolerance = 1e-6;
 
 /* Print progress at each doubling of the number of distributions per vertex. */
-static void report_held(void *context, size_t steps, double held) {
-  const size_t turns = steps / *(const size_t *)context;
-  if ((turns & (turns - 1)) == 0) {
-    (void)printf("pitcher-catcher: %8zu distributions, %.3g of the force remains\n", steps, held);
+static void report_remaining(void *context, size_t steps, double remaining) {
+  const size_t per_vertex = steps / *(const size_t *)context;
+  if ((per_vertex & (per_vertex - 1)) == 0) {
+    (void)printf("pitcher-catcher: %8zu distributions, %.3g of the force remains\n", steps,
+                 remaining);
   }
 }
 
@@ -182,7 +187,7 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
                              const double g[3], supine_solution *solution, supine_error *error) {
   size_t n = lungs->mesh.vertex_count;
   double range[2];
-  double apart = 0.0;
+  double difference = 0.0;
   double *force = malloc(n * sizeof *force);
   double *caught = malloc(n * sizeof *caught);
   supine_status status = SUPINE_OK;
@@ -199,14 +204,14 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
     const supine_gravities gravity = {1, g, range, range + 1};
     supine_physics_force(lungs, &model->force, &gravity, n, NULL, force);
     status = supine_physics_pitcher_catcher(&lungs->mesh, &lungs->topology, model->stiffness, force,
-                                            pitcher_tolerance, caught, report_held, &n, error);
+                                            pitcher_tolerance, caught, report_remaining, &n, error);
   }
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
-    apart = fmax(apart, fabs(caught[i] - solution->catch_[i]));
+    difference = fmax(difference, fabs(caught[i] - solution->catch_[i]));
     solution->catch_[i] = caught[i];
   }
   if (status == SUPINE_OK) {
-    (void)printf("pitcher-catcher: largest difference from the direct solve %.2g\n", apart);
+    (void)printf("pitcher-catcher: largest difference from the direct solve %.2g\n", difference);
   }
   free(force);
   free(caught);
@@ -228,10 +233,10 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   const double *g = wanted->state.gravity;
   supine_solution solution = {0};
   supine_mesh deformed = lungs->mesh;
-  supine_mesh rest = lungs->mesh;
+  supine_mesh reference = lungs->mesh;
   double gains[2][3];
   deformed.vertices = NULL;
-  rest.vertices = NULL;
+  reference.vertices = NULL;
   const supine_model *model = &wanted->model.prepared.model;
   supine_status status = supine_physics_solve(lungs, model, g, &solution, error);
   if (status == SUPINE_OK && wanted->pitcher_catcher) {
@@ -245,18 +250,18 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
     goto cleanup;
   }
   deformed.vertices = malloc(3 * deformed.vertex_count * sizeof(double));
-  rest.vertices = malloc(3 * rest.vertex_count * sizeof(double));
-  if (deformed.vertices == NULL || rest.vertices == NULL) {
+  reference.vertices = malloc(3 * reference.vertex_count * sizeof(double));
+  if (deformed.vertices == NULL || reference.vertices == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
                               deformed.vertex_count);
     goto cleanup;
   }
-  supine_tissue_collapse(lungs, wanted->model.prepared.model.share, rest.vertices);
+  supine_tissue_collapse(lungs, model->share, reference.vertices);
   for (size_t i = 0; i < 3 * solution.vertex_count; ++i) {
     solution.directions[i] *= gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
   }
-  supine_physics_solution_apply(&solution, &rest, 1.0, deformed.vertices);
-  const supine_mesh_save_options save = {.from = rest.vertices};
+  supine_physics_solution_apply(&solution, &reference, 1.0, deformed.vertices);
+  const supine_mesh_save_options save = {.from = reference.vertices};
   status = supine_mesh_save(wanted->path, &deformed, &save, error);
   if (status == SUPINE_OK) {
     (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
@@ -264,13 +269,13 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
     (void)printf(", largest displacement %.3f mm", supine_physics_solution_largest(&solution));
     if (solution.has_volume) {
       (void)printf(", %+.2f mL",
-                   1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&rest)));
+                   1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&reference)));
     }
     (void)putchar('\n');
   }
 cleanup:
   free(deformed.vertices);
-  free(rest.vertices);
+  free(reference.vertices);
   supine_physics_solution_free(&solution);
   return status;
 }

@@ -109,7 +109,7 @@ int main(int argc, char **argv) {
   if (command == NULL) {
     return unknown_command(name);
   }
-  if (!supine_thread_count_sound()) {
+  if (!supine_thread_count_is_valid()) {
     supine_options_say(name, "SUPINE_THREADS is '%s': set it to 1 to 256, or unset it",
                        getenv("SUPINE_THREADS")); /* NOLINT(concurrency-mt-unsafe) */
     return SUPINE_EXIT_USAGE;

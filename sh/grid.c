@@ -8,8 +8,8 @@
 
 #include "sh/grid.h"
 
-/* Refine nodes z and weights w to rounding error, by one Newton step on P_n: GSL tabulates rules of
- * some sizes, but computes the others only to about 1e-11, whose error one step reduces to 1e-22.
+/* Refine nodes z and weights w to rounding error, by one Newton step on P_n. GSL tabulates some
+ * rules and computes the others to about 1e-11, an error that one step reduces to 1e-22.
  *
  *     w = 2 / ((1 - z^2) P_n'(z)^2)
  *

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * The Gauss-Legendre x equispaced quadrature rule on the sphere. */
+ * Compute the Gauss-Legendre x equispaced quadrature rule on the sphere. */
 #ifndef SUPINE_GRID_H
 #define SUPINE_GRID_H
 
@@ -25,7 +25,8 @@ typedef struct supine_sh_grid {
  * longitudes > 2 L.
  * @param grid  written; free it with supine_sh_grid_destroy. NULL on failure
  * @retval SUPINE_ERROR_ARGUMENT  a number is out of range
- * @retval SUPINE_ERROR_MEMORY    an allocation failed; for GSL's own, its error handler runs first
+ * @retval SUPINE_ERROR_MEMORY    an allocation failed; if it was one of GSL, after its error
+ * handler
  */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 

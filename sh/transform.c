@@ -72,8 +72,8 @@ void supine_sh_transform_destroy(supine_sh_transform *plan) {
   }
 }
 
-/* GSL's SPHARM functions are normalised for exp(i m phi). The real harmonics of m > 0 have cos or
- * sin (m phi) in its place, and so a factor sqrt(2). */
+/* GSL's SPHARM functions are normalised for exp(i m phi); the real harmonics of m > 0, with cos or
+ * sin (m phi), have an additional factor sqrt(2). */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
                               double *coefficients) {
   const size_t count = supine_sh_count(plan->band);

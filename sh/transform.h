@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file The spherical-harmonic transform of several real fields at once, in double precision.
+/** @file Compute the spherical-harmonic transform of several real fields at once.
  *
  *     coefficient(l, m) = integral over the sphere of value(g) Y(l, m)(g)
  *
- * by the quadrature of the grid: exact to rounding for fields without bands above the plan's; in
- * other fields, the higher bands alias into the coefficients. Each field is transformed on its own.
- */
+ * by the quadrature of the grid: exact to rounding for fields without bands above the plan's band;
+ * higher bands of a field alias into its coefficients. */
 #ifndef SUPINE_TRANSFORM_H
 #define SUPINE_TRANSFORM_H
 
@@ -19,9 +18,9 @@
 typedef struct supine_sh_transform supine_sh_transform;
 
 /** Create a plan.
- * @param band  0 to SUPINE_SH_BAND_MAX; the grid needs latitudes > band, longitudes > 2 band
- * @param grid  must outlive the plan
- * @param fields  at least 1
+ * @param band    0 to SUPINE_SH_BAND_MAX; the grid needs latitudes > band, longitudes > 2 band
+ * @param grid    must outlive the plan
+ * @param fields  number of fields, at least 1
  * @retval SUPINE_ERROR_ARGUMENT  band too high, or a grid too small for it
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid, size_t fields,
@@ -30,8 +29,8 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
 /** Free a plan; NULL is legal. */
 void supine_sh_transform_destroy(supine_sh_transform *plan);
 
-/** Add latitude j's part of the transform to the coefficients, so that a caller needs the values of
- * only one latitude at a time. Zero the coefficients first; add each latitude once, in any order.
+/** Add the part of latitude j to the coefficients. Zero the coefficients first, then add each
+ * latitude once, in any order.
  * @param ring          values at latitude j, [longitudes, fields]
  * @param coefficients  [fields, (band + 1)^2] */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,

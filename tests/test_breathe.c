@@ -243,7 +243,7 @@ TEST(test_breathe_constant_flow_volumes_exact_in_every_frame) {
     assert_true(fabs(wanted[t] - 200.0 * (double)t / 66.66) < 1e-9);
   }
   check_volumes(basis, wanted, 334);
-  assert_non_null(strstr(text, "of 15 ms"));
+  assert_non_null(strstr(text, "allowed 15 ms"));
   free(wanted);
 
   course = supine_breath_default();

@@ -103,7 +103,7 @@ TEST(test_load_bad_files_message_names_line_and_vertex) {
       {"vertex,expandability\n0,1\n1,1\n0,2\n", ":4:", "vertex 0 was given before"},
       {"vertex,expandability\n0,1\n7,1\n", ":3:", "vertex 7 is not in"},
       {"vertex,expandability\n0,1\n-1,1\n", ":3:", "'-1'"},
-      {"vertex,expandability\n0,1\n1;1\n", ":3:", "1 fields, but the header has 2"},
+      {"vertex,expandability\n0,1\n1;1\n", ":3:", "1 field, but the header has 2"},
       {"vertex,expandability\n0,1\n99999999999999999999,1\n", ":3:", "not the number"},
       {"vertex,expandability\n0,1\n1,-4\n", ":3:", "-4 of vertex 1 is not positive"},
   };

@@ -51,7 +51,7 @@ TEST(test_fit_file_malformed_names_the_line) {
       {"pressure_cmH2O,\"volume_mL\n", ":1: a quote is not closed"},
       {"pressure_cmH2O,pressure_cmH2O\n", ":1: repeated column"},
       {"#\npressure_cmH2O,limb\n", ":2: the header has no column \"volume_mL\""},
-      {"pressure_cmH2O,volume_mL\n1,2\n1\n", ":3: 1 fields, but the header has 2"},
+      {"pressure_cmH2O,volume_mL\n1,2\n1\n", ":3: 1 field, but the header has 2"},
       {"pressure_cmH2O,volume_mL\n1,2,3\n", ":2: 3 fields"},
       {"pressure_cmH2O,volume_mL\n1,2\n\n3,nan\n", ":4: volume_mL \"nan\""},
       {"pressure_cmH2O,volume_mL\ninf,2\n", ":2: pressure_cmH2O \"inf\""},

@@ -184,9 +184,12 @@ TEST(test_scan_parse_states_accepted_or_refused) {
               {"upright:full", SUPINE_VOLUME_FULL, 0, {0, 0, -1}}};
   static const struct {
     const char *text, *said;
-  } bad[] = {{"supine:-3000", "full-3000"},     {"scan", "mesh has its volume"},
-             {"2600mL", "mesh has its volume"}, {"prone", "mesh has its volume"},
-             {"sopine:rest", "supine"},         {"left=rest,right=rest", "mesh has its volume"}};
+  } bad[] = {{"supine:-3000", "full-3000"},
+             {"scan", "not the state of a scan"},
+             {"2600mL", "not the state of a scan"},
+             {"prone", "not the state of a scan"},
+             {"sopine:rest", "supine"},
+             {"left=rest,right=rest", "not the state of a scan"}};
   supine_scan scan;
   supine_error error = {0};
   for (size_t i = 0; i < sizeof good / sizeof *good; ++i) {

@@ -107,7 +107,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
     (void)supine_state_print(state, text, sizeof text);
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "a scan of %.0f mL cannot be '%s': %s. Change --scanned", held, text,
-                            beyond_full ? "that is more than full inflation"
+                            beyond_full ? "that is beyond full inflation"
                                         : "that is less than the tissue, 10 % of full inflation");
   }
   return SUPINE_OK;

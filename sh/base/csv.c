@@ -38,8 +38,9 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
     }
     ++csv->line;
     if (strlen(csv->text) != (size_t)length) {
-      *status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                 "%s:%zu: a NUL byte: save it as CSV text", csv->path, csv->line);
+      *status =
+          supine_error_set(error, SUPINE_ERROR_FORMAT,
+                           "%s:%zu: a NUL byte: save the file as CSV text", csv->path, csv->line);
       return NULL;
     }
     static const char mark[] =
@@ -52,8 +53,9 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
-/* Split off the field at *rest; *rest then points behind it, or is NULL after the last. A quoted
- * field may contain the separator, and "" for a quote. NULL if a quote does not end. */
+/* Return the field at *rest, terminated; *rest then points to the next field, or is NULL after the
+ * last. A quoted field may contain the separator, and "" for a quote. Return NULL if a quote is not
+ * closed. */
 static char *csv_field(char **rest, char separator) {
   char *field = *rest + strspn(*rest, " ");
   char *end = field;
@@ -143,7 +145,9 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
   supine_status status = SUPINE_OK;
   char *text = csv_line(csv, &status, error);
   if (status == SUPINE_OK && text == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: empty; expected a header %s,...",
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: the file is empty; expected a header "
+                              "%s,...",
                               path, names[0]);
   }
   if (status == SUPINE_OK) {
@@ -171,9 +175,10 @@ supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) 
   }
   status = csv_split(csv, text, error);
   if (status == SUPINE_OK && csv->field_count != csv->column_count) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %zu fields, but the header has %zu",
-                         csv->path, csv->line, csv->field_count, csv->column_count);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s:%zu: %zu field%s, but the header has %zu: add or delete fields",
+                              csv->path, csv->line, csv->field_count,
+                              csv->field_count == 1 ? "" : "s", csv->column_count);
   }
   return status;
 }
@@ -192,8 +197,9 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
   }
   *number = strtod(text, &end);
   if (end == text || *end != '\0' || !isfinite(*number)) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s:%zu: %s \"%s\" is not a finite number",
-                            csv->path, csv->line, name, text);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s:%zu: %s \"%s\" is not a finite number: give one", csv->path,
+                            csv->line, name, text);
   }
   return SUPINE_OK;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Small CSV files: lists of fields, samples, parameters. */
+/* Read small CSV files. */
 #ifndef SUPINE_CSV_H
 #define SUPINE_CSV_H
 
@@ -11,36 +11,38 @@
 
 enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
-/* A reader of small CSV files: comments, blank lines, one header, quoted fields. The header
+/* A CSV file being read: comments (#), blank lines, one header, quoted fields. The header
  * determines the separator: ',', ';' (then numbers may have a decimal comma) or tab.
  * Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
-  char *text;
-  size_t capacity;
-  size_t line;
+  char *text;      /* current line */
+  size_t capacity; /* of `text`, bytes */
+  size_t line;     /* number of the current line, from 1 */
   char separator;
   size_t field_count;
-  char *field[SUPINE_CSV_FIELDS_MAX]; /* fields of the last row read */
-  size_t column_count;
+  char *field[SUPINE_CSV_FIELDS_MAX]; /* fields of the current row */
+  size_t column_count;                /* number of fields of the header */
   size_t
       column[SUPINE_CSV_FIELDS_MAX]; /* index of the field of each expected column; SIZE_MAX: none
                                       */
 } supine_csv;
 
-/* Open the file and read the header, which must have the first `required` of `names`, in any
- * case; other columns are ignored. */
+/* Open a file and read its header. Of the `count` expected columns, the first `required` must be in
+ * the header, in any order, upper or lower case; other columns are ignored.
+ * @param path  must outlive the reader */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
                               size_t required, supine_csv *csv, supine_error *error);
 
-/* Read a row; *more is false at the end. */
+/* Read the next row; set *more to false at the end. */
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);
 
-/* Return the text of an expected column of the last row; NULL if the file lacks the column. */
+/* Return the text of an expected column in the current row; NULL if the file lacks the column. */
 const char *supine_csv_text(const supine_csv *csv, size_t column);
 
-/* Parse an expected column, which the file has, as a finite number; messages call it `name`. */
+/* Parse an expected column, which the file must have, as a finite number.
+ * @param name  of the column, for messages */
 supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
                                 double *number, supine_error *error);
 

@@ -7,7 +7,7 @@
 
 #include <supine/status.h>
 
-/** Lines, each of which begins with "warning: " or "note: ", or with a file's name and one of them.
+/** Lines that begin with "warning: " or "note: ", or with the name of a file and one of these.
  * Zero-initialise. */
 typedef struct supine_findings {
   char text[4096]; /**< each line ends with a line feed */
@@ -16,8 +16,8 @@ typedef struct supine_findings {
 /** Add a line by a printf format; a line that does not fit is dropped. */
 SUPINE_PRINTF(2, 3) void supine_findings_add(supine_findings *findings, const char *format, ...);
 
-/** Return the line at *at, which has `length` bytes without its line feed, and move *at to the next
- * line; return NULL after the last. */
+/** Return the line at *at and move *at to the next line; return NULL after the last.
+ * @param length  set to the length of the line without its line feed */
 const char *supine_findings_next(const char **at, size_t *length);
 
 #endif

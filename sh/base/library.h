@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Load shared libraries at their first use if only few commands need them, as linking them
- * would delay the start of every command. List the functions once,
+/** @file Load shared libraries at their first use. Linking those that few commands need would delay
+ * the start of every command. List the functions once,
  *
  *     #define FUNCTIONS(EACH) EACH(cairo_, arc) EACH(cairo_, fill)
  *     static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
@@ -16,15 +16,15 @@
 #define SUPINE_LIBRARY_MEMBER(prefix, function) __typeof__(prefix##function) *function;
 #define SUPINE_LIBRARY_NAME(prefix, function) #prefix #function,
 
-/** Load the functions of a list into a struct of its members. */
+/** Load the functions of a list into a struct made by SUPINE_LIBRARY_MEMBER. */
 #define SUPINE_LIBRARY_LOAD(library, LIST, members, error)                                         \
   supine_library_load(library, (const char *const[]){LIST(SUPINE_LIBRARY_NAME) NULL}, members,     \
                       error)
 
 /** Load functions of a shared library, which stays loaded until the process ends.
- * @param library  its soname
- * @param names    of the functions; NULL after the last
- * @param members  pointers to functions, one for each name; written
+ * @param library  soname
+ * @param names    names of the functions; NULL after the last
+ * @param members  written: pointers to functions, one for each name
  * @retval SUPINE_ERROR_UNSUPPORTED  the library is not installed, or lacks a function */
 supine_status supine_library_load(const char *library, const char *const *names, void *members,
                                   supine_error *error);

@@ -38,7 +38,7 @@ bool supine_output_take_standard(void) {
 /* Existing temporary names, for supine_output_abandon_all. */
 static char *_Atomic live[LIVE_MAX];
 
-/* Replace one entry `from` of the list by `to`; NULL is a free entry. */
+/* Replace one entry `from` of `live` by `to`; NULL is a free entry. */
 static void set_live(char *from, char *to) {
   for (int i = 0; i < LIVE_MAX; ++i) {
     char *expected = from;
@@ -98,9 +98,9 @@ static void descriptor_path(int descriptor, char path[32]) {
   (void)snprintf(path, 32, "/proc/self/fd/%d", descriptor);
 }
 
-/* Give the output a unique temporary name beside its target: create a file of that name and return
- * its descriptor, or, unless `link` is NULL, give the name to the file that `link` refers to and
- * return 0. Return -1 and set errno on failure. */
+/* Choose a unique temporary name beside the target. If `link` is NULL, create a file of that name
+ * and return its descriptor; else give the name to the file that `link` refers to and return 0.
+ * Return -1 and set errno on failure. */
 static int take_temporary(supine_output *output, const char *link) {
   enum { TRIES = 100 };
   const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";
@@ -133,8 +133,8 @@ static int open_regular(supine_output *output) {
     errno = ENOMEM;
     return -1;
   }
-  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666); /* reduced by the
-                                                                                * umask */
+  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666); /* less
+                                                                                * the umask */
   free(folder);
   if (descriptor >= 0) {
     char link[32];
@@ -142,7 +142,7 @@ static int open_regular(supine_output *output) {
     if (access(link, F_OK) == 0) {
       return descriptor;
     }
-    (void)close(descriptor); /* without /proc it could not be named */
+    (void)close(descriptor); /* it cannot be named without /proc */
   }
   return take_temporary(output, NULL);
 }
@@ -206,8 +206,7 @@ static bool give_name(supine_output *output) {
     if (linkat(AT_FDCWD, link, AT_FDCWD, output->target, AT_SYMLINK_FOLLOW) == 0) {
       return true;
     }
-    /* link() replaces nothing: over an existing file, link to a temporary name first, then
-     * rename. */
+    /* link() does not replace an existing file: link to a temporary name, then rename. */
     if (errno != EEXIST || take_temporary(output, link) < 0) {
       return false;
     }

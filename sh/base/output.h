@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Output files that appear whole or not at all.
+/** @file Write output files whole or not at all.
  *
- * A file is written in its folder without a name (O_TMPFILE), so that nothing is left of it however
- * the program ends; if the file system does not support that, it is written under a temporary name.
- * It gets its own name when it is complete and on the disk. */
+ * A file is written in its folder without a name (O_TMPFILE), so that it vanishes if the program
+ * ends early; if the file system does not support that, it is written under a temporary name. It
+ * gets its own name when it is complete and on the disk. */
 #ifndef SUPINE_OUTPUT_H
 #define SUPINE_OUTPUT_H
 
@@ -18,7 +18,7 @@ typedef struct supine_output {
   FILE *file;
   char *path;      /**< as given by the user */
   char *target;    /**< path with symbolic links followed */
-  char *temporary; /**< its present name; "" if it has none */
+  char *temporary; /**< temporary name; NULL or "": none */
   bool standard;   /**< standard output */
 } supine_output;
 
@@ -30,28 +30,28 @@ typedef struct supine_output {
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_output_open(const char *path, supine_output *output, supine_error *error);
 
-/** Flush, wait for the disk, and give the file its name. On failure nothing is left, and an old
- * file is unchanged.
+/** Flush, wait for the disk, and give the file its name. On failure the new file is removed and an
+ * old file is unchanged.
  * @retval SUPINE_ERROR_WRITE  a write failed; the message says why: full disk, file too large */
 supine_status supine_output_commit(supine_output *output, supine_error *error);
 
 /** Discard the file; legal after a failed open, after commit, and on a zeroed struct. */
 void supine_output_abandon(supine_output *output);
 
-/** Report whether the path is standard output: "-", or "-" and an ending that names a format,
- * such as "-.ply". */
+/** Return whether the path is standard output: "-", or "-" and an ending that names a format, such
+ * as "-.ply". */
 bool supine_output_is_standard(const char *path);
 
-/** Reserve standard output for supine_output_open: other output goes to standard error from here
- * on. False if it is closed. */
+/** Reserve standard output for supine_output_open: from then on other output goes to standard
+ * error. Return false if standard output is closed. */
 bool supine_output_take_standard(void);
 
 /** Check that a file of this name can be written, without leaving one.
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY  as supine_output_open */
 supine_status supine_output_try(const char *path, supine_error *error);
 
-/** Make the path of `name` in the folder of the file `path`; an absolute `name` is kept. The caller
- * frees it. Return NULL if out of memory. */
+/** Return the path of `name` in the folder of the file `path`, or `name` if it is absolute; the
+ * caller frees it. Return NULL if out of memory. */
 char *supine_path_beside(const char *path, const char *name);
 
 /** Remove the temporary files of all outputs of the process; for handlers of fatal signals. */

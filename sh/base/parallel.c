@@ -22,7 +22,7 @@ static void *piece_run(void *argument) {
 }
 
 /* Read SUPINE_THREADS; return 0 if it is not set, -1 if it is not a number from 1 to 256. */
-static long asked_threads(void) {
+static long requested_threads(void) {
   const char *text = getenv("SUPINE_THREADS"); /* NOLINT(concurrency-mt-unsafe) */
   if (text == NULL) {
     return 0;
@@ -32,14 +32,14 @@ static long asked_threads(void) {
   return end != text && *end == '\0' && value >= 1 && value <= THREADS_MAX ? value : -1;
 }
 
-bool supine_thread_count_sound(void) {
-  return asked_threads() >= 0;
+bool supine_thread_count_is_valid(void) {
+  return requested_threads() >= 0;
 }
 
 size_t supine_thread_count(void) {
-  const long asked = asked_threads();
-  if (asked > 0) {
-    return (size_t)asked;
+  const long requested = requested_threads();
+  if (requested > 0) {
+    return (size_t)requested;
   }
   cpu_set_t allowed;
   if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) {
@@ -54,8 +54,7 @@ void supine_parallel_for(size_t count, size_t grain, size_t threads,
   if (count == 0) {
     return;
   }
-  const size_t step = grain == 0 ? 1 : grain;
-  const size_t grains = (count - 1) / step + 1;
+  const size_t grains = (count - 1) / grain + 1;
   size_t used = threads == 0 ? supine_thread_count() : threads;
   used = used > grains ? grains : used;
   used = used > THREADS_MAX ? THREADS_MAX : used;
@@ -67,9 +66,9 @@ void supine_parallel_for(size_t count, size_t grain, size_t threads,
   piece pieces[THREADS_MAX];
   bool started[THREADS_MAX] = {false};
   for (size_t t = 0; t < used; ++t) {
-    const size_t last = grains * (t + 1) / used * step;
+    const size_t last = grains * (t + 1) / used * grain;
     pieces[t] =
-        (piece){function, context, grains * t / used * step, last < count ? last : count, t};
+        (piece){function, context, grains * t / used * grain, last < count ? last : count, t};
   }
   for (size_t t = 1; t < used; ++t) {
     started[t] = pthread_create(&handles[t], NULL, piece_run, &pieces[t]) == 0;

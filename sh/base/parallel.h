@@ -6,24 +6,25 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/** Work on items begin <= i < end; `thread`, 0 to threads - 1, selects per-thread space. */
+/** A function that works on items begin <= i < end; `thread` is the number of its thread, 0 to
+ * threads - 1. */
 typedef void supine_range_function(void *context, size_t begin, size_t end, size_t thread);
 
 /** Return the default number of threads: the environment variable SUPINE_THREADS (1 to 256) or, if
  * it is not set or not valid, the number of processors that this process may use. */
 size_t supine_thread_count(void);
 
-/** Report whether the environment variable SUPINE_THREADS is unset or valid. */
-bool supine_thread_count_sound(void);
+/** Return whether the environment variable SUPINE_THREADS is unset or valid. */
+bool supine_thread_count_is_valid(void);
 
 /** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait.
  *
  * @param count    number of items
- * @param grain    smallest number of items of a thread, at least 1; small counts use fewer threads
+ * @param grain    smallest number of items for a thread, at least 1; small counts use fewer threads
  * @param threads  largest number of threads; 0: supine_thread_count()
  *
- * Pieces begin at multiples of `grain` and depend only on the arguments. The piece of a thread
- * that cannot start runs in the caller's thread. */
+ * Pieces begin at multiples of `grain` and depend only on the arguments and the number of threads.
+ * The piece of a thread that cannot be started runs in the caller's thread. */
 void supine_parallel_for(size_t count, size_t grain, size_t threads,
                          supine_range_function *function, void *context);
 

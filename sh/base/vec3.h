@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Vectors of three components, and directions spread over the sphere. */
+/** @file Compute with vectors of three components, and spread directions over the sphere. */
 #ifndef SUPINE_VEC3_H
 #define SUPINE_VEC3_H
 
@@ -65,10 +65,10 @@ static inline void supine_normal(const double p[3], const double q[3], const dou
   supine_cross(u, v, normal);
 }
 
-/** Compute direction `at` of a golden-angle spiral of `count` directions that covers the sphere
- * evenly from +z to -z.
+/** Compute direction number `at` of a golden-angle spiral of `count` directions that covers the
+ * sphere evenly from +z to -z.
  * @param at    0 to count - 1, not necessarily an integer
- * @param from  longitude at which the spiral begins, rad */
+ * @param from  longitude of direction 0, rad */
 static inline void supine_spiral(double at, double count, double from, double direction[3]) {
   static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */
   const double z = 1.0 - (2.0 * at + 1.0) / count;
