@@ -203,8 +203,8 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "breathe ras.safetensors --posture left --as-scanned -o b.safetensors");
   EXPECT(1, "full-2000", "precompute low.ply --scanned supine:-2000 -o b.safetensors");
   EXPECT(1, "beyond full", "precompute low.ply --scanned full+200 -o b.safetensors");
-  EXPECT(1, "mesh has its volume", "precompute low.ply --scanned 4000mL -o b.safetensors");
-  EXPECT(1, "mesh has its volume", "precompute low.ply --scanned scan -o b.safetensors");
+  EXPECT(1, "not the state of a scan", "precompute low.ply --scanned 4000mL -o b.safetensors");
+  EXPECT(1, "not the state of a scan", "precompute low.ply --scanned scan -o b.safetensors");
   EXPECT(1, "did you mean", "precompute low.ply --scanned sopine:rest -o b.safetensors");
   EXPECT(1, "share of the full volume", "precompute low.ply --resting prone=1.2 -o b.safetensors");
   EXPECT(1, "do not hold 6100 mL", "precompute lungs.ply --resting supine=6100mL -o b.safetensors");
@@ -296,7 +296,7 @@ TEST(test_mesh_open_surface_explains_volume) {
   EXPECT(0, "not closed", "precompute open.obj -o open.safetensors --band 2");
   EXPECT(2, "close the mesh", "deform open.safetensors --posture prone --volume scan+5 -o g.ply");
   EXPECT(2, "close the mesh", "deform open.safetensors --posture prone -o g.ply");
-  EXPECT(2, "close it", "solve open.obj --posture prone --volume scan+5 -o g.ply");
+  EXPECT(2, "close the mesh", "solve open.obj --posture prone --volume scan+5 -o g.ply");
   assert_int_equal(count_files("g."), 0);
 }
 
