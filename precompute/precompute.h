@@ -20,7 +20,7 @@ typedef struct supine_precompute_options {
   size_t band;                       /**< L */
   size_t modes;          /**< largest number of modes; 0: the (band + 1)^2 harmonics themselves */
   size_t held_out;       /**< number of directions at which the error is measured; 0: 100 to 1000 */
-  double expected_error; /**< c of supine/locate.h, mm, if below its default; 0: the default */
+  double expected_error; /**< its constant, mm, at most the default; 0: the default */
   supine_scan_frame frame;
   supine_progress_function *progress; /**< optional */
   void *progress_context;

@@ -33,7 +33,7 @@ typedef struct supine_model_choice {
 /** Return the default choices. */
 supine_model_choice supine_precompute_choice_default(void);
 
-/** Result of preparation. */
+/** A model, the volumes of its lungs, and the assumptions behind them. */
 typedef struct supine_prepared {
   supine_model model; /**< its arrays are those below */
   supine_reference reference;

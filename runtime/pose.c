@@ -70,7 +70,8 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
   double y[RESTING_TERMS];
   *v = (volumes){.lungs = basis->info.lung_count};
   if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "gravity is zero or not finite: give a vector with a direction");
   }
   const double length =
       sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1] + gravity[2] * gravity[2]);
@@ -268,7 +269,8 @@ supine_status supine_basis_gains(const supine_basis *basis, const supine_state *
 supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "gravity has no direction");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "gravity is zero or not finite: give a vector with a direction");
   }
   return supine_basis_gains(basis, state, pose, error);
 }

@@ -56,8 +56,8 @@ void supine_normals_rows_free(supine_normals_rows *rows);
 
 /* Monomials of the weights and gains in some states. */
 typedef struct supine_normals_states {
-  size_t count;    /* S, states that are reached */
-  size_t room;     /* states that were requested */
+  size_t count;    /* S: states whose volume the lungs can reach */
+  size_t room;     /* states requested */
   double *phi;     /* [G, room, 3, terms] */
   double range[2]; /* see supine_normals_modes */
 } supine_normals_states;

@@ -19,8 +19,8 @@ enum {
   ROUNDS = 5         /* rounds of fitting and of finding the nearest points */
 };
 
-static const double neighbours_differ = 0.3; /* prior deviation of a between neighbours */
-static const double regions_differ = 1.0;    /* prior deviation of a from 1 */
+static const double neighbours_differ = 0.3; /* prior deviation of the factors of neighbours */
+static const double regions_differ = 1.0;    /* prior deviation of a region's factor from 1 */
 static const double noise_least = 0.3;       /* least noise of a surface point, mm */
 static const double together = 10.0;         /* rows with a common error, which count as one */
 

@@ -46,7 +46,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
     const double weight = row->block == without ? 0.0 : row->weight;
     const double along = supine_dot(row->axis, w->field[i].u);
     double x[UNKNOWNS] = {along, fits_gain ? w->field[i].turned * along : 0.0};
-    double value = row->value; /* from full inflation */
+    double value = row->value; /* displacement from full inflation, mm */
     for (size_t a = 0; a < 3; ++a) {
       x[2 + a] = w->moved ? row->axis[a] : 0.0;
       value += w->gains[0][a] * row->axis[a] * w->field[i].u[a];

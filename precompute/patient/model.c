@@ -249,7 +249,7 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   const double *low[2] = {frame->minimum, record->emptier[0]};
   const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* largest distance of the faces over a state's width */
+  double off[2] = {0.0, 0.0}; /* largest distance of the boxes' faces, relative to the width */
   size_t axis[2] = {0};
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(

@@ -93,9 +93,8 @@ typedef struct supine_patient_record {
   supine_patient_surface_report surface;
   supine_patient_expand_report expand;
   supine_patient_applied applied;
-  double gain_error; /**< standard error of the gain; 0: not fitted */
-  /* Not in a record that was read: */
-  size_t further_count; /**< further states */
+  double gain_error;    /**< standard error of the gain; 0: not fitted */
+  size_t further_count; /**< number of further states; supine_patient_read leaves it 0 */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
   bool gain_open; /**< the fitted gain is not between 0.01 and 2, so the force keeps its own */
 } supine_patient_record;

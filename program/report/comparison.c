@@ -148,7 +148,7 @@ void supine_report_free(supine_comparison *c) {
 void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   char whole[160];
   (void)supine_state_describe(&c->state, whole, sizeof whole);
-  const char *space = strchr(whole, ' '); /* ends the posture, "supine" */
+  const char *space = strchr(whole, ' '); /* behind the name of the posture */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
 }
 
