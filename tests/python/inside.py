@@ -140,7 +140,7 @@ assert list(np.flatnonzero(found.outliers)) == [7] and found.volume_error == 0
 assert (found.positions(lungs)[1] <= np.maximum(3.01, 1.001 * lungs.expected_error("left", "rest+300"))).all()
 assert (lungs.expected_error("scan") == 0).all()
 refused(supine.ArgumentError, "observed points", lungs.locate, [], [])
-refused(supine.ArgumentError, "out of range", lungs.locate, [n], [(0, 0, 0)])
+refused(supine.ArgumentError, "give a vertex below", lungs.locate, [n], [(0, 0, 0)])
 refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=True)
 refused(ValueError, "positions", lungs.locate, [0, 1], truth[:1])
 
