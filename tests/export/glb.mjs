@@ -215,3 +215,12 @@ for (const basis of [modes, paper, many]) {
 }
 await checkAnimations(modes);
 await checkColours(modes);
+
+/* The file of the default phantom, as a demonstration would send it. */
+const [demoMesh, demo, demoFile] = ['demo.ply', 'demo.safetensors', 'demo.glb'].map((name) => join(folder, name));
+supine('phantom', '-o', demoMesh);
+supine('precompute', demoMesh, '-o', demo);
+supine('export', demo, '-o', demoFile, '--animate');
+assert.ok(statSync(demoFile).size <= 500_000, `${statSync(demoFile).size} bytes`);
+await validate(demoFile);
+assert.equal((await open(demoFile)).lungs.length, 2);
