@@ -150,8 +150,8 @@ typedef struct supine_mesh_field {
 /** How to write a file, and its optional content. */
 typedef struct supine_mesh_save_options {
   supine_axes axes;    /**< axes of the file, written as its SPACE tag; AUTO: LPS */
-  const double *from;  /**< optional [vertex_count, 3] mm, where displacements start: VTP and PLY
-                            then carry displacements and their magnitudes as point data */
+  const double *from;  /**< optional [vertex_count, 3] starting points of displacements, mm: VTP
+                            and PLY files then contain displacements and their magnitudes */
   const char *comment; /**< optional, one line */
   double millimetres_per_unit; /**< unit of positions and displacements in the file; 0: 1 */
   const float *expected_error; /**< optional [vertex_count], mm in every unit: point data

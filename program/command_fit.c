@@ -21,7 +21,7 @@ typedef struct request {
   supine_landmark_options landmarks;
   bool has_law, expandability, json;
   int law;
-  supine_source_options source; /* for all surfaces */
+  supine_source_options source; /* options for loading surfaces */
 
   supine_state rest, state; /* states of the first and of the second scan */
   size_t count;             /* number of further states */

@@ -13,8 +13,9 @@
 #include "sh/grid.h"
 #include <supine/status.h>
 
-/** A plan for one band, one grid and a number of fields. Only one thread at a time may use a plan,
- * and only one in the process may create or destroy plans (FFTW's planner). */
+/** Plan for transforms of a fixed number of fields on one grid, up to one band. A plan is for one
+ * thread at a time, and only one thread of the process may create or destroy plans, as FFTW's
+ * planner has global state. */
 typedef struct supine_sh_transform supine_sh_transform;
 
 /** Create a plan.

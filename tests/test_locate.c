@@ -77,7 +77,7 @@ static void observe(world *w, const supine_state *state, bool turned) {
   float xyz[3 * VERTICES];
   deform(w->basis, state, xyz);
   for (size_t j = 0; j < SEEN; ++j) {
-    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* apices and bases are included */
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* spread from apex to base */
     const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
     w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
     move(turned, x, w->seen[j].position);

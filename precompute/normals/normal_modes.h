@@ -40,7 +40,7 @@ typedef struct supine_normals_surface {
 
 /** The modes of every vertex's normal, and their error. */
 typedef struct supine_normals_modes {
-  size_t count;    /**< Q; 0: none were made */
+  size_t count;    /**< number of modes Q; 0: no normals */
   int16_t *modes;  /**< [N, 3, Q] n as integers; `weights` contain their units */
   double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V */
   double range[2]; /**< least and largest volume of the states, mL beyond the reference surface; if

@@ -105,7 +105,7 @@ typedef struct supine_patient_record {
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
                                    const char *made_by, supine_error *error);
 
-/** Make the JSON value of the file; the caller releases it. NULL: no memory. */
+/** Convert a record to the JSON value of its file, which the caller releases; NULL: no memory. */
 struct json_t *supine_patient_encode(const supine_patient_record *record, const char *made_by);
 
 /** Print the text of the file; the caller frees it. NULL: no memory. */

@@ -15,7 +15,7 @@
 /** Largest number of modes of a basis that 'supine precompute' makes. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
 
-/** The forms of each of G lungs for K columns, mL. */
+/** Coefficients of the volumes of G lungs, mL, as cubic polynomials of the weights of K columns. */
 typedef struct supine_volume_forms {
   size_t lung_count;
   size_t column_count;

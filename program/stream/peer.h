@@ -48,7 +48,7 @@ typedef struct supine_stream_peer {
   bool knows_triangles;        /**< triangles were sent: the next POINTS message omits them */
   uint64_t last_frame;         /**< number of the last frame given to the peer */
   supine_stream_frame *frame;  /**< frame being sent; NULL: none */
-  supine_stream_packet packet; /**< its message; sent pieces are removed */
+  supine_stream_packet packet; /**< part of its message that is not yet sent */
 } supine_stream_peer;
 
 /** Result of reading or sending. */

@@ -108,8 +108,9 @@ SUPINE_API supine_status supine_locate(const supine_locate_task *task,
                                        supine_locate_residual *residuals, double *space,
                                        supine_location *found, supine_error *error);
 
-/** Compute the positions of every vertex of a basis of the same lungs, in the frame of the
- * observations, and their expected errors.
+/** Compute the positions of every vertex in the frame of the observations, and their expected
+ * errors.
+ * @param basis  basis of the located lungs, or of structures inside them
  * @param xyz    [N, 3] mm, written
  * @param sigma  [N] expected errors, mm, written
  * @retval those of supine_basis_pose
