@@ -18,13 +18,6 @@
  * centres in a tile of sums. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
-static inline double apart(const double a[3], const double b[3]) {
-  const double x = a[0] - b[0];
-  const double y = a[1] - b[1];
-  const double z = a[2] - b[2];
-  return sqrt(x * x + y * y + z * z);
-}
-
 /* Set the middle of the points' box, and half its diagonal as the unit. */
 static void frame(size_t count, const double *points, supine_inside_biharmonic *fit) {
   double square = 0.0;
@@ -51,7 +44,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
   }
   size_t farthest = 0;
   for (size_t i = 0; i < count; ++i) {
-    distance[i] = apart(points + 3 * i, fit->middle);
+    distance[i] = supine_distance(points + 3 * i, fit->middle);
     farthest = distance[i] > distance[farthest] ? i : farthest;
   }
   for (size_t i = 0; i < count; ++i) {
@@ -65,7 +58,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
     }
     ++fit->count;
     for (size_t i = 0; i < count; ++i) {
-      const double d = apart(points + 3 * i, centre);
+      const double d = supine_distance(points + 3 * i, centre);
       distance[i] = d < distance[i] ? d : distance[i];
     }
     for (size_t i = 0; i < count; ++i) {
@@ -95,7 +88,7 @@ SUPINE_CLONES static void fill(const double *c, const kernel *k) {
   static const double alpha = 3.0;
   for (size_t j = 0; j < k->size; ++j) {
     for (size_t i = j; i < k->size; ++i) {
-      k->matrix[j * k->size + i] = alpha - apart(c + 3 * i, c + 3 * j);
+      k->matrix[j * k->size + i] = alpha - supine_distance(c + 3 * i, c + 3 * j);
     }
   }
 }
