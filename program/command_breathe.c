@@ -10,7 +10,6 @@
 #include "sh/base/text.h"
 
 #include "program/breath_output.h"
-#include "program/drawing.h"
 #include "program/options/basis_input.h"
 #include "program/options/breath_frames.h"
 #include "program/options/pv.h"
@@ -32,11 +31,6 @@ typedef struct request {
   double fps, seconds; /* 0: not given */
 } request;
 
-static supine_status read_turn(const char *text, void *field, supine_error *error) {
-  request *wanted = field;
-  return supine_command_read_turn(text, &wanted->turn, error);
-}
-
 static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as supine_pv_course */
 
 static const supine_option table[] = {
@@ -49,7 +43,8 @@ static const supine_option table[] = {
     {"turn", 0, "FROM:TO:SECONDS",
      "turn gravity from one posture to another at constant speed, as supine:left:10s; between "
      "opposite postures, over the left side. The volume at rest follows the posture",
-     .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
+     SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
+     SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
      "tidal volume of both lungs, above rest in the posture (above the scan where rest is "

@@ -5,47 +5,262 @@
 #include <string.h>
 #include <strings.h>
 
-#include "program/drawing.h"
+#include <supine/compare.h>
+
+#include "sh/base/output.h"
+#include "sh/base/vec3.h"
+
+#include "program/inside.h"
 #include "program/options/basis_input.h"
+#include "program/options/breath_frames.h"
+#include "program/options/state_options.h"
 
 static const char name[] = "render";
+static const double inside_opacity = 0.35; /* default opacity of the lungs with --inside */
 
-typedef supine_command_drawing request;
+enum { PER_SECOND = 15, FRAMES_MAX = 10000, PAUSE_MS = 1000 /* at the end of a turn */ };
 
-static supine_status render(supine_command_studio *studio, const supine_posture_list *postures,
-                            supine_error *error) {
-  const size_t n = supine_basis_get_info(studio->basis)->vertex_count;
-  const size_t count = postures->count;
-  char label[128];
+typedef struct request {
+  const char *output;
+  const char *postures;
+  supine_volume_options volume;
+  supine_from from;     /* state that colours and displacements are measured from */
+  const char *inside;   /* NULL: none */
+  double largest;       /* end of the colour bar, mm; 0: automatic */
+  double opacity;       /* opacity of the lungs; 0: not given */
+  size_t width, height; /* pixels; 0: automatic */
+  supine_view view[SUPINE_VIEWS_MAX];
+  size_t view_count;
+  unsigned theme; /* 0: light; 1: dark */
+  bool turns;
+  breath_turn turn;
+} request;
+
+/* A state of the lungs, as a panel of the picture shows it. */
+typedef struct drawn {
+  supine_pose pose;
+  float *value; /* [N] displacement, mm */
+  char subtitle[96];
+  supine_command_marks marks;
+} drawn;
+
+/* The objects that draw a picture or the frames of a turn, and the panels of the picture. */
+typedef struct studio {
+  const request *wanted;
+  supine_basis *basis;
+  supine_reference_pose from;
+  supine_compare *compare;
+  supine_renderer *renderer;
+  supine_basis *inside; /* or NULL */
+  supine_command_names names;
+  supine_posture_list postures; /* one for each panel */
+  drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
-  supine_command_drawn *states = calloc(count, sizeof *states);
-  float *values = malloc(count * n * sizeof *values);
-  supine_status status = SUPINE_OK;
-  if (states == NULL || values == NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  double ends[2]; /* largest 95th percentile and largest displacement of the states found, mm */
+  char label[128];
+} studio;
+
+static void close_studio(studio *s) {
+  for (size_t i = 0; i < SUPINE_PANELS_MAX; ++i) {
+    supine_command_marks_free(&s->shown[i].marks);
+    free(s->shown[i].value);
   }
-  for (size_t i = 0; i < count && status == SUPINE_OK; ++i) {
-    states[i].value = values + i * n;
-    status = supine_command_drawn_find(studio, &postures->item[i], &states[i], error);
-    if (status == SUPINE_OK) {
-      status = supine_command_drawn_mark(studio, &states[i], error);
-    }
-    panel[i] = supine_command_drawn_panel(studio->wanted, &states[i],
-                                          supine_options_posture_label(postures->item[i].name),
-                                          postures->item[i].gravity);
+  supine_command_names_close(&s->names);
+  supine_basis_close(s->inside);
+  supine_render_destroy(s->renderer);
+  supine_compare_destroy(s->compare);
+  supine_basis_close(s->basis);
+}
+
+static supine_status open_studio(studio *s, const char *path, supine_error *error) {
+  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error);
+  if (status == SUPINE_OK) {
+    status = supine_options_basis_closed(s->basis, path, error);
   }
   if (status == SUPINE_OK) {
-    const supine_picture picture = supine_command_drawing_picture(studio, panel, count, label);
-    status = supine_render_picture_save(studio->renderer, &picture, studio->wanted->output, error);
-    if (status == SUPINE_OK) {
-      (void)printf("%s: %zu x %zu pixels\n", studio->wanted->output, picture.width, picture.height);
+    status = supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_compare_create(s->basis, &s->compare, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_render_create(s->basis, &s->renderer, error);
+  }
+  if (status == SUPINE_OK && s->wanted->inside != NULL) {
+    status = supine_command_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error);
+  }
+  for (size_t i = 0; i < s->postures.count && status == SUPINE_OK; ++i) {
+    s->shown[i].value =
+        malloc(supine_basis_get_info(s->basis)->vertex_count * sizeof *s->shown[i].value);
+    if (s->shown[i].value == NULL) {
+      status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     }
   }
-  for (size_t i = 0; states != NULL && i < count; ++i) {
-    supine_command_marks_free(&states[i].marks);
+  return status;
+}
+
+/* Fill panel i: compute the pose of its posture, the values to colour by, the line below its name,
+ * and the marks of the structures inside. */
+static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
+  const supine_posture_item *item = &s->postures.item[i];
+  drawn *shown = &s->shown[i];
+  supine_status status =
+      supine_options_pose(s->basis, name, &s->wanted->volume, item->gravity, &shown->pose, error);
+  if (status == SUPINE_OK && s->inside != NULL) {
+    supine_command_marks_free(&shown->marks);
+    status = supine_command_marks_make(s->inside, &s->names, &shown->pose, &s->from.pose,
+                                       &shown->marks, error);
   }
-  free(states);
-  free(values);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  supine_distance_statistics statistics;
+  supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
+  supine_compare_statistics(s->compare, shown->value, &statistics);
+  s->ends[0] = fmax(s->ends[0], statistics.p95);
+  s->ends[1] = fmax(s->ends[1], statistics.max);
+  double held[SUPINE_LUNGS_MAX];
+  double volume = 0.0;
+  supine_basis_volumes(s->basis, &shown->pose, held);
+  for (size_t lung = 0; lung < supine_basis_get_info(s->basis)->lung_count; ++lung) {
+    volume += held[lung];
+  }
+  (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm", volume,
+                 statistics.mean, statistics.max);
+  s->panel[i] = (supine_panel){.title = supine_options_posture_label(item->name),
+                               .subtitle = shown->subtitle,
+                               .pose = &shown->pose,
+                               .value = shown->value,
+                               .marks = s->inside != NULL ? &shown->marks.marks : NULL};
+  memcpy(s->panel[i].gravity, item->gravity, sizeof s->panel[i].gravity);
+  return SUPINE_OK;
+}
+
+/* Return the picture of all panels. */
+static supine_picture make_picture(studio *s) {
+  const request *wanted = s->wanted;
+  const size_t count = s->postures.count;
+  const double opacity = wanted->opacity > 0.0    ? wanted->opacity
+                         : wanted->inside != NULL ? inside_opacity
+                                                  : 1.0;
+  const double largest =
+      wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(s->ends[0]);
+  (void)snprintf(s->label, sizeof s->label, "displacement from %s, mm", s->from.name);
+  return (supine_picture){.panel = s->panel,
+                          .panel_count = count,
+                          .view = wanted->view,
+                          .view_count = wanted->view_count,
+                          .bar_label = s->label,
+                          .colours = SUPINE_COLOURS_DISPLACEMENT,
+                          .largest = largest,
+                          .beyond = s->ends[1] > largest,
+                          .transparency = 1.0 - opacity,
+                          .dark = wanted->theme == 1,
+                          .width = wanted->width != 0 ? wanted->width : 20 + 440 * count,
+                          .height = wanted->height != 0 ? wanted->height
+                                                        : 120 + 480 * wanted->view_count};
+}
+
+static supine_status draw_postures(studio *s, supine_error *error) {
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < s->postures.count && status == SUPINE_OK; ++i) {
+    status = fill_panel(s, i, error);
+  }
+  const supine_picture picture = make_picture(s);
+  if (status == SUPINE_OK) {
+    status = supine_render_picture_save(s->renderer, &picture, s->wanted->output, error);
+  }
+  if (status == SUPINE_OK) {
+    (void)printf("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
+  }
+  return status;
+}
+
+/* Fill the panel for frame `frame` of the `count` of a turn. */
+static supine_status find_frame(studio *s, size_t frame, size_t count, supine_error *error) {
+  const breath_turn *turn = &s->wanted->turn;
+  supine_posture_item *item = &s->postures.item[0];
+  const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
+  const double angle = acos(cosine) * 180.0 / 3.14159265358979323846;
+  const double share = (double)frame / (double)(count - 1);
+  supine_breath_turn_gravity(turn, share * turn->seconds, item->gravity);
+  (void)snprintf(item->name, sizeof item->name, "turned by %.0f of %.0f degrees", share * angle,
+                 angle);
+  return fill_panel(s, 0, error);
+}
+
+/* Append all frames of a turn to an animation.
+ * @param extent  extent of each view over the whole turn, so that the scale stays fixed */
+static supine_status add_frames(studio *s, size_t count, const double (*extent)[4],
+                                supine_animation *animation, supine_error *error) {
+  supine_progress progress = supine_options_progress_begin(name);
+  supine_status status = SUPINE_OK;
+  for (size_t frame = 0; frame < count && status == SUPINE_OK; ++frame) {
+    status = find_frame(s, frame, count, error);
+    supine_picture picture = make_picture(s);
+    picture.extent = extent;
+    if (status == SUPINE_OK) {
+      status = supine_render_animation_add(animation, s->renderer, &picture,
+                                           frame + 1 < count ? 1000 / PER_SECOND : PAUSE_MS, error);
+    }
+    if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count)) {
+      status =
+          supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+    }
+  }
+  supine_options_progress_end(&progress);
+  return status;
+}
+
+/* Draw a turn as an animation. A first pass over its frames finds the largest displacement and the
+ * extents, so that the colour bar and the scale stay fixed. */
+static supine_status draw_turn(studio *s, supine_error *error) {
+  static const double none[4] = SUPINE_EXTENT_NONE;
+  const char *path = s->wanted->output;
+  const double seconds = s->wanted->turn.seconds;
+  const double frames = fmax(2.0, floor(seconds * PER_SECOND * (1.0 + 1e-12)) + 1.0);
+  double extent[SUPINE_VIEWS_MAX][4];
+  supine_animation *animation = NULL;
+  supine_output output = {0};
+  supine_status status = SUPINE_OK;
+  if (!(frames <= FRAMES_MAX)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a turn of %g s exceeds %d frames: give a shorter time", seconds,
+                            FRAMES_MAX);
+  }
+  const size_t count = (size_t)frames;
+  for (size_t view = 0; view < SUPINE_VIEWS_MAX; ++view) {
+    memcpy(extent[view], none, sizeof none);
+  }
+  for (size_t frame = 0; frame < count && status == SUPINE_OK; ++frame) {
+    status = find_frame(s, frame, count, error);
+    const supine_picture picture = make_picture(s);
+    if (status == SUPINE_OK) {
+      supine_render_picture_extent(s->renderer, &picture, extent);
+    }
+  }
+  const supine_picture picture = make_picture(s);
+  if (status == SUPINE_OK) {
+    status = supine_output_open(path, &output, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_render_animation_open(picture.width, picture.height, &animation, error);
+  }
+  supine_options_signals_catch(true);
+  if (status == SUPINE_OK) {
+    status = add_frames(s, count, (const double(*)[4])extent, animation, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_render_animation_write(animation, output.file, error);
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* committing reports a failed write */
+      status = supine_output_commit(&output, error);
+    }
+  }
+  supine_output_abandon(&output);
+  supine_render_animation_close(animation);
+  if (status == SUPINE_OK) {
+    (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height, count);
+  }
   return status;
 }
 
@@ -99,11 +314,6 @@ static supine_status read_views(const char *text, void *field, supine_error *err
   }
 }
 
-static supine_status read_turn(const char *text, void *field, supine_error *error) {
-  request *wanted = field;
-  return supine_command_read_turn(text, &wanted->turn, error);
-}
-
 static const char *const themes[] = {"light", "dark", NULL};
 
 static const supine_option table[] = {
@@ -111,7 +321,8 @@ static const supine_option table[] = {
     {"turn", 0, "FROM:TO:SECONDS",
      "draw an animation instead: gravity turns from one posture to another at constant speed, "
      "as supine:left:5s, stays for a second, and starts again",
-     .read = read_turn, .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns)},
+     SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
+     SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
@@ -174,29 +385,15 @@ static void begin(void *chosen) {
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
-  supine_posture_list postures = {.count = 0};
-  supine_reference_pose from;
-  supine_basis *basis = NULL;
-  supine_status status = check(wanted, &postures, error);
+  studio s = {.wanted = wanted, .postures = {.count = 1}};
+  supine_status status = check(wanted, &s.postures, error);
   if (status == SUPINE_OK) {
-    status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
+    status = open_studio(&s, given->operand[0], error);
   }
   if (status == SUPINE_OK) {
-    status = supine_options_basis_closed(basis, given->operand[0], error);
+    status = wanted->turns ? draw_turn(&s, error) : draw_postures(&s, error);
   }
-  if (status == SUPINE_OK) {
-    status = supine_options_reference(basis, &wanted->from, true, &from, error);
-  }
-  if (status == SUPINE_OK) {
-    supine_command_studio studio = {.basis = basis, .wanted = wanted, .from = &from};
-    status = supine_command_studio_open(&studio, error);
-    if (status == SUPINE_OK) {
-      status = wanted->turns ? supine_command_drawing_turn(&studio, error)
-                             : render(&studio, &postures, error);
-    }
-    supine_command_studio_close(&studio);
-  }
-  supine_basis_close(basis);
+  close_studio(&s);
   return status;
 }
 

@@ -7,6 +7,7 @@
 #include "sh/base/vec3.h"
 
 #include "program/options/breath_frames.h"
+#include "program/options/state_options.h"
 
 /* Compute the direction 90 degrees from `from`, towards `to`. */
 static void find_quarter(const breath_turn *turn, double quarter[3]) {
@@ -40,6 +41,24 @@ void supine_breath_turn_gravity(const breath_turn *turn, double time, double gra
   for (size_t k = 0; k < 3; ++k) {
     gravity[k] = cos(angle) * turn->from[k] + sin(angle) * quarter[k];
   }
+}
+
+supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error) {
+  breath_turn *made = turn;
+  char from[SUPINE_POSTURE_NAME_MAX];
+  char to[SUPINE_POSTURE_NAME_MAX];
+  char seconds[32];
+  if (sscanf(text, "%47[^:]:%47[^:]:%31s", from, to, seconds) != 3) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  const size_t last = strlen(seconds) - 1;
+  seconds[last] = seconds[last] == 's' ? '\0' : seconds[last];
+  if (!supine_options_parse_number(seconds, &made->seconds) || !(made->seconds > 0.0)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "'%s' needs a time above 0 s, as in supine:left:5s", text);
+  }
+  const supine_status status = supine_options_posture(from, made->from, error);
+  return status == SUPINE_OK ? supine_options_posture(to, made->to, error) : status;
 }
 
 void supine_breath_frames_free(breath_frames *frames) {

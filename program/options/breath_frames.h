@@ -16,6 +16,9 @@ typedef struct breath_turn {
  * left side, or the back where gravity starts along the body or to a side. */
 void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
 
+/* Read "supine:left:10s" into a breath_turn, as a supine_option_reader. */
+supine_status supine_breath_turn_read(const char *text, void *turn, supine_error *error);
+
 /* Times, directions of gravity and volumes of all frames. */
 typedef struct breath_frames {
   const supine_basis *basis;
