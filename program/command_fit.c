@@ -442,8 +442,9 @@ const supine_command supine_command_fit = {
              "SCAN SCAN [--state STATE:FILE]... -o patient.json [OPTIONS]",
     .about = "Fits a model to one person's lungs in two scans: a law of motion, and its residual "
              "interpolated by kriging. Reports the measured and the expected error at held-out "
-             "points. Landmarks determine most; surfaces alone do not show sliding along them. "
-             "'supine precompute --patient' makes a basis from the model and either scan.",
+             "points. Landmarks determine most; surfaces alone do not show sliding along them, so "
+             "their expected error includes that seen in other patients. 'supine precompute "
+             "--patient' makes a basis from the model and either scan.",
     .options = table,
     .notes =
         "The residuals are those of no motion, a translation, an affine map, the law, and the law "

@@ -124,29 +124,41 @@ static supine_status hold_all_out(study *s, squares *held, supine_error *error) 
   return SUPINE_OK;
 }
 
-/* Find the expected error of a surface's points in three dimensions, mm RMS; return their mean
- * displacement, mm. */
-static double expect(const study *s, supine_patient_krige *krige, double *expected) {
+/* Compute the expected error of a surface's points in three dimensions, mm RMS, and their mean
+ * displacement, mm. Without landmarks, the rows hold nothing of the motion along the surface, so
+ * the covariance of g is that of other patients. */
+static supine_status expect(const study *s, size_t triples, const supine_patient_krige *fitted,
+                            double *expected, double *mean, supine_error *error) {
   const double share = (double)s->components / (double)s->row_count;
+  supine_patient_fit_options options = s->options;
+  supine_patient_krige krige = {0};
   double variance = 0.0;
-  double moved = 0.0;
-  for (size_t i = 0; i < s->row_count; i += s->components) {
+  options.noise = fitted->noise;
+  if (triples == 0) {
+    options.sill = 1.0;
+    options.uncorrected = false;
+  }
+  const supine_status status =
+      supine_patient_krige_fit(&options, s->rows, s->row_count, &krige, error);
+  *mean = 0.0;
+  for (size_t i = 0; i < s->row_count && status == SUPINE_OK; i += s->components) {
     supine_patient_row row = s->rows[i];
     double u[3];
-    supine_patient_direction(&krige->law, &row.place,
-                             supine_patient_force_at(&krige->law, &row.place), u);
-    moved += supine_length(u) * share;
+    supine_patient_direction(&fitted->law, &row.place,
+                             supine_patient_force_at(&fitted->law, &row.place), u);
+    *mean += supine_length(u) * share;
     for (size_t a = 0; a < 3; ++a) {
       double of;
       for (size_t b = 0; b < 3; ++b) {
         row.axis[b] = a == b ? 1.0 : 0.0;
       }
-      (void)supine_patient_krige_predict(krige, &row, &of);
+      (void)supine_patient_krige_predict(&krige, &row, &of);
       variance += of * share;
     }
   }
   *expected = near_surface * sqrt(variance);
-  return moved;
+  supine_patient_krige_free(&krige);
+  return status;
 }
 
 static supine_patient_score baseline_of(const study *s) {
@@ -163,8 +175,8 @@ static double conclude(const study *s, const squares *sums, double score[SCORES]
 }
 
 /* Fit all rows, then without each fold. */
-static supine_status run(study *s, supine_patient *patient, supine_patient_fit_report *report,
-                         supine_error *error) {
+static supine_status run(study *s, size_t triples, supine_patient *patient,
+                         supine_patient_fit_report *report, supine_error *error) {
   squares fitted = {.points = 0};
   squares held = {.points = 0};
   double moved = 0.0;
@@ -175,9 +187,11 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
     add_rows(s, s->rows, s->row_count, &krige, &fitted);
     s->options.sill = krige.sill;
     s->options.uncorrected = krige.sill == 0.0;
-    moved = expect(s, &krige, &report->expected_point);
+    status = expect(s, triples, &krige, &report->expected_point, &moved, error);
     supine_patient_krige_errors(&krige, report->error);
     supine_patient_krige_take(&krige, patient);
+  }
+  if (status == SUPINE_OK) {
     status = hold_all_out(s, &held, error);
   }
   if (status == SUPINE_OK) {
@@ -226,7 +240,7 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
     }
   }
   if (status == SUPINE_OK) {
-    status = run(&s, patient, report, error);
+    status = run(&s, triples, patient, report, error);
   }
   free(s.fold);
   return status;

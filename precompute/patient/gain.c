@@ -13,6 +13,7 @@
 static const double gain_least = 0.01, gain_most = 2.0; /* other gains count as undetermined */
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
 static const double settled = 1e-4;      /* change of s and s gain that ends the rounds */
+static const double unsettled = 1e-2;    /* change in the last round that is an error */
 static const double force_least = 0.2;   /* least fitted force, relative to its mean of 1 */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, UNKNOWNS = 5 };
 
@@ -156,6 +157,12 @@ static supine_status settle(work *w, supine_patient_further *further, supine_err
     status = w->surface == NULL ? SUPINE_OK : match_surface(w, error);
     further->residual = fit(w, further->fits_gain, EIGHTHS);
     change = fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]);
+  }
+  if (status == SUPINE_OK && change >= unsettled) {
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "a further state does not settle: after %d rounds its gain still "
+                              "changes by %.2g. Check that axes and person are the same",
+                              ROUNDS, change);
   }
   further->scale = w->x[0];
   further->gain = w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0;
