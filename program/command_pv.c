@@ -6,9 +6,10 @@
 
 #include <jansson.h>
 
-#include "program/options/pv.h"
+#include "sh/base/output.h"
 
 #include "program/options/command.h"
+#include "program/options/pv.h"
 
 static const char command[] = "pv";
 
@@ -20,7 +21,7 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", "write the parameters (CSV, one row per limb)",
+    {"output", 'o', "FILE", "write the report with the parameters (JSON), for --pv",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
     {"confidence", 'c', "SHARE", "confidence level of the intervals, between 0 and 1",
      SUPINE_FILLS(request, confidence), .standard = "0.95", .range = {0.0, 1.0}, .open = true,
@@ -52,8 +53,7 @@ static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *r
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {
   supine_pv pv = {0};
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
-  const supine_status status =
-      supine_breath_fit_file(path, chosen->confidence, &pv, reports, error);
+  supine_status status = supine_breath_fit_file(path, chosen->confidence, &pv, reports, error);
   if (status != SUPINE_OK) {
     return status;
   }
@@ -70,8 +70,16 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
                                 json_limb(&pv.limb[limb], &reports[limb]));
     }
   }
+  supine_output output = {0};
+  if (chosen->output != NULL) {
+    status = supine_output_open(chosen->output, &output, error);
+  }
+  if (status == SUPINE_OK && chosen->output != NULL) {
+    (void)json_dumpf(root, output.file, JSON_INDENT(2)); /* a failed write stays in the stream */
+    status = supine_output_commit(&output, error);
+  }
   supine_options_print(root, chosen->json);
-  return chosen->output != NULL ? supine_breath_save(chosen->output, &pv, error) : SUPINE_OK;
+  return status;
 }
 
 static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
@@ -164,9 +172,9 @@ const supine_command supine_command_pv = {
         "sharpen its knees.\n"
         "\n"
         "Examples:\n"
-        "  supine pv fit patient.csv -o patient.pv.csv\n"
-        "  supine breathe lungs.safetensors --posture supine --pv patient.pv.csv -o breath.vtp\n"
-        "  supine pv show patient.pv.csv --step 0.5 > curve.csv",
+        "  supine pv fit patient.csv -o patient.pv.json\n"
+        "  supine breathe lungs.safetensors --posture supine --pv patient.pv.json -o breath.vtp\n"
+        "  supine pv show patient.pv.json --step 0.5 > curve.csv",
     .operands_least = 1,
     .operands_most = 2,
     .operands_missing = "give 'fit FILE' or 'show [FILE]'",

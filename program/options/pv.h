@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Fit a lung's pressure-volume relation (supine/breath.h) to samples; read and write its
- * parameters. Everything here is thread-safe. Turn GSL's default error handler off first: it
+ * Fit a lung's pressure-volume relation (supine/breath.h) to samples; read its parameters. Everything here is thread-safe. Turn GSL's default error handler off first: it
  * aborts. */
 #ifndef SUPINE_PV_H
 #define SUPINE_PV_H
@@ -60,11 +59,7 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
 supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
                                      supine_pv_report *reports, supine_error *error);
 
-/** Write parameters as CSV, one row per limb, with enough digits to read back the same numbers.
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_ARGUMENT (an invalid curve), SUPINE_ERROR_MEMORY */
-supine_status supine_breath_save(const char *path, const supine_pv *pv, supine_error *error);
-
-/** Read what supine_breath_save wrote. A single limb serves for both.
+/** Read the parameters that 'supine pv fit -o' wrote. A single limb serves for both.
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
 supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error);
 

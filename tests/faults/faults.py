@@ -34,7 +34,7 @@ solve lungs.ply --posture supine --reach 10 --scale 5 -o state.ply
 embed lungs.safetensors points.csv -o points.safetensors
 embed lungs.safetensors --grid 60 -o grid.safetensors
 fit --landmarks pairs.csv --law deep -o patient.json
-pv fit samples.csv -o patient.pv.csv
+pv fit samples.csv -o patient.pv.json
 """
 
 # Commands to test; outputs go to the folder out.
@@ -69,14 +69,14 @@ compare lungs.safetensors --postures supine,prone --json
 compare lungs.safetensors --postures supine,prone -o out/a.html
 compare points.safetensors --postures supine,prone
 breathe lungs.safetensors --posture prone --fps 1 -o out/a.vtp
-breathe lungs.safetensors --turn supine:left:1s --fps 2 --pv patient.pv.csv -o out/a.safetensors
+breathe lungs.safetensors --turn supine:left:1s --fps 2 --pv patient.pv.json -o out/a.safetensors
 render lungs.safetensors --posture supine --size 300x200 -o out/a.png
 render lungs.safetensors --turn supine:left:0.1s --size 300x200 -o out/a.webp
 export lungs.safetensors -o out/a.html
 export lungs.safetensors --inside points.safetensors -o out/a.html
 export lungs.safetensors -o out/a.glb
 export lungs.safetensors -o out/a.glb --plain --animate
-pv show patient.pv.csv
+pv show patient.pv.json
 pv fit samples.csv -o out/a.csv
 pv fit samples.csv --json
 stream lungs.safetensors --listen 127.0.0.1:0 --seconds 0.05 --volume rest

@@ -45,13 +45,9 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   static const char *const texts[] = {
       "expandability\n1\n0.5\n# half\n2e-1\n", "vertex,expandability\n0,1\n2,0.25\n1,3\n",
       ("pressure_cmH2O,volume_mL,limb\n0,100,inhale\n5,420,inhale\n10,900,inhale\n20,1500,inhale\n"
-       "20,1500,exhale\n10,1200,exhale\n5,700,exhale\n0,150,exhale\n")};
+       "20,1500,exhale\n10,1200,exhale\n5,700,exhale\n0,150,exhale\n"),
+      ("{\"inhale\": {\"pressure_cmH2O\": [0, 30], \"volume_mL\": [0, 6000],\n"
+       "\"control\": [-0.7, -2.2, 0.5, 0.3, -0.1]}}")};
   enum { TEXTS = sizeof texts / sizeof *texts };
-  if (index < TEXTS) {
-    return supine_fuzz_text(texts[index], size);
-  }
-  const char *path = supine_fuzz_file((const uint8_t *)"", 0, ".json");
-  return index == TEXTS && supine_breath_save(path, supine_breath_normal(), NULL) == SUPINE_OK
-             ? supine_fuzz_take(path, size)
-             : NULL;
+  return index < TEXTS ? supine_fuzz_text(texts[index], size) : NULL;
 }
