@@ -35,7 +35,8 @@ static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as sup
 
 static const supine_option table[] = {
     {"output", 'o', "OUT",
-     "NAME.vtp: one file for ParaView, which counts its time in frames; positions are rounded to "
+     "NAME.vtp: one file for ParaView, whose time is the index of the frame; positions are rounded "
+     "to "
      "1/256 mm, with normals, lungs, gravity and volumes. NAME.safetensors: positions [T,N,3], "
      "triangles [M,3], time [T] in s, volume [T,G] in mL and gravity [T,3]",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
@@ -65,8 +66,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, breath.course), .choices = courses, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
-    {"fps", 0, "N", "frames per second; by default one every 15 ms", SUPINE_FILLS(request, fps),
-     SUPINE_ABOVE_ZERO, .standard = "66.66"},
+    {"fps", 0, "N", "frames per second", SUPINE_FILLS(request, fps), SUPINE_ABOVE_ZERO,
+     .standard = "66.66"},
     {"seconds", 0, "S", "duration; default: the turn, or one breath",
      SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},

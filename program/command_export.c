@@ -45,8 +45,8 @@ static const supine_option table[] = {
      "KHR_mesh_quantization",
      SUPINE_FILLS(request, glb.plain), SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
-     "add animations: breathing while turning from supine over the left side to prone and on, and "
-     "breathing in each lying posture",
+     "add animations: one breathes while gravity turns from supine over the left side to prone and "
+     "back over the right side; others breathe in each lying posture",
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
     {.name = NULL}};
 

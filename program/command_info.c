@@ -207,17 +207,15 @@ const supine_command supine_command_info = {
         "with, and its accuracy.",
     .options = table,
     .notes =
-        "The compression error is the difference from the full solve on held-out directions: in "
-        "percent of the RMS displacement, and in mm at a volume or at a state between full "
-        "inflation (0) and rest (1). It is also listed, as a share, for the bands up to 0, 1, 2, "
-        "..., and for the best 1, 2, 3, ... modes.\n"
+        "The compression error is the difference from the full solve on held-out directions, in "
+        "percent of the RMS displacement and in mm. It is also listed for each highest band 0, 1, "
+        "2, ... and for the best 1, 2, 3, ... modes, as a share.\n"
         "Triangles that turn over are counted in the worst of six postures.\n"
-        "The expected error is that of a displacement from the scan: " SUPINE_EXPECTED_MEANING
+        "The expected error is given for the displacement from the scan: " SUPINE_EXPECTED_MEANING
         ". " SUPINE_EXPECTED_SUPPORT "\n"
         "Displacement by band is the share of the squared displacement, over the surface and all "
-        "orientations, that the harmonics of each band l = 0, 1, 2, ... carry. Odd bands change "
-        "sign when gravity "
-        "does; the even bands beyond l = 0 make prone differ from the exact reverse of supine.",
+        "orientations, in the harmonics of each band l = 0, 1, 2, ... Displacements of odd bands "
+        "are reversed when gravity is reversed; those of even bands are not.",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

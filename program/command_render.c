@@ -404,9 +404,9 @@ const supine_command supine_command_render = {
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
     .about =
         "Draws the lungs in each posture, side by side and off screen: coloured by "
-        "displacement, with contour lines at the ticks of the colour bar, and a ball that "
-        "shows the body's axes (left, right, anterior, posterior, head, feet) and gravity (the "
-        "arrow; a cross points away from you).",
+        "displacement, with contour lines at the ticks of the colour bar. A ball shows the "
+        "body's axes (left, right, anterior, posterior, head, feet) and gravity as an arrow (a "
+        "cross where it points away from you).",
     .options = table,
     .notes =
         "Examples:\n"

@@ -82,9 +82,10 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
-     "what peers receive unless they choose: weights, an NDARRAY of the K weights and the "
+     "what a peer receives until it asks for something else: weights, an NDARRAY of the K weights "
+     "and the "
      "three gains of each lung; surface, a POLYDATA of points and triangle strips; points, a "
-     "POLYDATA whose triangles are sent once. A peer chooses with a STRING of device SEND that "
+     "POLYDATA whose triangles are sent once. A peer asks with a STRING of device SEND that "
      "holds one of these words",
      SUPINE_FILLS(request, options.content), .choices = supine_stream_content_names,
      .standard = "weights"},
@@ -112,7 +113,8 @@ static const supine_option table[] = {
     {"record", 0, "POSES.csv", "write the received poses, at the end of the run",
      SUPINE_FILLS(request, record), .file = SUPINE_FILE_OUT},
     {"replay", 0, "POSES.csv",
-     "follow recorded poses instead, from the first peer or viewer on, then stop",
+     "follow recorded poses instead of a tracker, starting when the first peer or viewer connects, "
+     "and stop at their end",
      SUPINE_FILLS(request, replay), .file = SUPINE_FILE_IN},
     {"seconds", 0, "S", "duration; default: until interrupted",
      SUPINE_FILLS(request, options.seconds), SUPINE_ABOVE_ZERO, .more = true},

@@ -62,13 +62,12 @@ static const supine_option table[] = {
      .read = read_state, .wants = "(at most 8) SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
-     "state that motion starts from: that of the first landmarks, and of the surface that the "
-     "fitted "
-     "maps move; default: the scan",
+     "state in which the motion starts, in which the first landmarks were placed; default: the "
+     "scan",
      FILLS(from), .read = read_posture, .wants = "a state, as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
-     "state of the landmarks where no --state is given; default of the states that name no posture "
-     "or volume: supine, and the volume of their surface",
+     "state of the second landmarks, without --state. With --state, the default for states "
+     "without a posture or a volume: supine, and the volume of the surface",
      FILLS(to), .read = read_posture, .wants = "a state, as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
@@ -230,27 +229,26 @@ const supine_command supine_command_validate = {
     "compare a basis with another scan of the person",
     .usage = "BASIS --state [POSTURE:]SURFACE [--landmarks PAIRS.csv] [OPTIONS]\n"
              "BASIS --landmarks PAIRS.csv --to POSTURE:VOLUME [OPTIONS]",
-    .about = "Compares a basis with other states of the same person: "
-             "distances between the surfaces and of landmarks, and how much of the motion is "
-             "explained, beside what no motion, a translation and an affine map "
-             "leave; and, of several states, how linear displacement is with volume.",
+    .about = "Compares a basis with other states of the same person. Reports the distances between "
+             "the surfaces and between landmarks, and how much of the motion is explained, in "
+             "comparison with no motion, a translation and an affine map. With several states, "
+             "reports how linear displacement is in volume.",
     .options = table,
-    .notes = "Distances are between the surfaces, both ways (largest: Hausdorff), and between the "
-             "landmarks. 'no motion' is the distance without motion; translation and affine "
-             "are fitted to the other state itself. explained is the part of the squared distance "
-             "without motion that is gone. A small distance between surfaces does not prove the "
-             "motion inside: landmarks measure it. Santhanam 2008 found surfaces within 2 mm, and "
-             "constants within 1 %.\n"
-             "With several states: the scale of the displacement that comes nearest to a state's "
-             "surface is "
-             "also found; the largest deviation is how far a straight line of scale over volume, "
-             "through "
-             "the start of motion, misses those in one posture, in percent of the largest.\n"
-             "\n"
-             "Examples:\n"
-             "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
-             "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
-             "      --state supine:full:full.ply --landmarks pairs.csv",
+    .notes =
+        "Distances between surfaces are measured in both directions; the largest is the Hausdorff "
+        "distance. The translation and the affine map are fitted to the other state. "
+        "'explained' is 1 minus the squared distance after the motion over that without "
+        "motion. A small distance between surfaces does not prove the motion inside: "
+        "landmarks measure it. Santhanam 2008 found surfaces within 2 mm, and constants "
+        "within 1 %.\n"
+        "With several states, the displacement is also scaled to come nearest to each surface. "
+        "In each posture a straight line through the start of motion is fitted to scale over "
+        "volume; its largest deviation is given in percent of the largest scale.\n"
+        "\n"
+        "Examples:\n"
+        "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
+        "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
+        "      --state supine:full:full.ply --landmarks pairs.csv",
     .operands_least = 1,
     .operands_most = 1,
     .operands_missing = "name one basis file (made by 'supine precompute')",

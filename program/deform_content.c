@@ -37,7 +37,7 @@ const supine_option supine_command_deform_content_options[] = {
      "with --image, a CT in Hounsfield units: scale densities inside the lungs by the local change "
      "of volume, which keeps their mass; the header of the output says so",
      SUPINE_FILLS(supine_deform_content, density)},
-    {"labels", 0, "FILE", "label map to move and write to -o, by nearest voxels",
+    {"labels", 0, "FILE", "label map to move and write to -o, with the label of the nearest voxel",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {.name = NULL}};
 

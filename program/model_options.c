@@ -176,9 +176,9 @@ const supine_option supine_command_model_options[] = {
     {.help = "Direction of displacement:", .more = true},
     {"constants", 0, "C1,...,C6",
      "constants of the box model; default by law:" SUPINE_LAWS(
-         LAW_CONSTANTS) ". Fitted to landmarks: paper to ten 4-D CTs (DIR-Lab), deep to ten "
-                        "full breaths (DIR-Lab COPDgene). The constants that the paper used "
-                        "are lost",
+         LAW_CONSTANTS) ". Those of paper are fitted to the landmarks of ten 4-D CTs "
+                        "(DIR-Lab), as the original constants are lost; those of deep to ten "
+                        "full breaths (DIR-Lab COPDgene)",
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
     {.help = "Tissue. Expandability a is the inverse of stiffness, E = 1/a. Only ratios "
              "between the parts of the lungs count: doubling every a changes nothing."},
