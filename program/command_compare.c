@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine compare: compare postures by displacement, and ventilation by height in each. */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -211,12 +210,7 @@ static supine_status compare(const char *path, const char *made_by, const supine
   }
   status = supine_report_find(&comparison, error);
   if (status == SUPINE_OK) {
-    if (!wanted->json) {
-      supine_report_text(&comparison, stdout);
-    } else if (!supine_report_json(&comparison, stdout)) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_WRITE, "cannot print JSON: %s", strerror(errno));
-    }
+    supine_report_print(&comparison, wanted->json);
   }
   if (status == SUPINE_OK && wanted->html != NULL) {
     status = write_html(wanted->html, &comparison, error);

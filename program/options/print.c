@@ -82,7 +82,8 @@ static const struct {
               {NULL, "control", "control parameters c1 to c5"},
               {NULL, "control_interval", "  confidence interval, +-"},
               {NULL, "corrected", "law and kriging"},
-              {NULL, "directions", "held-out directions"},
+              {"error", "directions", "held-out directions"},
+              {"sphere", "directions", "sampled directions"},
               {NULL, "energy_per_band", "displacement by band, share"},
               {NULL, "error", "compression error"},
               {"error", "volume_ml", "state of the mm: volume, mL"},
@@ -102,6 +103,7 @@ static const struct {
               {NULL, "left_without_gain_mm", "without the gain, mm"},
               {NULL, "linearity", "linearity of displacement with volume"},
               {NULL, "lung_count", "number of lungs"},
+              {NULL, "max", "largest"},
               {NULL, "max_mm", "largest, mm"},
               {NULL, "max_percent", "largest, % of RMS displacement"},
               {NULL, "midline_mm", "x of the midline, mm"},
@@ -113,6 +115,7 @@ static const struct {
               {NULL, "none", "no motion"},
               {NULL, "of", "measured on"},
               {NULL, "off_percent", "largest deviation, %"},
+              {NULL, "p95", "95 %"},
               {NULL, "p95_mm", "95 %, mm"},
               {NULL, "p95_percent", "95 %, % of RMS displacement"},
               {NULL, "paper", "Santhanam 2008 found"},
@@ -120,6 +123,7 @@ static const struct {
               {NULL, "reach_mm", "reach of a force, mm"},
               {NULL, "rest_part", "state of the mm: full 0, rest 1"},
               {NULL, "resting_shares", "volume at rest, share of full"},
+              {NULL, "rms", "RMS"},
               {NULL, "rms_after_mm", "distance after, RMS, mm"},
               {NULL, "rms_before_mm", "distance before, RMS, mm"},
               {NULL, "rms_mL", "residual, RMS, mL"},
@@ -128,6 +132,7 @@ static const struct {
               {NULL, "rms_percent", "residual, % of range of volumes"},
               {"states", "scale", "scale of the displacement"},
               {NULL, "scanned", "state in the scan"},
+              {NULL, "sphere", "all directions of gravity"},
               {NULL, "spread_rms", "spread, RMS"},
               {NULL, "standard_errors", "standard errors of c1 to c9"},
               {"linearity", "states", "states"},
@@ -145,7 +150,7 @@ static const struct {
  * underscores, and a comma before a unit at its end. */
 static void write_label(const char *parent, const char *key, char text[TEXT_MAX]) {
   static const char *const units[][2] = {
-      {"_mm", ", mm"}, {"_ml", ", mL"}, {"_percent", ", %"}, {"_rad", ", rad"}};
+      {"_mm", ", mm"}, {"_mm2", ", mm2"}, {"_ml", ", mL"}, {"_percent", ", %"}, {"_rad", ", rad"}};
   for (size_t i = 0; i < sizeof labels / sizeof *labels; ++i) {
     if (strcmp(labels[i].key, key) == 0 &&
         (labels[i].parent == NULL || strcmp(labels[i].parent, parent) == 0)) {

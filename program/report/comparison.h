@@ -59,10 +59,8 @@ bool supine_report_has_errors(const supine_comparison *comparison);
 /* Return the volume that all lungs together gain by the breath in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
-/* Print the comparison. Write errors stay in the stream; supine_report_json returns false if
- * jansson fails. */
-void supine_report_text(const supine_comparison *comparison, FILE *file);
-bool supine_report_json(const supine_comparison *comparison, FILE *file);
+/* Print the comparison to standard output, as JSON or as text with tables of the postures. */
+void supine_report_print(const supine_comparison *comparison, bool json);
 
 /* Print the comparison as HTML. If pictures cannot be drawn, print the reason in their place. Write
  * errors stay in the stream.

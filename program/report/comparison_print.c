@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Print a comparison as JSON, or as text. */
+#include <limits.h>
+
+#include "sh/base/text.h"
+
+#include "program/report/comparison.h"
+
+static json_t *statistics(const supine_distance_statistics *d) {
+  return json_pack("{s:f, s:f, s:f, s:f}", "mean", d->mean, "rms", d->rms, "p95", d->p95, "max",
+                   d->max);
+}
+
+static json_t *direction(const double g[3]) {
+  return json_pack("[f, f, f]", g[0], g[1], g[2]);
+}
+
+static json_t *by_lung(const supine_comparison *c, const double *values) {
+  const supine_basis_info *info = supine_basis_get_info(c->basis);
+  json_t *list = json_object();
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)json_object_set_new(list, info->lung_names[lung], json_real(values[lung]));
+  }
+  return list;
+}
+
+/* Return a slab of a posture; its expansion is relative to its volume before the breath, its share
+ * to the volume of the breath. */
+static json_t *encode_slab(const supine_comparison *c, size_t posture, size_t s) {
+  const supine_slab *slab = &c->posture[posture].slab[s];
+  const double thickness = 1.0 / SUPINE_COMPARISON_SLABS;
+  const double total = supine_report_gain(c, posture);
+  return json_pack("{s:[f, f], s:f, s:f, s:f, s:f}", "height", 1.0 - thickness * (double)(s + 1),
+                   1.0 - thickness * (double)s, "volume_ml", slab->volume, "gain_ml", slab->gain,
+                   "expansion", slab->volume > 0.0 ? slab->gain / slab->volume : 0.0, "share",
+                   total != 0.0 ? slab->gain / total : 0.0);
+}
+
+static json_t *encode_postures(const supine_comparison *c) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const supine_posture_item *item = &c->postures.item[i];
+    json_t *posture =
+        json_pack("{s:s, s:o, s:o}", "name", item->name, "gravity", direction(item->gravity),
+                  "displacement_mm", statistics(&c->posture[i].displacement));
+    if (supine_report_has_errors(c)) {
+      (void)json_object_set_new(posture, "expected_error_mm",
+                                json_real(c->posture[i].expected_error));
+    }
+    json_t *slabs = json_array();
+    for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+      (void)json_array_append_new(slabs, encode_slab(c, i, s));
+    }
+    (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
+    (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
+    (void)json_object_set_new(posture, "slabs", slabs);
+    (void)json_array_append_new(list, posture);
+  }
+  return list;
+}
+
+/* Append a row to the table `heading` of an object: `value` in the column `name`, then `members`,
+ * which it releases. */
+static void add_row(json_t *tables, const char *heading, const char *name, const char *value,
+                    json_t *members) {
+  json_t *row = json_pack("{s:s}", name, value);
+  (void)json_object_update_new(row, members);
+  if (json_object_get(tables, heading) == NULL) {
+    (void)json_object_set_new(tables, heading, json_array());
+  }
+  (void)json_array_append_new(json_object_get(tables, heading), row);
+}
+
+/* Add tables that compare the postures, for the text. */
+static void add_tables(const supine_comparison *c, json_t *text) {
+  char gained[64];
+  (void)snprintf(gained, sizeof gained, "gain of each lung in a breath of %.4g mL, mL",
+                 supine_report_gain(c, 0));
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const char *name = supine_options_posture_label(c->postures.item[i].name);
+    json_t *moved = statistics(&c->posture[i].displacement);
+    if (supine_report_has_errors(c)) {
+      (void)json_object_set_new(moved, "expected error", json_real(c->posture[i].expected_error));
+    }
+    add_row(text, "displacement, mm", "posture", name, moved);
+    add_row(text, "volume of each lung, mL", "posture", name, by_lung(c, c->posture[i].volume));
+    add_row(text, gained, "posture", name, by_lung(c, c->posture[i].gain));
+  }
+  for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+    json_t *values[2] = {json_object(), json_object()};
+    char height[16];
+    (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
+    for (size_t i = 0; i < c->postures.count; ++i) {
+      const char *name = supine_options_posture_label(c->postures.item[i].name);
+      json_t *slab = encode_slab(c, i, s);
+      for (int k = 0; k < 2; ++k) {
+        const json_t *part = json_object_get(slab, k == 0 ? "expansion" : "share");
+        (void)json_object_set_new(values[k], name, json_real(100.0 * json_number_value(part)));
+      }
+      json_decref(slab);
+    }
+    add_row(text, "regional expansion by height along gravity, % of the volume before the breath",
+            "height, %", height, values[0]);
+    add_row(text, "share of the breath by height along gravity, %", "height, %", height, values[1]);
+  }
+}
+
+void supine_report_print(const supine_comparison *c, bool json) {
+  char volume[160];
+  char file_name[PATH_MAX] = "";
+  supine_text_add(file_name, sizeof file_name, "%s", c->path);
+  (void)supine_text_make_utf8(file_name);
+  supine_report_volume(c, volume, sizeof volume);
+  json_t *root = json_pack("{s:s, s:s, s:s, s:I, s:f}", "file", file_name, "volume", volume,
+                           "displacement_from", c->reference.name, "vertices",
+                           (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
+                           supine_compare_area(c->compare));
+  if (json) {
+    (void)json_object_set_new(root, "postures", encode_postures(c));
+  } else {
+    add_tables(c, root);
+  }
+  if (!json && supine_report_has_errors(c)) {
+    (void)json_object_set_new(root, "expected error",
+                              json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
+  }
+  (void)json_object_set_new(root, "sphere",
+                            json_pack("{s:I, s:{s:o, s:f}}", "directions",
+                                      (json_int_t)c->directions, "farthest_from_supine", "gravity",
+                                      direction(c->farthest), "rms_mm", c->farthest_rms));
+  supine_options_print(root, json);
+}
