@@ -6,10 +6,11 @@
 
 #include <gsl/gsl_statistics.h>
 
+#include "mesh/mesh.h"
+#include "precompute/writer.h"
 #include "sh/base/clock.h"
 #include "sh/base/text.h"
 
-#include "program/breath_output.h"
 #include "program/options/basis_input.h"
 #include "program/options/breath_frames.h"
 #include "program/options/pv.h"
@@ -40,7 +41,7 @@ static const supine_option table[] = {
      "1/256 mm, with normals, lungs, gravity and volumes. NAME.safetensors: positions [T,N,3], "
      "triangles [M,3], time [T] in s, volume [T,G] in mL and gravity [T,3]",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
-     .endings = SUPINE_BREATH_ENDINGS},
+     .endings = ".vtp or .safetensors"},
     {"turn", 0, "FROM:TO:SECONDS",
      "turn gravity from one posture to another at constant speed, as supine:left:10s; between "
      "opposite postures, over the left side. The volume at rest follows the posture",
@@ -107,8 +108,54 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
                                 seconds, wanted->fps, FRAMES_MAX);
 }
 
+/* A breath, and the memory for its surfaces. */
+typedef struct playing {
+  const request *wanted;
+  supine_basis *basis;
+  breath_frames frames;
+  supine_mesh mesh;  /* for VTP: vertices of the current frame, triangles of the basis */
+  float *normals;    /* [N, 3] for VTP */
+  float *positions;  /* [N, 3] of the current frame; for safetensors [T, N, 3] of all follow, mm */
+  double *seconds;   /* [T] time that each frame took to compute */
+  double *origin;    /* [N, 3] positions that displacements start from, mm */
+  char comment[512]; /* of the VTP file */
+} playing;
+
+static void end(playing *p) {
+  supine_breath_frames_free(&p->frames);
+  supine_mesh_free(&p->mesh);
+  free(p->normals);
+  free(p->positions);
+  free(p->seconds);
+  free(p->origin);
+  supine_basis_close(p->basis);
+}
+
+/* Allocate the memory for `count` frames. */
+static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
+  const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
+  const size_t kept = series ? 1 : 1 + count;
+  if (frame <= SIZE_MAX / sizeof(float) / kept) {
+    p->positions = malloc(kept * frame * sizeof *p->positions);
+  }
+  p->normals = malloc(frame * sizeof *p->normals);
+  p->seconds = malloc(count * sizeof *p->seconds);
+  if (p->normals == NULL || p->seconds == NULL ||
+      supine_options_basis_mesh(p->basis, &p->mesh) != SUPINE_OK) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
+  }
+  return p->positions != NULL
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MEMORY,
+                                "%s: no memory for %zu frames of %zu vertices (%.1f GB): lower "
+                                "--seconds or --fps, or write a .vtp file",
+                                p->wanted->path, count, frame / 3,
+                                4e-9 * (double)frame * (double)kept);
+}
+
 /* Print the volumes, and the time that frames took. */
-static void report(const request *wanted, const breath_frames *frames, double *seconds) {
+static void report(const playing *p) {
+  const breath_frames *frames = &p->frames;
   double least = INFINITY;
   double peak = 0.0;
   for (size_t t = 0; t < frames->count; ++t) {
@@ -120,33 +167,96 @@ static void report(const request *wanted, const breath_frames *frames, double *s
     peak = fmax(peak, sum);
   }
   (void)printf("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-               wanted->path, frames->count, frames->count == 1 ? "" : "s",
-               frames->time[frames->count - 1], wanted->fps, least, peak);
+               p->wanted->path, frames->count, frames->count == 1 ? "" : "s",
+               frames->time[frames->count - 1], p->wanted->fps, least, peak);
   (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
-               1e3 * gsl_stats_median(seconds, 1, frames->count),
-               1e3 * gsl_stats_max(seconds, 1, frames->count), 1e3 * budget);
+               1e3 * gsl_stats_median(p->seconds, 1, frames->count),
+               1e3 * gsl_stats_max(p->seconds, 1, frames->count), 1e3 * budget);
 }
 
-/* Compute and write all frames. */
-static supine_status play_frames(const breath_frames *frames, breath_output *output, float *xyz,
-                                 double *seconds, supine_error *error) {
+/* Compute all frames.
+ * @param series  gets each frame; NULL: `positions` keeps them */
+static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
+  const size_t frame = 3 * p->mesh.vertex_count;
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
-  for (size_t t = 0; t < frames->count && status == SUPINE_OK; ++t) {
+  for (size_t t = 0; t < p->frames.count && status == SUPINE_OK; ++t) {
     supine_pose pose;
     const double start = supine_clock_seconds();
-    (void)supine_breath_frames_pose(frames, t, &pose,
+    (void)supine_breath_frames_pose(&p->frames, t, &pose,
                                     NULL); /* succeeded in supine_breath_frames_create */
-    supine_deform(frames->basis, &pose, xyz);
-    seconds[t] = supine_clock_seconds() - start;
-    status = supine_command_breath_output_add(output, xyz, error);
-    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)frames->count)) {
+    supine_deform(p->basis, &pose, p->positions);
+    p->seconds[t] = supine_clock_seconds() - start;
+    if (series != NULL) {
+      for (size_t i = 0; i < frame; ++i) {
+        p->mesh.vertices[i] = (double)p->positions[i];
+      }
+      supine_normals(p->basis, p->positions, p->normals);
+      status = supine_mesh_series_add(series, error);
+    } else {
+      memcpy(p->positions + (1 + t) * frame, p->positions, frame * sizeof *p->positions);
+    }
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->frames.count)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
     }
   }
   supine_options_progress_end(&progress);
   return status;
+}
+
+/* Compute the frames, and write them as VTP.
+ * @param save  axes, unit and comment */
+static supine_status write_series(playing *p, supine_mesh_save_options *save, supine_error *error) {
+  /* Half of this step, mm, is less than the storage error (supine_basis_info). */
+  static const double rounding = 1.0 / 256.0;
+  const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
+  const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->frames.gravity},
+                                      {"volume_mL", p->frames.lungs, p->frames.volumes}};
+  supine_mesh_series *series = NULL;
+  save->from = p->origin;
+  save->normals = p->normals;
+  save->lung = lung == NULL ? NULL : lung->data;
+  save->fields = fields;
+  save->field_count = sizeof fields / sizeof *fields;
+  save->rounding = rounding;
+  supine_status status = supine_mesh_series_open(p->wanted->path, &p->mesh, save, p->frames.count,
+                                                 p->frames.time, &series, error);
+  if (status == SUPINE_OK) {
+    status = play_frames(p, series, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_mesh_series_commit(series, error);
+  }
+  supine_mesh_series_close(series);
+  return status;
+}
+
+/* Compute the frames, and write them as safetensors. */
+static supine_status write_tensors(playing *p, const char *made_by, supine_error *error) {
+  const breath_frames *frames = &p->frames;
+  const size_t t = frames->count;
+  const supine_tensor tensors[] = {
+      {"positions",
+       SUPINE_F32,
+       3,
+       {t, p->mesh.vertex_count, 3},
+       p->positions + 3 * p->mesh.vertex_count},
+      {"triangles", SUPINE_U32, 2, {p->mesh.triangle_count, 3}, p->mesh.triangles},
+      {"time", SUPINE_F64, 1, {t}, frames->time},
+      {"volume", SUPINE_F64, 2, {t, frames->lungs}, frames->volumes},
+      {"gravity", SUPINE_F64, 2, {t, 3}, frames->gravity}};
+  const supine_metadata metadata[] = {{"format", "supine-breath"},
+                                      {"version", "1"},
+                                      {"units", "mm, s, mL (gas and tissue of each lung)"},
+                                      {"axes", "LPS"},
+                                      {"made_by", made_by}};
+  const supine_status status = play_frames(p, NULL, error);
+  return status == SUPINE_OK
+             ? supine_writer_safetensors_write(p->wanted->path, tensors,
+                                               sizeof tensors / sizeof *tensors, metadata,
+                                               sizeof metadata / sizeof *metadata, error)
+             : status;
 }
 
 /* Check the surfaces with the smallest and the largest volume: warn, or fail if they fold. */
@@ -170,68 +280,44 @@ static supine_status check_ends(const request *wanted, const breath_frames *fram
   return status;
 }
 
-/* Compute and write the breath. Over 60 lines, as it makes and frees all resources. */
-static supine_status play(const supine_basis *basis, const request *wanted,
-                          const supine_mesh_save_options *frame, size_t count, const char *made_by,
-                          supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
+/* Compute and write the breath. */
+static supine_status play(playing *p, size_t count, const char *made_by, supine_error *error) {
+  const request *wanted = p->wanted;
+  const bool tensors = supine_text_ends_in_any_case(wanted->path, ".safetensors");
+  supine_mesh_save_options save = {.comment = p->comment};
   supine_pv pv = *supine_breath_normal();
-  supine_mesh rest = {0};
-  breath_frames frames = {0};
-  breath_output *output = NULL;
-  float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
-  double *seconds = malloc(count * sizeof *seconds);
-  double *origin = NULL;
   supine_reference_pose from;
-  supine_status status = SUPINE_OK;
-  if (xyz == NULL || seconds == NULL || supine_options_basis_mesh(basis, &rest) != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
-    goto cleanup;
+  supine_status status = supine_options_basis_frame(p->basis, wanted->as_scanned, &save, error);
+  if (status == SUPINE_OK) {
+    status = begin_frames(p, count, !tensors, error);
   }
-  if (wanted->pv != NULL) {
+  if (status == SUPINE_OK && wanted->pv != NULL) {
     status = supine_breath_load(wanted->pv, &pv, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_breath_frames_create(basis, &pv, &wanted->breath, &wanted->turn, wanted->fps,
-                                         count, &frames, error);
+    status = supine_breath_frames_create(p->basis, &pv, &wanted->breath, &wanted->turn, wanted->fps,
+                                         count, &p->frames, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_options_reference(basis, &wanted->from, false, &from, error);
+    status = supine_options_reference(p->basis, &wanted->from, false, &from, error);
   }
   if (status == SUPINE_OK) {
-    status = check_ends(wanted, &frames, error);
+    status = check_ends(wanted, &p->frames, error);
   }
   if (status == SUPINE_OK) {
-    origin = supine_options_basis_positions(basis, &from.pose);
-    status = origin != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+    p->origin = supine_options_basis_positions(p->basis, &from.pose);
+    status = p->origin != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
-    const breath_content content = {.rest = &rest,
-                                    .origin = origin,
-                                    .origin_name = from.name,
-                                    .frame = frame,
-                                    .frames = &frames,
-                                    .made_by = made_by};
-    status = supine_command_breath_output_open(wanted->path, &content, &output, error);
-  }
-  if (status != SUPINE_OK) {
-    goto cleanup;
-  }
-  status = play_frames(&frames, output, xyz, seconds, error);
-  if (status == SUPINE_OK) {
-    status = supine_command_breath_output_commit(output, error);
+    (void)snprintf(p->comment, sizeof p->comment,
+                   "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
+                   made_by);
+    status = tensors ? write_tensors(p, made_by, error) : write_series(p, &save, error);
   }
   if (status == SUPINE_OK) {
-    report(wanted, &frames, seconds);
+    report(p);
   }
-cleanup:
-  supine_command_breath_output_close(output);
-  supine_breath_frames_free(&frames);
-  supine_mesh_free(&rest);
-  free(origin);
-  free(xyz);
-  free(seconds);
   return status;
 }
 
@@ -242,23 +328,19 @@ static void begin(void *chosen) {
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
-  supine_mesh_save_options frame = {0};
-  supine_basis *basis = NULL;
+  playing p = {.wanted = wanted};
   size_t count = 1;
   supine_status status = complete(wanted, &count, error);
   if (status == SUPINE_OK) {
-    status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error);
+    status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &p.basis, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_options_basis_closed(basis, path, error);
+    status = supine_options_basis_closed(p.basis, path, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_options_basis_frame(basis, wanted->as_scanned, &frame, error);
+    status = play(&p, count, given->made_by, error);
   }
-  if (status == SUPINE_OK) {
-    status = play(basis, wanted, &frame, count, given->made_by, error);
-  }
-  supine_basis_close(basis);
+  end(&p);
   return status;
 }
 
