@@ -28,8 +28,8 @@ typedef struct supine_fields {
  * @param options  axes and unit of the displacements
  * @param fields   release with supine_fields_free
  * @retval SUPINE_ERROR_READ    the file is missing
- * @retval SUPINE_ERROR_FORMAT  malformed; fewer than two directions, a direction that is zero or
- * not finite, two equal directions, or a displacement that is not finite
+ * @retval SUPINE_ERROR_FORMAT  malformed; a direction that is zero or not finite, or a displacement
+ * that is not finite
  * @retval SUPINE_ERROR_MESH    the number of vertices differs from that of the lungs
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,

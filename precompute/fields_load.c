@@ -8,9 +8,6 @@
 #include "precompute/fields.h"
 #include "sh/base/vec3.h"
 
-/* Largest distance between unit vectors that count as the same direction. */
-static const double same_direction = 1e-6;
-
 void supine_fields_free(supine_fields *fields) {
   free(fields->directions);
   free(fields->displacement);
@@ -30,9 +27,9 @@ static supine_status allocate(size_t count, supine_fields *fields, supine_error 
                                 fields->vertex_count);
 }
 
-/* Normalise direction `at`, and check that no earlier one is the same. */
-static supine_status check_direction(const supine_fields *fields, size_t at, const char *path,
-                                     supine_error *error) {
+/* Normalise direction `at`. */
+static supine_status normalise(const supine_fields *fields, size_t at, const char *path,
+                               supine_error *error) {
   double *g = fields->directions + 3 * at;
   const double length = supine_length(g);
   if (!(length > 0.0) || !isfinite(length)) {
@@ -43,13 +40,6 @@ static supine_status check_direction(const supine_fields *fields, size_t at, con
   }
   for (size_t k = 0; k < 3; ++k) {
     g[k] /= length;
-  }
-  for (size_t other = 0; other < at; ++other) {
-    if (supine_distance(g, fields->directions + 3 * other) < same_direction) {
-      return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: rows %zu and %zu have the same direction: keep one of them",
-                              path, other, at);
-    }
   }
   return SUPINE_OK;
 }
@@ -93,7 +83,7 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
     for (size_t k = 0; k < 3; ++k) {
       fields->directions[3 * d + k] = element(gravity, 3 * d + k);
     }
-    status = check_direction(fields, d, path, error);
+    status = normalise(fields, d, path, error);
     for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
       double *u = fields->displacement + 3 * (n * d + i);
       for (size_t k = 0; k < 3; ++k) {
@@ -121,13 +111,6 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                           supine_safetensors_find(file, "displacement"), options, &made, error);
   }
   supine_safetensors_close(file);
-  if (status == SUPINE_OK && made.direction_count < 2) {
-    status = supine_error_set(
-        error, SUPINE_ERROR_FORMAT,
-        "%s: %zu direction%s: give at least two, so that one can be predicted from "
-        "another",
-        path, made.direction_count, made.direction_count == 1 ? "" : "s");
-  }
   if (status != SUPINE_OK) {
     supine_fields_free(&made);
     return status;
