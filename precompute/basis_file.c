@@ -157,14 +157,12 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   } else {
     add(list, "lungs", "%s", supine_lungs_name(lungs, 0));
   }
-  if (lungs->topology.closed) {
-    double volume[2];
-    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-      const supine_mesh part = supine_lungs_part(lungs, lung);
-      volume[lung] = 1e-3 * share[lung] * supine_mesh_volume(&part);
-    }
-    add_by_lung(list, "reference_volume_ml", lungs->lung_count, volume);
+  double volume[2];
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    const supine_mesh part = supine_lungs_part(lungs, lung);
+    volume[lung] = 1e-3 * share[lung] * supine_mesh_volume(&part);
   }
+  add_by_lung(list, "reference_volume_ml", lungs->lung_count, volume);
   if (share[0] != 1.0 || share[1] != 1.0) {
     add_by_lung(list, "lung_share", lungs->lung_count, share);
   }
@@ -309,14 +307,12 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
     tensors[count++] = (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, field->coefficients};
     tensors[count++] = (supine_tensor){"direction", SUPINE_F32, 2, {n, 3}, directions};
   }
-  if (content->forms != NULL) {
-    tensors[count++] =
-        (supine_tensor){"volume_linear", SUPINE_F64, 3, {g, 3, k}, content->forms->linear};
-    tensors[count++] =
-        (supine_tensor){"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, content->forms->quadratic};
-    tensors[count++] =
-        (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
-  }
+  tensors[count++] =
+      (supine_tensor){"volume_linear", SUPINE_F64, 3, {g, 3, k}, content->forms->linear};
+  tensors[count++] =
+      (supine_tensor){"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, content->forms->quadratic};
+  tensors[count++] =
+      (supine_tensor){"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, content->forms->cubic};
   if (content->resting != NULL) {
     tensors[count++] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {g, 9}, content->resting};
   }

@@ -14,7 +14,7 @@ typedef struct supine_basis_content {
   const supine_fit_report *fit; /**< fit of another simulator's fields; NULL: a model's field */
   const double *directions;     /**< [N, 3]; NULL: a vector field */
   const supine_compression *compression;
-  const supine_volume_forms *forms; /**< forms of the coefficients; NULL: open surface */
+  const supine_volume_forms *forms; /**< forms of the coefficients */
   const supine_accuracy *accuracy;
   const supine_reference *reference; /**< volumes of the lungs; NULL: rest and full are unknown */
   const double *resting;             /**< [G, 9] harmonics of the volumes at rest, mL beyond the

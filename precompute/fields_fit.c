@@ -336,7 +336,7 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
   supine_compression field = {0};
   supine_volume_forms forms = {0};
   supine_status status = supine_fields_fit(fields, options, &field, report, error);
-  if (status == SUPINE_OK && lungs->topology.closed) {
+  if (status == SUPINE_OK) {
     status = supine_projection_compression_volume_forms(&field, lungs, NULL, NULL, &forms, error);
   }
   if (status == SUPINE_OK) {
@@ -346,7 +346,7 @@ supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_f
                                           .options = &basis,
                                           .fit = report,
                                           .compression = &field,
-                                          .forms = forms.linear != NULL ? &forms : NULL,
+                                          .forms = &forms,
                                           .accuracy = &report->accuracy};
     report->mode_count = field.mode_count;
     status = supine_writer_basis_write(path, &content, error);

@@ -136,11 +136,8 @@ static supine_status anchor(pipeline *p, supine_error *error) {
 }
 
 static supine_status find_forms(pipeline *p, supine_error *error) {
-  return !p->lungs->topology.closed
-             ? SUPINE_OK
-             : supine_projection_compression_volume_forms(&p->compression, p->lungs,
-                                                          p->options->model.share, p->directions,
-                                                          &p->forms, error);
+  return supine_projection_compression_volume_forms(
+      &p->compression, p->lungs, p->options->model.share, p->directions, &p->forms, error);
 }
 
 /* Check that the field takes each lung to its volume at rest, volume [lungs] mL beyond the
@@ -222,8 +219,7 @@ static supine_status hold_out(pipeline *p, supine_error *error) {
 
 static supine_status measure(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_measure(&p->truth, &p->compression, p->directions,
-                                                       p->forms.linear != NULL ? &p->forms : NULL,
-                                                       p->volume, &p->accuracy, error);
+                                                       &p->forms, p->volume, &p->accuracy, error);
   p->accuracy.volume *= p->reference.known ? 1.0 : breath_volume;
   return status;
 }
@@ -268,24 +264,20 @@ static supine_status drop_modes(pipeline *p, supine_error *error) {
 }
 
 static supine_status find_turned_over(pipeline *p, supine_error *error) {
-  const supine_status status =
-      p->forms.linear == NULL
-          ? SUPINE_OK
-          : supine_accuracy_turned_over(p->lungs, p->directions, &p->compression, &p->forms,
-                                        p->volume, &p->turned_over);
+  const supine_status status = supine_accuracy_turned_over(p->lungs, p->directions, &p->compression,
+                                                           &p->forms, p->volume, &p->turned_over);
   return status == SUPINE_OK ? status
                              : supine_error_set(error, status, "no memory to look for folds");
 }
 
 static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {
-  const bool closed = p->forms.linear != NULL;
   const supine_basis_content content = {.lungs = p->lungs,
                                         .options = p->options,
                                         .directions = p->directions,
                                         .compression = &p->compression,
-                                        .forms = closed ? &p->forms : NULL,
+                                        .forms = &p->forms,
                                         .accuracy = &p->accuracy,
-                                        .turned_over = closed ? &p->turned_over : NULL,
+                                        .turned_over = &p->turned_over,
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
                                         .resting = p->reference.known ? p->resting[0] : NULL};

@@ -38,8 +38,7 @@ typedef struct supine_precompute_report {
   size_t mode_count;
   size_t solve_count; /**< number of directions solved for */
   supine_accuracy accuracy;
-  double turned_over; /**< share of triangles, see supine_accuracy_turned_over; 0 if the surface is
-                       * open */
+  double turned_over; /**< share of triangles, see supine_accuracy_turned_over */
 } supine_precompute_report;
 
 /** Project, compress, measure, and write the basis file, whole or not at all.
@@ -49,7 +48,7 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
                                 supine_error *error);
 
 /** Fit, compress and cross-validate another simulator's fields, and write the basis file. Gain 1
- * gives the fields as they were; closed surfaces have volumes.
+ * gives the fields as they were.
  * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *path,

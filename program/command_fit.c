@@ -131,11 +131,9 @@ static void evidence_free(evidence *of) {
   supine_patient_pairs_free(&of->pairs);
 }
 
-/* Return the volume of lungs, mL; 0 without a surface, or for an open one. */
+/* Return the volume of lungs, mL; 0 without a surface. */
 static double volume_of(const supine_lungs *lungs) {
-  return lungs->mesh.vertex_count > 0 && lungs->topology.closed
-             ? 1e-3 * supine_mesh_volume(&lungs->mesh)
-             : 0.0;
+  return lungs->mesh.vertex_count > 0 ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
 }
 
 /* Find the lung that each landmark lies in, by the surface of the first scan. */

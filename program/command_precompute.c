@@ -256,7 +256,7 @@ const supine_command supine_command_precompute = {
              "basis file, from which 'supine deform' and the run-time library compute deformed "
              "lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, OFF, ...), "
              "with both lungs in one file or a file for each; LABELS is the label map of a "
-             "segmentation (NRRD, NIfTI, MetaImage). Only closed surfaces have a volume.",
+             "segmentation (NRRD, NIfTI, MetaImage). Surfaces must be closed.",
     .options = table,
     .notes = "Examples:\n"
              "  supine precompute left.ply right.ply -o lungs.safetensors\n"

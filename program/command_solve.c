@@ -18,22 +18,18 @@ typedef struct request {
   supine_orientation orientation;
   const char *path;
   supine_state state; /* volume: SUPINE_VOLUME_DEFAULT if none was given */
-  bool has_scale, has_vertex, pitcher_catcher;
-  double scale;
+  bool has_vertex, pitcher_catcher;
   size_t vertex;
 } request;
 
 static const supine_option table[] = {
     {"output", 'o', "FILE", SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
-    {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP, SUPINE_FILLS(request, state),
-     .read = supine_options_read_volume, .rivals = "breath"},
-    {"scale", 0, "MM",
-     "largest displacement instead of a volume, mm; negative: reversed. Default if rest is "
-     "unknown: gain 1, displacements F d with the share F of the force that a vertex keeps and its "
-     "direction d in mm",
-     SUPINE_FILLS(request, scale), SUPINE_SAYS_GIVEN(request, has_scale), .wants = "millimetres",
-     .rivals = "breath"},
+    {"volume", 0, "VOLUME",
+     SUPINE_VOLUME_HELP
+     ". Default if rest is unknown: gain 1, displacements F d with the share F of the force that a "
+     "vertex keeps and its direction d in mm",
+     SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"unit-force", 0, "VERTEX",
      "instead of a posture: write as CSV the response of every vertex to a unit force on this "
      "one (numbered from 0), a column of the transfer matrix T",
@@ -120,28 +116,15 @@ static void fill(double gains[2][3], double gain) {
   }
 }
 
-/* Find the gains of each lung from --scale or from the volume of the state; else set them to 1. */
+/* Find the gains of each lung from the volume of the state; else set them to 1. */
 static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
   const supine_reference *reference = &wanted->model.prepared.reference;
   const supine_volume *volume = &wanted->state.volume;
   fill(gains, 1.0);
-  if (wanted->has_scale) {
-    const double largest = supine_physics_solution_largest(solution);
-    fill(gains, wanted->scale / largest);
-    return largest > 0.0
-               ? SUPINE_OK
-               : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                  "no vertex moves in this posture: give another posture or "
-                                  "another --law");
-  }
   if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
     return SUPINE_OK;
-  }
-  if (!solution->has_volume) {
-    return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                            "--volume needs a closed surface: close the mesh, or give --scale");
   }
   if (!reference->known) { /* add the volume to the scan, with one gain for both lungs */
     const double held =
@@ -266,12 +249,9 @@ static supine_status write_solution(const supine_lungs *lungs, const request *wa
   if (status == SUPINE_OK) {
     (void)printf("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
     print_gains(lungs, gains);
-    (void)printf(", largest displacement %.3f mm", supine_physics_solution_largest(&solution));
-    if (solution.has_volume) {
-      (void)printf(", %+.2f mL",
-                   1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&reference)));
-    }
-    (void)putchar('\n');
+    (void)printf(", largest displacement %.3f mm, %+.2f mL\n",
+                 supine_physics_solution_largest(&solution),
+                 1e-3 * (supine_mesh_volume(&deformed) - supine_mesh_volume(&reference)));
   }
 cleanup:
   free(deformed.vertices);

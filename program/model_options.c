@@ -251,7 +251,7 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
   choice->model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_patient_resting(record, &choice->resting);
   if (!choice->has_scan) {
-    const double volume = lungs->topology.closed ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
+    const double volume = 1e-3 * supine_mesh_volume(&lungs->mesh);
     choice->has_scan = true;
     choice->scan = supine_patient_scan(record, state, volume, &choice->resting);
     if (state == 1 && !choice->scan.known) {

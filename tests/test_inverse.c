@@ -54,9 +54,8 @@ static int teardown(void **state) {
 static void solve(const fixture *f, int k, const double *stiffness, double *catch_) {
   assert_int_equal(supine_physics_equilibrium_set_stiffness(f->equilibrium[k], stiffness, NULL),
                    SUPINE_OK);
-  assert_int_equal(
-      supine_physics_equilibrium_solve(f->equilibrium[k], 1, f->force, catch_, NULL, NULL),
-      SUPINE_OK);
+  assert_int_equal(supine_physics_equilibrium_solve(f->equilibrium[k], 1, f->force, catch_, NULL),
+                   SUPINE_OK);
 }
 
 TEST(test_equilibrium_force_of_its_catch_recovers_it) {

@@ -146,18 +146,6 @@ TEST(test_lungs_inward_flipped_and_reported) {
 }
 
 /* If triangles of one piece face different ways, the surface counts as open. */
-TEST(test_lungs_half_inward_not_closed) {
-  supine_mesh lump = helper_lump(5, 90.0, 3);
-  turn_inwards(&lump, lump.triangle_count / 2);
-  supine_lungs lungs = {0};
-  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
-  assert_false(lungs.topology.closed);
-  assert_true(lungs.topology.inconsistent_edges > 0);
-  assert_false(lungs.reversed[0]);
-  supine_lungs_free(&lungs);
-  supine_mesh_free(&lump);
-}
-
 static void expect_refused(const supine_mesh *meshes, size_t count, const double *midline,
                            const char *words) {
   supine_lungs lungs = {0};

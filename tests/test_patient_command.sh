@@ -141,8 +141,8 @@ grep -q 'gain from.*other postures do not' fit.txt || fail "a gain at its bound:
 
 # A stiff region is recovered and used in the basis, which reaches the other state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
-"$supine" solve rest.ply --posture supine --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
-  --constants 5,2.2,9,1.1,20,1.4 --scale -30 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
+"$supine" solve rest.ply --posture supine --scanned none --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
+  --constants 5,2.2,9,1.1,20,1.4 --volume scan-1000 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
   fail "solve with a lesion"
 "$supine" fit rest.ply stiff.ply --rest 6000mL --other 5000mL --expandability -o stiff.json \
   >fit.txt || fail "fit a lesion"

@@ -455,24 +455,6 @@ TEST(test_precompute_default_law_keeps_four_modes) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_open_surface_has_no_volume) {
-  supine_mesh lump = helper_lump(6, 80.0, 3);
-  supine_lungs lungs = {0};
-  --lump.triangle_count;
-  assert_int_equal(supine_lungs_create(&lump, 1, NULL, &lungs, NULL), SUPINE_OK);
-  const supine_precompute_report report = make_basis(&lungs, 3, 0, 0.0, 0);
-  assert_true(report.accuracy.relative_rms > 0.0);
-  assert_close(report.accuracy.volume, 0.0, 0.0);
-  supine_basis *basis = open_basis();
-  const supine_state state_of = {.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_SCAN, 10.0}};
-  supine_pose pose;
-  assert_false(supine_basis_get_info(basis)->has_volume);
-  assert_int_equal(supine_basis_pose(basis, &state_of, &pose, NULL), SUPINE_ERROR_OPEN_SURFACE);
-  supine_basis_close(basis);
-  supine_lungs_free(&lungs);
-  supine_mesh_free(&lump);
-}
-
 static void normal_of(const float *xyz, const uint32_t *corner, double *normal) {
   double u[2][3];
   for (size_t j = 0; j < 2; ++j) {

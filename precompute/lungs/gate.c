@@ -57,6 +57,19 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   return SUPINE_OK;
 }
 
+static supine_status check_closed(const supine_lungs *lungs, const char *name,
+                                  supine_error *error) {
+  const supine_topology *t = &lungs->topology;
+  return t->closed
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
+                                "%s: the surface is open (edges: %zu boundary, %zu non-manifold, "
+                                "%zu inconsistent) and encloses no volume: close its holes in a "
+                                "mesh editor, or give the label map that it was made from",
+                                name, t->boundary_edges, t->non_manifold_edges,
+                                t->inconsistent_edges);
+}
+
 /* Refuse lungs of an impossible size; only warn if the user gave the axes or units. */
 static supine_status check_size(const supine_lungs *lungs, const supine_lungs_source *source,
                                 supine_findings *findings, supine_error *error) {
@@ -181,13 +194,6 @@ static void note_lungs(const supine_lungs *lungs, const char *name, supine_findi
                           supine_lungs_name(lungs, lung));
     }
   }
-  const supine_topology *t = &lungs->topology;
-  if (!t->closed) {
-    supine_findings_add(findings,
-                        "%s: note: the surface is not closed (edges: %zu boundary, %zu "
-                        "non-manifold, %zu inconsistent): volumes are unknown",
-                        name, t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges);
-  }
 }
 
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
@@ -210,6 +216,7 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
     return status;
   }
   status = check_size(lungs, source, findings, error);
+  status = status == SUPINE_OK ? check_closed(lungs, source->name, error) : status;
   status = status == SUPINE_OK ? judge(lungs, source, &side, axes_hold, findings, error) : status;
   if (status == SUPINE_OK && lungs->lung_count == 1 && source->midline == NULL) {
     status = take_side(meshes, count, source, side, lungs, findings, error);

@@ -228,9 +228,9 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
   return SUPINE_OK;
 }
 
-/* Reverse the triangles of each closed lung whose volume is negative. */
+/* Reverse the triangles of each lung whose volume is negative. */
 static void face_outwards(supine_lungs *lungs) {
-  for (size_t lung = 0; lungs->topology.closed && lung < lungs->lung_count; ++lung) {
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const supine_mesh part = supine_lungs_part(lungs, lung);
     lungs->reversed[lung] = supine_mesh_volume(&part) < 0.0;
     if (lungs->reversed[lung]) {

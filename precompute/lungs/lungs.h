@@ -27,8 +27,8 @@ typedef struct supine_lungs {
  *
  * Components whose centres lie left and right of the box's centre, and that hardly overlap in x,
  * are two lungs; otherwise all of them are one lung. The midline is the box's centre for two lungs
- * and the face of the box nearest x = 0 for one. If the triangles of a closed lung face inwards,
- * they are reversed.
+ * and the face of the box nearest x = 0 for one. If the triangles of a lung face inwards, they are
+ * reversed.
  *
  * @param meshes   [count] not changed
  * @param midline  x of the plane between left and right, mm; NULL: find it

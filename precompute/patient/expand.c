@@ -120,7 +120,7 @@ static supine_status find_responses(const supine_patient_matching *m,
         alone[i * lanes + r] = force[i] * shares[first + r];
       }
     }
-    status = supine_physics_equilibrium_solve(m->equilibrium, lanes, alone, caught, NULL, error);
+    status = supine_physics_equilibrium_solve(m->equilibrium, lanes, alone, caught, error);
     for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
       memcpy(response + i * regions->count + first, caught + m->match[i].vertex * lanes,
              lanes * sizeof *caught);

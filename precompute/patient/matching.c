@@ -133,7 +133,7 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, e, error);
   if (status == SUPINE_OK) {
     status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->columns,
-                                              m->spread, NULL, error);
+                                              m->spread, error);
   }
   for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
     memcpy(m->rows[i].place.force, m->spread + SUPINE_PATIENT_COLUMNS * m->match[i].vertex,

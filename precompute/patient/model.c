@@ -147,7 +147,7 @@ static double gain_towards(const supine_volume_form *form, const double part[2],
 }
 
 /* Find the part of the way from full inflation to rest between the states, by axis, that gives
- * closed lungs their volumes at full inflation and at rest. `ones` [N] are 1. */
+ * the lungs their volumes at full inflation and at rest. `ones` [N] are 1. */
 static void find_way(const work *w, const supine_resting *resting, const double *ones,
                      double way[3]) {
   enum { ROUNDS = 30 };
@@ -157,18 +157,18 @@ static void find_way(const work *w, const supine_resting *resting, const double 
   const double full = full_of_either(record, resting);
   const double volume[2] = {
       full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
-  const bool closed = w->lungs.topology.closed && full > 0.0;
+  const bool known = full > 0.0;
   supine_volume_form form[2] = {{{0.0}}};
   double part[2];
   double gains[2][3];
   find_parts(record, part);
-  if (closed) {
+  if (known) {
     supine_physics_volume_of_fields(&w->lungs, NULL, w->moved, ones, 1, form);
     for (size_t i = 0; i < sizeof form[0].of / sizeof *form[0].of; ++i) {
       form[0].of[i] += form[1].of[i];
     }
   }
-  for (int round = 0; round < ROUNDS && closed; ++round) {
+  for (int round = 0; round < ROUNDS && known; ++round) {
     const size_t k = (size_t)round % 2;
     const supine_volume *of = &record->state[k].volume;
     if (of->ml == 0.0 && of->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {

@@ -402,14 +402,10 @@ static void solve_parts(void *context, size_t begin, size_t end, size_t thread) 
 
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                                const double *force, double *catch_,
-                                               double *residual, supine_error *error) {
+                                               supine_error *error) {
   solve s = {equilibrium, count, force, catch_, {SUPINE_OK, SUPINE_OK}, {0.0, 0.0}};
   const size_t threads = equilibrium->parts[0].vertex_count > LARGE ? 1 : 0;
   supine_parallel_for(equilibrium->part_count, 1, threads, solve_parts, &s);
-  const double largest = s.residual[0] >= s.residual[1] ? s.residual[0] : s.residual[1];
-  if (residual != NULL) {
-    *residual = largest;
-  }
   for (size_t k = 0; k < 2; ++k) {
     if (s.status[k] == SUPINE_ERROR_MEMORY) {
       return supine_error_set(error, s.status[k], "no memory to solve %zu vertices",
@@ -469,7 +465,7 @@ supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, si
   }
   force[vertex] = 1.0;
   const supine_status status =
-      supine_physics_equilibrium_solve(equilibrium, 1, force, column, NULL, error);
+      supine_physics_equilibrium_solve(equilibrium, 1, force, column, error);
   free(force);
   return status;
 }

@@ -79,13 +79,12 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
  * than 100000 vertices is not kept: solve for all forces in one call.
  * @param force     [N, count] f on the masses (nothing is applied to springs)
  * @param catch_    [N, count] F, written; may be `force`
- * @param residual  largest |b - A t| / |b| of all forces, where b is area a f with a reach and f
- *                  without; NULL: not wanted
  * @retval SUPINE_ERROR_MEMORY
- * @retval SUPINE_ERROR_NUMERICAL  a residual above 1e-8, or a force that is not finite */
+ * @retval SUPINE_ERROR_NUMERICAL  a force that is not finite, or |b - A t| / |b| above 1e-8, where
+ *                                 b is area a f with a reach and f without */
 supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, size_t count,
                                                const double *force, double *catch_,
-                                               double *residual, supine_error *error);
+                                               supine_error *error);
 
 /** Find the force f [N] whose equilibrium is the catch F [N]: f = A t / (area a) with a reach,
  * f = A t without, as in [Santhanam2008] IV-B.3.

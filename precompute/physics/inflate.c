@@ -260,10 +260,6 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
     status = check_folds(&a, error);
   }
   supine_mesh_box(&lungs->mesh, lungs->minimum, lungs->maximum);
-  for (size_t i = 0; i < a.size; i += 3) {
-    found->moved =
-        fmax(found->moved, supine_distance(lungs->mesh.vertices + i, a.scan.mesh.vertices + i));
-  }
   if (status == SUPINE_OK) {
     free(lungs->scanned);
     lungs->scanned = a.scan.mesh.vertices;

@@ -121,14 +121,7 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
                             .lung_count = lungs->lung_count,
                             .side = {lungs->side[0], lungs->side[1]}};
   *reference = found;
-  const supine_volume *volume = &scan->state.volume;
-  const bool full = volume->kind == SUPINE_VOLUME_FULL && volume->ml == 0.0;
-  if (!lungs->topology.closed && scan->known && !full) {
-    return supine_error_set(
-        error, SUPINE_ERROR_OPEN_SURFACE,
-        "an open surface has no volume: close the mesh, or give --scanned full or none");
-  }
-  if (!lungs->topology.closed || !scan->known) {
+  if (!scan->known) {
     return SUPINE_OK;
   }
   double held[2] = {0.0, 0.0};

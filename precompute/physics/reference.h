@@ -53,13 +53,10 @@ typedef struct supine_reference {
   double scan_rest[2];     /**< volume at rest in the scan's posture; 0 if the scan is full */
   double scan_gains[2][3]; /**< A of the scan */
   size_t solves;           /**< number of solves to reach the fixed point */
-  double moved;            /**< largest distance from the scan to the reference surface, mm */
 } supine_reference;
 
-/** Move lungs from the scan to the reference, in place. An open surface has no volume: its scan
- * must be at full inflation or unknown, and rest stays unknown.
+/** Move lungs from the scan to the reference, in place.
  * @param lungs  vertices and box change; the midline stays
- * @retval SUPINE_ERROR_OPEN_SURFACE  an open surface in a known state other than full
  * @retval SUPINE_ERROR_ARGUMENT      a scan below the volume of its tissue, or above full inflation
  * @retval SUPINE_ERROR_NUMERICAL     the surface folds on the way, or no fixed point is found
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_MESH */
@@ -80,7 +77,7 @@ void supine_reference_share_out(const supine_reference *reference, const double 
 
 /** Move scanned lungs to their reference volumes, in place, by solving for the fixed point above.
  * lungs->scanned takes the vertices of the scan. Statuses as supine_reference_find.
- * @param reference  has the scan and the volumes; scan_gains, solves and moved are written */
+ * @param reference  has the scan and the volumes; scan_gains and solves are written */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *reference, supine_error *error);
 

@@ -28,7 +28,6 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   memset(made.cubic, 0, sizeof made.cubic);
   memset(made.form, 0, sizeof made.form);
   made.vertex_count = n;
-  made.has_volume = lungs->topology.closed;
   made.catch_ = made.catch_ != NULL ? made.catch_ : malloc(n * sizeof *made.catch_);
   made.directions =
       made.directions != NULL ? made.directions : malloc(3 * n * sizeof *made.directions);
@@ -48,17 +47,13 @@ supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model
   }
   const supine_gravities gravity = {1, g, range, range + 1};
   supine_physics_force(lungs, &model->force, &gravity, n, NULL, work);
-  status = supine_physics_equilibrium_solve(made.equilibrium, 1, work, made.catch_, &made.residual,
-                                            error);
+  status = supine_physics_equilibrium_solve(made.equilibrium, 1, work, made.catch_, error);
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  if (made.has_volume) {
-    supine_physics_volume_of_fields(lungs, model->share, made.directions, made.catch_, 1,
-                                    made.form);
-    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-      supine_physics_volume_form_add(&made.form[lung], made.cubic);
-    }
+  supine_physics_volume_of_fields(lungs, model->share, made.directions, made.catch_, 1, made.form);
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    supine_physics_volume_form_add(&made.form[lung], made.cubic);
   }
   supine_tissue_collapse_directions(lungs, model->share, made.directions);
   *solution = made;

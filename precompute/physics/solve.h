@@ -16,10 +16,8 @@ typedef struct supine_solution {
   double *catch_;                  /**< [N] F */
   double *directions;              /**< [N, 3] d, mm; for collapsed lungs by
                                       supine_tissue_rest_directions */
-  bool has_volume;                 /**< the surface is closed, and cubic is set */
   double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
   supine_volume_form form[2]; /**< volume that each lung gains as a form of its three gains, mL */
-  double residual;            /**< relative residual of the equilibrium */
 } supine_solution;
 
 /** Solve for gravity along the unit vector `g`.
@@ -36,7 +34,8 @@ void supine_physics_solution_free(supine_solution *solution);
 double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Compute positions [N, 3], p + s F d, mm.
- * @param reference  p: the lungs' mesh; for collapsed lungs the surface of supine_tissue_collapse */
+ * @param reference  p: the lungs' mesh; for collapsed lungs the surface of supine_tissue_collapse
+ */
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *reference,
                                    double scale, double *positions);
 

@@ -73,10 +73,8 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
     }
     find_misses(n, is, should, length, 1.0, 1.0, misses);
     supine_accuracy_tally_add(&sums->error, n, misses);
-    if (work->scales != NULL) {
-      find_misses(n, is, should, length, work->scales[2 * d + 1], work->scales[2 * d], misses);
-      supine_accuracy_tally_add(&sums->error_mm, n, misses);
-    }
+    find_misses(n, is, should, length, work->scales[2 * d + 1], work->scales[2 * d], misses);
+    supine_accuracy_tally_add(&sums->error_mm, n, misses);
   }
 }
 
@@ -172,24 +170,20 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   }
   double *scales = weights + count * modes;
   double *volumes = scales + 2 * count;
-  accuracy_work work = {truth, compression, directions, weights, NULL, tallies, space};
+  accuracy_work work = {truth, compression, directions, weights, scales, tallies, space};
   for (size_t d = 0; d < count; ++d) {
     const double *g = truth->directions + 3 * d;
     volumes[d] = volume_along(volume, g);
     supine_projection_compression_weights(compression, g, weights + d * modes);
   }
-  if (forms != NULL && truth->cubic != NULL) {
-    const double part = find_part(&work, forms, volumes, scales);
-    if (part == 0.0) {
-      status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the error cannot be measured: the surface folds before the lungs "
-                                "reach a thousandth of %g mL; check the surface and the constants "
-                                "of the law",
-                                volumes[0]);
-      goto cleanup;
-    }
-    accuracy->volume = part;
-    work.scales = scales;
+  accuracy->volume = find_part(&work, forms, volumes, scales);
+  if (accuracy->volume == 0.0) {
+    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                              "the error cannot be measured: the surface folds before the lungs "
+                              "reach a thousandth of %g mL; check the surface and the constants "
+                              "of the law",
+                              volumes[0]);
+    goto cleanup;
   }
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);
   conclude(&work, accuracy);

@@ -65,16 +65,15 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            supine_truth *truth, supine_error *error) {
   const size_t rank = projection->rank;
   double *range = malloc(2 * count * sizeof *range);
-  *truth =
-      (supine_truth){.direction_count = count,
-                     .directions = malloc(3 * count * sizeof(double)),
-                     .rank = rank,
-                     .columns = projection->columns,
-                     .functions = malloc(count * rank * sizeof(double)),
-                     .cubic = lungs->topology.closed ? malloc(3 * count * sizeof(double)) : NULL};
+  *truth = (supine_truth){.direction_count = count,
+                          .directions = malloc(3 * count * sizeof(double)),
+                          .rank = rank,
+                          .columns = projection->columns,
+                          .functions = malloc(count * rank * sizeof(double)),
+                          .cubic = malloc(3 * count * sizeof(double))};
   supine_status status = SUPINE_ERROR_MEMORY;
   if (range != NULL && truth->directions != NULL && truth->functions != NULL &&
-      (truth->cubic != NULL || !lungs->topology.closed)) {
+      truth->cubic != NULL) {
     supine_accuracy_held_out_directions(count, truth->directions);
     status = supine_physics_height_range(lungs, model->force.pair, count, truth->directions, range,
                                          range + count);

@@ -105,8 +105,8 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   supine_status status = supine_physics_model_equilibrium(lungs, model, &equilibrium, error);
   if (status == SUPINE_OK) {
     supine_physics_force(lungs, &model->force, &gravities, n, NULL, made->columns);
-    status = supine_physics_equilibrium_solve(equilibrium, rank, made->columns, made->columns, NULL,
-                                              error);
+    status =
+        supine_physics_equilibrium_solve(equilibrium, rank, made->columns, made->columns, error);
   }
   supine_physics_equilibrium_destroy(equilibrium);
   return status;

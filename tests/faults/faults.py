@@ -30,7 +30,7 @@ phantom --vertices 100 -o lungs.ply
 phantom --vertices 100 -o lungs.stl
 phantom --vertices 100 -o lungs.obj
 precompute lungs.ply --band 2 -o lungs.safetensors
-solve lungs.ply --posture supine --reach 10 --scale 5 -o state.ply
+solve lungs.ply --posture supine --reach 10 -o state.ply
 embed lungs.safetensors points.csv -o points.safetensors
 embed lungs.safetensors --grid 60 -o grid.safetensors
 fit --landmarks pairs.csv --law deep -o patient.json
