@@ -146,7 +146,7 @@ static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs 
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
                              pairs->count)
           : supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
-                                         lungs->mesh.triangles, &tree, error);
+                                         lungs->mesh.triangles, true, &tree, error);
   for (size_t i = 0; i < pairs->count && status == SUPINE_OK; ++i) {
     const supine_inside_place place = supine_inside_surface_find(tree, pairs->from + 3 * i, NULL);
     const size_t lung =

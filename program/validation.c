@@ -175,7 +175,7 @@ static supine_status find_best(const supine_command_subject *s, const supine_mes
       look.distance == NULL
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
           : supine_inside_surface_create(mesh->vertices, mesh->triangle_count, mesh->triangles,
-                                         &tree, error);
+                                         false, &tree, error);
   const double span = search_span * fmax(1.0, fabs(outcome->scale));
   double low = outcome->scale - span;
   double high = outcome->scale + span;

@@ -90,7 +90,7 @@ static supine_status surface_distance(const supine_mesh *rest, const double *mov
   supine_status status =
       space == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for distances")
                     : supine_inside_surface_create(moved, rest->triangle_count, rest->triangles,
-                                                   &tree, error);
+                                                   false, &tree, error);
   if (status == SUPINE_OK) {
     supine_inside_surface_distances(state_tree, n, moved, space, nearest);
     supine_inside_surface_distances(tree, state->vertex_count, state->vertices, space + n, NULL);
@@ -145,7 +145,7 @@ supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_moved mo
   }
   if (status == SUPINE_OK) {
     status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                          &tree, error);
+                                          false, &tree, error);
   }
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;

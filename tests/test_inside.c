@@ -156,7 +156,7 @@ TEST(test_surface_find_torn_surface_inside_stays_inside) {
   supine_inside_surface *torn = NULL;
   uint64_t seed = 15; /* the first 12 triangles are missing */
   assert_int_equal(supine_inside_surface_create(shell->vertices, shell->triangle_count - 12,
-                                                shell->triangles + 36, &torn, NULL),
+                                                shell->triangles + 36, true, &torn, NULL),
                    SUPINE_OK);
   for (int i = 0; i < 200; ++i) {
     double p[3];

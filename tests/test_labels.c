@@ -101,7 +101,7 @@ TEST(test_labels_phantom_recovered) {
   supine_inside_surface *truth = NULL;
   assert_int_equal(supine_phantom_create(20000, 6000.0, &phantom, NULL), SUPINE_OK);
   assert_int_equal(supine_inside_surface_create(phantom.vertices, phantom.triangle_count,
-                                                phantom.triangles, &truth, NULL),
+                                                phantom.triangles, true, &truth, NULL),
                    SUPINE_OK);
   const size_t half = phantom.triangle_count / 2; /* the left lung's come first */
   const double share[] = {0.005, 0.01, 0.02};

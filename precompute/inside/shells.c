@@ -57,7 +57,7 @@ static supine_status create_shell(const supine_basis_info *info, const float *sc
   }
   shell->edge = mean_edge(shell);
   return supine_inside_surface_create(shell->vertices, shell->triangle_count, shell->triangles,
-                                      &shell->surface, error);
+                                      true, &shell->surface, error);
 }
 
 supine_status supine_inside_shells_create(const supine_basis *basis, supine_inside_shells *shells,

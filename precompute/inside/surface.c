@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Find nearest points and winding numbers by a tree of boxes over triangles. */
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,13 +20,17 @@ static const double on_surface = 1e-3;
 
 typedef struct node {
   double low[3], high[3];
-  double area, centre[3]; /* centre of area, mm */
-  double dipole[3];       /* sum of the triangles' unit normals times their areas, mm^2 */
-  double radius;          /* of the box, about the centre */
   uint32_t begin, end;
   uint32_t right; /* second child; the first is the next node; 0: a leaf */
   uint32_t leaf;  /* index of a leaf's boxes */
 } node;
+
+/* The triangles of a node, seen from afar. */
+typedef struct dipole {
+  double area, centre[3]; /* centre of area, mm */
+  double normal[3];       /* sum of the triangles' unit normals times their areas, mm^2 */
+  double radius;          /* of the box, about the centre */
+} dipole;
 
 /* The boxes of a leaf's triangles, rounded outwards: least and greatest x, y and z. */
 typedef struct boxes {
@@ -40,6 +43,7 @@ struct supine_inside_surface {
   size_t triangle_count;
   uint32_t *order; /* triangles, leaf by leaf */
   node *nodes;
+  dipole *dipoles; /* of each node; NULL: only distances are wanted */
   uint32_t node_count;
   boxes *leaves; /* boxes of the triangles of each leaf */
   uint32_t leaf_count;
@@ -116,24 +120,26 @@ static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   }
 }
 
-/* Add a part with centre of area `centre` to a node's dipole, area and first moment. */
-static void add_part(node *n, double area, const double centre[3], const double dipole[3]) {
-  n->area += area;
+/* Add a part with centre of area `centre` to a dipole, whose centre is still the first moment. */
+static void add_part(dipole *d, double area, const double centre[3], const double normal[3]) {
+  d->area += area;
   for (int k = 0; k < 3; ++k) {
-    n->centre[k] += area * centre[k];
-    n->dipole[k] += dipole[k];
+    d->centre[k] += area * centre[k];
+    d->normal[k] += normal[k];
   }
 }
 
 /* Find a node's dipole: a leaf's from its triangles, otherwise from its children. */
-static void find_dipole(const supine_inside_surface *s, node *n) {
-  n->area = 0.0;
-  memset(n->centre, 0, sizeof n->centre);
-  memset(n->dipole, 0, sizeof n->dipole);
+static void find_dipole(const supine_inside_surface *s, const node *n) {
+  if (s->dipoles == NULL) {
+    return;
+  }
+  dipole *d = &s->dipoles[n - s->nodes];
+  *d = (dipole){0};
   if (n->right != 0) {
-    const node *child[2] = {n + 1, &s->nodes[n->right]};
+    const dipole *child[2] = {d + 1, &s->dipoles[n->right]};
     for (int i = 0; i < 2; ++i) {
-      add_part(n, child[i]->area, child[i]->centre, child[i]->dipole);
+      add_part(d, child[i]->area, child[i]->centre, child[i]->normal);
     }
   }
   for (size_t i = n->begin; i < n->end && n->right == 0; ++i) {
@@ -146,15 +152,15 @@ static void find_dipole(const supine_inside_surface *s, node *n) {
       normal[k] *= 0.5;
       centre[k] = (p[0][k] + p[1][k] + p[2][k]) / 3.0;
     }
-    add_part(n, sqrt(supine_dot(normal, normal)), centre, normal);
+    add_part(d, sqrt(supine_dot(normal, normal)), centre, normal);
   }
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
-    n->centre[k] = n->area > 0.0 ? n->centre[k] / n->area : 0.5 * (n->low[k] + n->high[k]);
-    const double reach = greatest(n->high[k] - n->centre[k], n->centre[k] - n->low[k]);
+    d->centre[k] = d->area > 0.0 ? d->centre[k] / d->area : 0.5 * (n->low[k] + n->high[k]);
+    const double reach = greatest(n->high[k] - d->centre[k], d->centre[k] - n->low[k]);
     square += reach * reach;
   }
-  n->radius = sqrt(square);
+  d->radius = sqrt(square);
 }
 
 /* Build the node of triangles order[begin..end) and its descendants. */
@@ -191,8 +197,9 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
 }
 
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
-                                           const uint32_t *triangles,
+                                           const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error) {
+  const size_t leaves = 2 * count / LEAF + 1; /* each at least half full */
   supine_inside_surface *s = calloc(1, sizeof *s);
   keyed *space = malloc((count + count / 2) * sizeof *space);
   *surface = NULL;
@@ -201,10 +208,12 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
     s->triangles = triangles;
     s->triangle_count = count;
     s->order = malloc(count * sizeof *s->order);
-    s->nodes = malloc(2 * count * sizeof *s->nodes); /* a binary tree of `count` leaves at most */
-    s->leaves = malloc((2 * count / LEAF + 1) * sizeof *s->leaves); /* each at least half full */
+    s->nodes = malloc(2 * leaves * sizeof *s->nodes);
+    s->dipoles = sides ? malloc(2 * leaves * sizeof *s->dipoles) : NULL;
+    s->leaves = malloc(leaves * sizeof *s->leaves);
   }
-  if (s == NULL || space == NULL || s->order == NULL || s->nodes == NULL || s->leaves == NULL) {
+  if (s == NULL || space == NULL || s->order == NULL || s->nodes == NULL || s->leaves == NULL ||
+      (sides && s->dipoles == NULL)) {
     free(space);
     supine_inside_surface_destroy(s);
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a tree of %zu triangles",
@@ -223,6 +232,7 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   if (surface != NULL) {
     free(surface->order);
     free(surface->nodes);
+    free(surface->dipoles);
     free(surface->leaves);
     free(surface);
   }
@@ -390,11 +400,12 @@ static double solid_angle(const double *const p[3], const double x[3]) {
 
 static double angle(const supine_inside_surface *s, size_t at, const double x[3]) {
   const node *n = &s->nodes[at];
+  const dipole *d = &s->dipoles[at];
   double apart[3];
-  supine_subtract(n->centre, x, apart);
+  supine_subtract(d->centre, x, apart);
   const double distance = sqrt(supine_dot(apart, apart));
-  if (distance > dipole_distance * n->radius) {
-    return supine_dot(n->dipole, apart) / (distance * distance * distance);
+  if (distance > dipole_distance * d->radius) {
+    return supine_dot(d->normal, apart) / (distance * distance * distance);
   }
   if (n->right != 0) {
     return angle(s, at + 1, x) + angle(s, n->right, x);

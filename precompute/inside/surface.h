@@ -3,6 +3,7 @@
 #ifndef SUPINE_INSIDE_SURFACE_H
 #define SUPINE_INSIDE_SURFACE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -22,9 +23,10 @@ typedef struct supine_inside_place {
 /** Build a tree of boxes over the triangles.
  * @param vertices   [., 3] mm, must outlive the tree
  * @param triangles  [count, 3], 0 < count < 2^31, facing outwards; must outlive the tree
+ * @param sides      true: supine_inside_surface_find will be called, which needs more memory
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
-                                           const uint32_t *triangles,
+                                           const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error);
 /** Free the tree; NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);

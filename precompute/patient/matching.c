@@ -192,7 +192,7 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
   if (status == SUPINE_OK) {
     supine_patient_matching_choose(m, most);
     status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
-                                          &m->tree, error);
+                                          false, &m->tree, error);
   }
   return status;
 }
