@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine info: describe a basis file and its accuracy. */
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sh/base/findings.h"
-#include "sh/base/text.h"
 
 #include <supine/compare.h>
 #include <supine/runtime.h>
@@ -134,11 +132,9 @@ static supine_status describe(const char *path, const supine_basis *basis, const
   json_t *of = json_object();
   json_t *warnings = json_array();
   size_t length;
-  char printable[PATH_MAX] = "";
-  supine_text_add(printable, sizeof printable, "%s", path);
   json_t *root =
-      json_pack("{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:I, s:I}", "file",
-                supine_text_make_utf8(printable), "lungs", lungs != NULL ? lungs : "?", "vertices",
+      json_pack("{s:o, s:s, s:I, s:I, s:I, s:I, s:I, s:b, s:s, s:I, s:I}", "file",
+                supine_options_json_text(path), "lungs", lungs != NULL ? lungs : "?", "vertices",
                 (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
                 "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "lung_count",
                 (json_int_t)info->lung_count, "has_volume", (int)info->has_volume, "kind",

@@ -6,11 +6,11 @@
 #include <strings.h>
 
 #include <supine/locate.h>
+#include <supine/posture.h>
 
 #include "sh/base/output.h"
 
 #include "program/inside.h"
-#include "program/located.h"
 #include "program/observed.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
@@ -22,7 +22,7 @@ typedef struct request {
   supine_orientation orientation;
   supine_state state; /* its volume is the default where none was given */
   double noise;
-  bool rigid;
+  bool rigid, json;
 } request;
 
 static const supine_option table[] = {
@@ -40,12 +40,138 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, rigid)},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
      .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
+    {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
 
+enum { POSTURES = 6 };
+static const char *const postures[POSTURES] = {"supine", "prone",   "left",
+                                               "right",  "upright", "inverted"};
+
+static const double negligible = 0.01; /* smallest probability with which a posture counts */
+static const double determined = 0.95; /* probability above which points determine a posture */
+
+/* Lungs found from observed points. */
+typedef struct lungs_found {
+  size_t count;                       /* postures tried */
+  supine_location location[POSTURES]; /* of each */
+  double share[POSTURES];             /* its probability, given the points */
+  const supine_location *best;
+  supine_locate_residual *residuals; /* [points] of the most probable posture */
+  float *xyz, *sigma;                /* [N, 3] and [N] of that posture; errors include all */
+  void *space;                       /* workspaces of supine_locate */
+} lungs_found;
+
+/* Fit every posture; one that no volume fits gets the share 0. */
+static supine_status try_postures(const supine_locate_task *task, bool posture_given,
+                                  supine_locate_residual *residuals, lungs_found *located,
+                                  supine_error *error) {
+  const size_t n = task->count;
+  const size_t space = supine_locate_space(n);
+  supine_status status = SUPINE_OK;
+  double highest = -INFINITY;
+  double sum = 0.0;
+  located->count = posture_given ? 1 : POSTURES;
+  for (size_t k = 0; k < located->count; ++k) {
+    supine_locate_task one = *task;
+    if (!posture_given) {
+      (void)supine_posture_gravity(postures[k], one.state.gravity);
+    }
+    const supine_status tried =
+        supine_locate(&one, residuals + k * n, (double *)located->space + k * space,
+                      &located->location[k], status == SUPINE_OK ? error : NULL);
+    status = tried == SUPINE_OK ? status : tried;
+    located->share[k] = tried == SUPINE_OK ? located->location[k].log_evidence : -INFINITY;
+    if (located->share[k] > highest) {
+      highest = located->share[k];
+      located->best = &located->location[k];
+      memcpy(located->residuals, residuals + k * n, n * sizeof *residuals);
+    }
+  }
+  if (located->best == NULL) {
+    return status;
+  }
+  for (size_t k = 0; k < located->count; ++k) {
+    located->share[k] = exp(located->share[k] - highest);
+    sum += located->share[k];
+  }
+  for (size_t k = 0; k < located->count; ++k) {
+    located->share[k] /= sum;
+  }
+  return SUPINE_OK;
+}
+
+/* Compute the best posture's positions, and the errors of a mixture of all postures:
+ * sigma^2 = sum over k of share_k (sigma_k^2 + |x_k - x|^2). */
+static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
+                                    lungs_found *located, supine_error *error) {
+  const size_t n = supine_basis_get_info(shown)->vertex_count;
+  supine_status status =
+      supine_locate_positions(located->best, shown, located->xyz, located->sigma, error);
+  double sum = located->share[located->best - located->location];
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    located->sigma[i] *= located->sigma[i] * (float)sum;
+  }
+  for (size_t k = 0; k < located->count && status == SUPINE_OK; ++k) {
+    const double share = located->share[k];
+    if (&located->location[k] == located->best || share < negligible) {
+      continue;
+    }
+    status = supine_locate_positions(&located->location[k], shown, xyz, sigma, error);
+    sum += share;
+    for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+      float square = sigma[i] * sigma[i];
+      for (size_t j = 3 * i; j < 3 * i + 3; ++j) {
+        square += (xyz[j] - located->xyz[j]) * (xyz[j] - located->xyz[j]);
+      }
+      located->sigma[i] += (float)share * square;
+    }
+  }
+  for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
+    located->sigma[i] = sqrtf(located->sigma[i] / (float)sum);
+  }
+  return status;
+}
+
+/* Find the lungs, and the positions [N, 3] of the basis `shown` in them. If no posture was given,
+ * the task's gravity is tried as each of the six named postures. */
+static supine_status find(const supine_locate_task *task, bool posture_given,
+                          const supine_basis *shown, lungs_found *located, supine_error *error) {
+  const size_t n = supine_basis_get_info(shown)->vertex_count;
+  const size_t tries = POSTURES;
+  supine_locate_residual *residuals = malloc(tries * task->count * sizeof *residuals);
+  float *xyz = malloc(3 * n * sizeof *xyz);
+  float *sigma = malloc(n * sizeof *sigma);
+  located->residuals = malloc(task->count * sizeof *residuals);
+  located->xyz = malloc(3 * n * sizeof *xyz);
+  located->sigma = malloc(n * sizeof *sigma);
+  located->space = malloc(tries * supine_locate_space(task->count) * sizeof(double));
+  supine_status status = SUPINE_OK;
+  if (residuals == NULL || xyz == NULL || sigma == NULL || located->residuals == NULL ||
+      located->xyz == NULL || located->sigma == NULL || located->space == NULL) {
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
+  } else {
+    status = try_postures(task, posture_given, residuals, located, error);
+  }
+  if (status == SUPINE_OK) {
+    status = find_positions(shown, xyz, sigma, located, error);
+  }
+  free(residuals);
+  free(xyz);
+  free(sigma);
+  return status;
+}
+
+static void free_found(lungs_found *located) {
+  free(located->residuals);
+  free(located->xyz);
+  free(located->sigma);
+  free(located->space);
+}
+
 /* Write the lungs' surface, with the expected error of each vertex. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
-                                   const supine_command_located *located, supine_error *error) {
+                                   const lungs_found *located, supine_error *error) {
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   supine_mesh mesh = {0};
@@ -70,8 +196,8 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
 }
 
 static supine_status write_points(const char *path, const supine_basis *inside,
-                                  const supine_command_names *names,
-                                  const supine_command_located *located, supine_error *error) {
+                                  const supine_command_names *names, const lungs_found *located,
+                                  supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   supine_output output = {0};
   supine_status status = supine_output_open(path, &output, error);
@@ -91,42 +217,62 @@ static supine_status write_points(const char *path, const supine_basis *inside,
   return supine_output_commit(&output, error);
 }
 
-/* Print the result. */
-static void tell(const request *wanted, const supine_command_names *names,
-                 const supine_command_observed *observed, const supine_basis *basis,
-                 const supine_command_located *located) {
+/* Print the state, the motion and the residuals that were found. */
+static void print(const request *wanted, const supine_command_names *names,
+                  const supine_command_observed *observed, size_t n, const lungs_found *located) {
   const supine_location *best = located->best;
-  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const double share = located->share[best - located->location];
+  const double *r = best->rotation;
+  const double *t = best->translation;
+  supine_state posture = best->state;
+  char text[160];
   double square = 0.0;
   double largest = 0.0;
+  json_t *outliers = json_array();
+  posture.volume = (supine_volume){0};
+  posture.lung_count = 0;
+  (void)supine_state_describe(&posture, text, sizeof text);
   for (size_t i = 0; i < n; ++i) {
-    const double sigma = (double)located->sigma[i];
-    square += sigma * sigma;
-    largest = fmax(largest, sigma);
+    square += (double)located->sigma[i] * (double)located->sigma[i];
+    largest = fmax(largest, (double)located->sigma[i]);
   }
-  (void)printf("%s: expected error %.1f mm (RMS of %zu points), %.1f mm at most; %s\n",
-               wanted->output, sqrt(square / (double)n), n, largest, SUPINE_EXPECTED_MEANING);
-  supine_command_located_tell(located, wanted->orientation.given);
-  const double *t = best->translation;
-  (void)printf("translation %.1f,%.1f,%.1f mm", t[0], t[1], t[2]);
+  json_t *root =
+      json_pack("{s:o, s:I, s:f, s:f, s:s}", "file", supine_options_json_text(wanted->output),
+                "points", (json_int_t)n, "expected_rms_mm", sqrt(square / (double)n),
+                "expected_largest_mm", largest, "posture", text);
+  if (!wanted->orientation.given) {
+    (void)json_object_update_new(root, json_pack("{s:f, s:b}", "probability_percent", 100.0 * share,
+                                                 "determined", (int)(share >= determined)));
+  }
+  if (best->volume > 0.0) {
+    (void)json_object_set_new(root, "volume_ml", json_real(best->volume));
+  }
+  if (best->volume_error > 0.0) {
+    (void)json_object_update_new(root, json_pack("{s:f, s:f}", "volume_deviation_ml",
+                                                 best->volume_error, "deviation_without_points_ml",
+                                                 best->volume_prior_error));
+  }
+  (void)json_object_set_new(root, "translation_mm", json_pack("[f, f, f]", t[0], t[1], t[2]));
   if (wanted->rigid) {
-    const double *r = best->rotation;
     const double cosine = fmax(-1.0, fmin(1.0, 0.5 * (r[0] + r[4] + r[8] - 1.0)));
-    (void)printf(" after a rotation of %.1f degrees", acos(cosine) * (180.0 / 3.14159265358979));
+    (void)json_object_set_new(root, "rotation_degrees",
+                              json_real(acos(cosine) * (180.0 / 3.14159265358979)));
   }
-  (void)printf("\n%zu observed point%s", observed->count, observed->count == 1 ? "" : "s");
-  if (best->residual_rms > 0.0) {
-    (void)printf(", %.1f mm (RMS) from where the others put each", best->residual_rms);
-  }
-  (void)putchar('\n');
+  (void)json_object_update_new(root, json_pack("{s:I, s:f}", "observed_points",
+                                               (json_int_t)observed->count, "left_rms_mm",
+                                               best->residual_rms));
   for (size_t j = 0; j < observed->count; ++j) {
-    const supine_locate_residual *r = &located->residuals[j];
-    if (r->outlier) {
-      (void)printf("%s does not fit and was left out: %.1f mm from where the others put it, %.1f "
-                   "mm expected\n",
-                   names->text[names->part[observed->points[j].vertex]], r->distance, r->sigma);
+    const supine_locate_residual *residual = &located->residuals[j];
+    if (residual->outlier) {
+      (void)json_array_append_new(
+          outliers,
+          json_pack("{s:o, s:f, s:f}", "name",
+                    supine_options_json_text(names->text[names->part[observed->points[j].vertex]]),
+                    "distance_mm", residual->distance, "expected_mm", residual->sigma));
     }
   }
+  (void)json_object_set_new(root, "outliers", outliers);
+  supine_options_print(root, wanted->json);
 }
 
 static supine_status locate(const request *wanted, const supine_basis *lungs,
@@ -135,14 +281,13 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
   const size_t length = strlen(wanted->output);
   const bool csv = strcasecmp(wanted->output + length - 4, ".csv") == 0;
   const supine_basis *shown = csv ? inside : lungs;
-  supine_command_located located = {0};
+  lungs_found located = {0};
   const supine_locate_task task = {.inside = inside,
                                    .count = observed->count,
                                    .observed = observed->points,
                                    .state = wanted->state,
                                    .rigid = wanted->rigid};
-  supine_status status =
-      supine_command_located_find(&task, wanted->orientation.given, shown, &located, error);
+  supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT &&
       wanted->rigid) { /* the fault is in the file's points, not in an option */
     status = error->status = SUPINE_ERROR_FORMAT;
@@ -152,9 +297,9 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                  : write_surface(wanted->output, lungs, &located, error);
   }
   if (status == SUPINE_OK) {
-    tell(wanted, names, observed, shown, &located);
+    print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, &located);
   }
-  supine_command_located_free(&located);
+  free_found(&located);
   return status;
 }
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine validate: compare a basis with other states of the same person. */
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -99,9 +98,7 @@ static json_t *encode_state(const supine_command_state *state,
                             const supine_command_outcome *outcome) {
   json_t *root = json_object();
   if (state->path != NULL) {
-    char file[PATH_MAX] = "";
-    supine_text_add(file, sizeof file, "%s", state->path);
-    (void)json_object_set_new(root, "file", json_string(supine_text_make_utf8(file)));
+    (void)json_object_set_new(root, "file", supine_options_json_text(state->path));
   }
   (void)json_object_update_new(root, json_pack("{s:[f, f, f], s:f, s:f}", "gravity",
                                                state->state.gravity[0], state->state.gravity[1],

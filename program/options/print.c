@@ -82,6 +82,8 @@ static const struct {
               {NULL, "control", "control parameters c1 to c5"},
               {NULL, "control_interval", "  confidence interval, +-"},
               {NULL, "corrected", "law and kriging"},
+              {NULL, "determined", "determined by the points"},
+              {NULL, "deviation_without_points_ml", "  without the points, mL"},
               {"error", "directions", "held-out directions"},
               {"sphere", "directions", "sampled directions"},
               {NULL, "energy_per_band", "displacement by band, share"},
@@ -91,6 +93,7 @@ static const struct {
               {NULL, "error_modes", "error by number of modes, share"},
               {NULL, "expected_constant_mm", "expected error^2 / displacement, mm"},
               {NULL, "expected_error", "expected error of a displacement from the scan"},
+              {NULL, "expected_largest_mm", "expected error, largest, mm"},
               {NULL, "expected_rms_mm", "expected error, RMS, mm"},
               {NULL, "fitted_rms_mm", "residual at the fitted points, RMS, mm"},
               {NULL, "from_scale", "scale at the start of motion"},
@@ -115,6 +118,7 @@ static const struct {
               {NULL, "none", "no motion"},
               {NULL, "of", "measured on"},
               {NULL, "off_percent", "largest deviation, %"},
+              {NULL, "outliers", "outliers, left out"},
               {NULL, "p95", "95 %"},
               {NULL, "p95_mm", "95 %, mm"},
               {NULL, "p95_percent", "95 %, % of RMS displacement"},
@@ -143,14 +147,16 @@ static const struct {
               {"states", "landmarks", "distance between landmarks"},
               {"states", "surface", "distance between surfaces"},
               {"states", "volume_ml", "volume above the start, mL"},
+              {NULL, "volume_deviation_ml", "volume, standard deviation, mL"},
               {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
               {NULL, "volume_mL", "volume, from and to, mL"}};
 
 /* Write the label of a member. Without one in the table, write its key with spaces instead of
  * underscores, and a comma before a unit at its end. */
 static void write_label(const char *parent, const char *key, char text[TEXT_MAX]) {
-  static const char *const units[][2] = {
-      {"_mm", ", mm"}, {"_mm2", ", mm2"}, {"_ml", ", mL"}, {"_percent", ", %"}, {"_rad", ", rad"}};
+  static const char *const units[][2] = {{"_mm", ", mm"},   {"_mm2", ", mm2"},
+                                         {"_ml", ", mL"},   {"_percent", ", %"},
+                                         {"_rad", ", rad"}, {"_degrees", ", degrees"}};
   for (size_t i = 0; i < sizeof labels / sizeof *labels; ++i) {
     if (strcmp(labels[i].key, key) == 0 &&
         (labels[i].parent == NULL || strcmp(labels[i].parent, parent) == 0)) {
@@ -258,6 +264,12 @@ static void print_object(const char *parent, json_t *object, int indent) {
     }
   }
   json_decref(rows);
+}
+
+json_t *supine_options_json_text(const char *text) {
+  char printable[TEXT_MAX] = "";
+  supine_text_add(printable, sizeof printable, "%s", text);
+  return json_string(supine_text_make_utf8(printable));
 }
 
 void supine_options_print(json_t *value, bool json) {

@@ -1,14 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Print a comparison as one self-contained HTML file by filling report.html. */
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 #include <supine/version.h>
-
-#include "sh/base/text.h"
 
 #include "program/export/template.h"
 #include "program/options/basis_input.h"
@@ -66,9 +63,7 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
 /* Return the data of the report's header, of its section on all directions, and its provenance. */
 static json_t *facts(const supine_comparison *c) {
   const char *slash = strrchr(c->path, '/');
-  char name[PATH_MAX] = "";
-  supine_text_add(name, sizeof name, "%s", slash != NULL ? slash + 1 : c->path);
-  json_t *file = json_string(supine_text_make_utf8(name));
+  json_t *file = supine_options_json_text(slash != NULL ? slash + 1 : c->path);
   char volume[160];
   supine_report_volume(c, volume, sizeof volume);
   json_t *list = provenance(c, file);

@@ -1,9 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Print a comparison as JSON, or as text. */
-#include <limits.h>
-
-#include "sh/base/text.h"
-
 #include "program/report/comparison.h"
 
 static json_t *statistics(const supine_distance_statistics *d) {
@@ -107,12 +103,9 @@ static void add_tables(const supine_comparison *c, json_t *text) {
 
 void supine_report_print(const supine_comparison *c, bool json) {
   char volume[160];
-  char file_name[PATH_MAX] = "";
-  supine_text_add(file_name, sizeof file_name, "%s", c->path);
-  (void)supine_text_make_utf8(file_name);
   supine_report_volume(c, volume, sizeof volume);
-  json_t *root = json_pack("{s:s, s:s, s:s, s:I, s:f}", "file", file_name, "volume", volume,
-                           "displacement_from", c->reference.name, "vertices",
+  json_t *root = json_pack("{s:o, s:s, s:s, s:I, s:f}", "file", supine_options_json_text(c->path),
+                           "volume", volume, "displacement_from", c->reference.name, "vertices",
                            (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
                            supine_compare_area(c->compare));
   if (json) {
