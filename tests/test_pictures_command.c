@@ -211,6 +211,7 @@ TEST(test_compare_misuse_usage_error) {
   EXPECT(1, "give rest, full or scan", "compare lungs.safetensors --volume much");
   EXPECT(0, "\"has_volume\": false", "info open.safetensors --json");
   EXPECT(2, "surface is open", "compare open.safetensors");
+  EXPECT(2, "surface is open", "breathe open.safetensors --posture left -o a.vtp");
   EXPECT(2, "surface is open", "export open.safetensors -o a.html");
   EXPECT(2, "surface is open", "stream open.safetensors --listen 0 --seconds 0.1");
   EXPECT(2, "close the mesh", "deform open.safetensors --posture prone -o a.ply");
