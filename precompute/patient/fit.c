@@ -10,6 +10,7 @@
 #include "sh/base/vec3.h"
 
 enum {
+  EXPECTED_MAX = 200, /* points at which the expected error is computed, about */
   FOLDS = SUPINE_PATIENT_FOLDS,
   ITEMS = SUPINE_PATIENT_SEEDS * FOLDS,
   SCORES = SUPINE_PATIENT_SCORES
@@ -129,7 +130,8 @@ static supine_status hold_all_out(study *s, squares *held, supine_error *error) 
  * the covariance of g is that of other patients. */
 static supine_status expect(const study *s, size_t triples, const supine_patient_krige *fitted,
                             double *expected, double *mean, supine_error *error) {
-  const double share = (double)s->components / (double)s->row_count;
+  const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
+  const double share = 1.0 / ceil((double)s->row_count / (double)step);
   supine_patient_fit_options options = s->options;
   supine_patient_krige krige = {0};
   double variance = 0.0;
@@ -141,7 +143,7 @@ static supine_status expect(const study *s, size_t triples, const supine_patient
   const supine_status status =
       supine_patient_krige_fit(&options, s->rows, s->row_count, &krige, error);
   *mean = 0.0;
-  for (size_t i = 0; i < s->row_count && status == SUPINE_OK; i += s->components) {
+  for (size_t i = 0; i < s->row_count && status == SUPINE_OK; i += step) {
     supine_patient_row row = s->rows[i];
     double u[3];
     supine_patient_direction(&fitted->law, &row.place,

@@ -12,10 +12,10 @@
 
 static const double gain_least = 0.01, gain_most = 2.0; /* other gains count as undetermined */
 static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
-static const double settled = 1e-4;      /* change of s and s gain that ends the rounds */
-static const double unsettled = 1e-2;    /* change in the last round that is an error */
-static const double force_least = 0.2;   /* least fitted force, relative to its mean of 1 */
-enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, UNKNOWNS = 5 };
+static const double settled = 1e-4;    /* change of the scales and the gain that ends the rounds */
+static const double unsettled = 1e-2;  /* change in the last round that is an error */
+static const double force_least = 0.2; /* least fitted force, relative to its mean of 1 */
+enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, GAIN = 5, UNKNOWNS = 6 };
 
 /* The fitted displacement at a row. */
 typedef struct field {
@@ -23,7 +23,8 @@ typedef struct field {
   double turned; /* relative change of the force by the further state's posture, at a gain of 1 */
 } field;
 
-/* A further state as rows, axis . ((s + s gain turned) u + t) = value. */
+/* A further state as rows, axis . (s (1 + gain turned) u + t) = value, with a scale s for each
+ * lung, as each has its own volume in the further posture. */
 typedef struct work {
   const supine_patient_record *record;
   const supine_mesh *surface;       /* NULL: the state is points */
@@ -32,21 +33,25 @@ typedef struct work {
                                      * the emptier state, by axis */
   supine_patient_matching matching; /* rows, whose blocks are eighths of the lungs; matches */
   field *field;                     /* [rows] */
-  double x[UNKNOWNS];               /* s, s gain, t */
+  double x[UNKNOWNS];               /* s of the left and the right lung, t, gain */
 } work;
 
-/* Fit the unknowns by linear least squares without one eighth of the lungs (EIGHTHS: with all);
- * return the RMS residual, mm. */
+/* Fit the unknowns by linear least squares about the present scales without one eighth of the lungs
+ * (EIGHTHS: with all); return the RMS residual, mm. */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
+  const double scale[2] = {w->x[0], w->x[1]};
   double squares = 0.0;
   double weights = 0.0;
   for (size_t i = 0; i < w->matching.count; ++i) {
     const supine_patient_row *row = &w->matching.rows[i];
     const double weight = row->block == without ? 0.0 : row->weight;
     const double along = supine_dot(row->axis, w->field[i].u);
-    double x[UNKNOWNS] = {along, fits_gain ? w->field[i].turned * along : 0.0};
+    const size_t lung = row->place.side > 0.0 ? 0U : 1U;
+    double x[UNKNOWNS] = {0.0};
+    x[lung] = along;
+    x[GAIN] = fits_gain ? scale[lung] * w->field[i].turned * along : 0.0;
     double value = row->value; /* displacement from full inflation, mm */
     for (size_t a = 0; a < 3; ++a) {
       x[2 + a] = w->moved ? row->axis[a] : 0.0;
@@ -136,7 +141,8 @@ static void find_motion(work *w, const supine_lungs *rest, const double gravity[
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {
-    const double scale = w->x[0] + w->x[1] * w->field[i].turned;
+    const double scale =
+        w->x[m->rows[i].place.side > 0.0 ? 0U : 1U] * (1.0 + w->x[GAIN] * w->field[i].turned);
     for (size_t k = 0; k < 3; ++k) {
       m->match[i].moved[k] = m->rest->mesh.vertices[3 * m->match[i].vertex + k] +
                              (scale - w->gains[0][k]) * w->field[i].u[k] + w->x[2 + k];
@@ -153,10 +159,11 @@ static supine_status settle(work *w, supine_patient_further *further, supine_err
   double sum = 0.0;
   double square = 0.0;
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
-    const double before[2] = {w->x[0], w->x[1]};
+    const double before[UNKNOWNS] = {w->x[0], w->x[1], [GAIN] = w->x[GAIN]};
     status = w->surface == NULL ? SUPINE_OK : match_surface(w, error);
     further->residual = fit(w, further->fits_gain, EIGHTHS);
-    change = fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]);
+    change =
+        fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]) + fabs(w->x[GAIN] - before[GAIN]);
   }
   if (status == SUPINE_OK && change >= unsettled) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
@@ -164,15 +171,15 @@ static supine_status settle(work *w, supine_patient_further *further, supine_err
                               "changes by %.2g. Check that axes and person are the same",
                               ROUNDS, change);
   }
-  further->scale = w->x[0];
-  further->gain = w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0;
-  further->residual_without_gain = fit(w, false, EIGHTHS);
+  memcpy(further->scale, w->x, sizeof further->scale);
+  further->gain = w->x[GAIN];
   for (size_t without = 0; without < EIGHTHS && further->fits_gain; ++without) {
     (void)fit(w, true, without);
-    const double change_of_gain = (w->x[0] != 0.0 ? w->x[1] / w->x[0] : 0.0) - further->gain;
+    const double change_of_gain = w->x[GAIN] - further->gain;
     sum += change_of_gain;
     square += change_of_gain * change_of_gain;
   }
+  further->residual_without_gain = fit(w, false, EIGHTHS);
   further->gain_error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
   return status;
 }
@@ -181,7 +188,7 @@ supine_status supine_patient_gain_fit(const supine_patient_record *record, const
                                       const supine_patient_pairs *pairs, const supine_mesh *surface,
                                       bool moved, supine_patient_further *further,
                                       supine_error *error) {
-  work w = {.record = record, .surface = surface, .moved = moved, .x = {1.0}};
+  work w = {.record = record, .surface = surface, .moved = moved, .x = {1.0, 1.0}};
   further->fits_gain =
       supine_distance(further->state.gravity, record->state[1].gravity) >= same_posture;
   supine_patient_path(record, w.gains);

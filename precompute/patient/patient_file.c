@@ -51,8 +51,8 @@ static const numbers table[] = {
     {"frame", "midline_mm", 1, AT(patient.frame.midline), false},
     {"emptier_frame", "minimum_mm", 3, AT(emptier[0]), false},
     {"emptier_frame", "maximum_mm", 3, AT(emptier[1]), false},
-    {"fuller", "volume_ml", 1, AT(volume[0]), false},
-    {"emptier", "volume_ml", 1, AT(volume[1]), false},
+    {"fuller", "volume_ml", 1, AT(volume[0]), true},
+    {"emptier", "volume_ml", 1, AT(volume[1]), true},
     {"force", "base", 1, AT(force.base), false},
     {"force", "gain", 1, AT(force.gain), false},
     {"force", "gain_standard_error", 1, AT(gain_error), true},
@@ -135,9 +135,10 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
   for (size_t k = 0; k < record->further_count && root != NULL; ++k) {
     const supine_patient_further *further = &record->further[k];
     (void)json_array_append_new(
-        further_states, json_pack("{s:o, s:f, s:f, s:f}", "state", state_text(&further->state),
-                                  "scale", further->scale, "left_rms_mm", further->residual,
-                                  "left_without_gain_mm", further->residual_without_gain));
+        further_states,
+        json_pack("{s:o, s:o, s:f, s:f}", "state", state_text(&further->state), "scale",
+                  array_of(further->scale, 2), "left_rms_mm", further->residual,
+                  "left_without_gain_mm", further->residual_without_gain));
   }
   if (record->stiffness.count > 0) {
     (void)json_object_set_new(group_of(root, "expandability"), "regions",

@@ -16,7 +16,7 @@ enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_S
 typedef struct supine_patient_further {
   supine_state state;
   bool fits_gain;  /**< the posture differs from the fitted one, so the gain is fitted */
-  double scale;    /**< factor on the displacement from full inflation to rest */
+  double scale[2]; /**< factor on the displacement from full inflation to rest, left and right */
   double residual; /**< RMS residual of the fit, mm; of a surface along its normals */
   double residual_without_gain; /**< the same with all of the force fixed to the body */
   double gain, gain_error;      /**< gain and its standard error, by leaving out each eighth of the
