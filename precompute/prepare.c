@@ -167,7 +167,7 @@ static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   supine_text_add(p->summary, size, "); rest supine %.0f mL (%s)",
                   supine_reference_rest(reference, supine, ml),
                   memcmp(&usual, &choice->resting, sizeof usual) == 0
-                      ? "healthy people's share; --resting changes it"
+                      ? "healthy people's share, which --resting changes"
                       : "by --resting");
 }
 

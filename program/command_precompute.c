@@ -82,7 +82,12 @@ static void report_result(const char *path, const supine_lungs *lungs,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
                options->band, report->mode_count, options->modes == 0 ? "harmonic" : "mode",
                plural(report->mode_count));
-  (void)printf("assumed: %s\n", options->assumed);
+  (void)puts("assumed (--axes, --units, --scanned, --law and --resting change it):");
+  for (const char *item = options->assumed, *end; item != NULL; item = end) {
+    end = strstr(item, "; ");
+    (void)printf("  %.*s\n", (int)(end != NULL ? end - item : 1000), item);
+    end = end != NULL ? end + 2 : NULL;
+  }
   (void)printf("error against the full solve, on %zu held-out direction%s:\n  %.3g %% RMS, %.3g "
                "%% 95th percentile, %.3g %% largest, of the RMS displacement\n",
                accuracy->direction_count, plural(accuracy->direction_count),

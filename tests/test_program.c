@@ -167,16 +167,16 @@ static double positions_apart(const char *first, const char *second) {
 TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(0, "-2000.00 mL",
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
-  EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL; full inflation 6000 mL",
+  EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL\n  full inflation 6000 mL",
          "precompute low.ply --scanned full-2000 --band 7 -o low.safetensors");
-  EXPECT(0, "rest supine 2580 mL (healthy people's share; --resting changes it)",
+  EXPECT(0, "rest supine 2580 mL (healthy people's share, which --resting changes)",
          "info low.safetensors");
   EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume scan -o low.obj");
   EXPECT(0, "displacement 0.000 mm from the scan",
          "deform low.safetensors --posture supine --volume scan --from scan -o low.obj");
   EXPECT(0, "displacement 0.000 mm from supine at full inflation",
          "deform low.safetensors --posture prone --volume full --from full -o low.obj");
-  EXPECT(0, "assumed: RAS axes (by --axes), 10 mm a unit",
+  EXPECT(0, "RAS axes (by --axes), 10 mm a unit",
          "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "ras.ply",
          "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
