@@ -7,7 +7,7 @@
 
 typedef struct supine_mesh_points {
   size_t count;
-  double *at;   /**< [count, 3] mm, LPS */
+  double *at;   /**< [count, 3] positions, mm, LPS */
   char **names; /**< [count] never NULL; numbered from 1 if the file has none */
 } supine_mesh_points;
 
