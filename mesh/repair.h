@@ -7,16 +7,16 @@
 
 typedef struct supine_mesh_repair_report {
   size_t duplicates; /**< triangles dropped: same corners as an earlier one */
-  size_t loose;      /**< triangles dropped: none of its edges has exactly two triangles */
+  size_t loose;      /**< triangles dropped: without an edge that exactly two triangles share */
   size_t reversed;   /**< triangles reversed to face like most of their surface */
-  size_t separated;  /**< vertices added where closed surfaces shared one */
+  size_t separated;  /**< vertices added where closed surfaces shared a vertex */
 } supine_mesh_repair_report;
 
 /** Repair a surface in place. A surface without defects is not changed.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
-/** Drop vertices in no triangle, keeping the order of the others; return how many.
+/** Drop vertices in no triangle, keeping the order of the others; return the number dropped.
  * @param space  [vertex_count] work space */
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
