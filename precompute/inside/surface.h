@@ -31,7 +31,7 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
 /** Free the tree; NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
-/** Find the surface's nearest point; depth is positive on both sides. Thread-safe.
+/** Find the surface's nearest point; `depth` is positive on both sides. Thread-safe.
  * @param near  the place of a nearby point, to save work; NULL: none */
 supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
                                                   const double point[3],

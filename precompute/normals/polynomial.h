@@ -41,9 +41,9 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
 
 /* The polynomials of some vertices of one lung. */
 typedef struct supine_normals_rows {
-  size_t count;     /* R */
-  uint32_t *vertex; /* [R] */
-  double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normals.h) */
+  size_t count;     /* number of vertices, R */
+  uint32_t *vertex; /* [R] indices of the vertices */
+  double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normal_modes.h) */
 } supine_normals_rows;
 
 /* Find the polynomials of every `stride`-th vertex of a lung from `offset` on, without those whose
@@ -59,7 +59,7 @@ typedef struct supine_normals_states {
   size_t count;    /* S: states whose volume the lungs can reach */
   size_t room;     /* states requested */
   double *phi;     /* [G, room, 3, terms] */
-  double range[2]; /* see supine_normals_modes */
+  double range[2]; /* range of the states, as in supine_normals_modes */
 } supine_normals_states;
 
 /* Spread up to `count` states over the sphere and over the volumes from rest to the reference

@@ -16,8 +16,8 @@
 #include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 
-/* Number of vertices in a block, number of parts into which sums are divided (fixed, so that sums
- * do not depend on the number of threads), and largest number of halvings of a volume. */
+/* BLOCK: vertices in a block. PARTS: parts into which sums are divided, a fixed number, so that
+ * sums do not depend on the number of threads. VOLUME_HALVINGS: most halvings of a volume. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
 /* Sums over one of the PARTS. */
@@ -30,14 +30,14 @@ typedef struct tally {
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] */
-  const double *weights;    /* [D, K] */
+  const double *directions; /* [N, 3] d, mm */
+  const double *weights;    /* [D, K] weights of the modes */
   const double *scales; /* [D, 2] gains of the full solve and the compression; NULL: open surface */
   tally *tallies;       /* [PARTS] */
   double *space;        /* [threads, BLOCK, K + 2 D] */
 } accuracy_work;
 
-/* Compute out = |a is - b should| length. */
+/* Compute out [n], the length of the differences of displacements: |a is - b should| length. */
 SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {
