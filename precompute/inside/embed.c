@@ -140,7 +140,8 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
 
 /* Find the displacements of points [begin, end) of `order`, at most BLOCK, all of one lung. `space`
  * holds positions [2 BLOCK, 3], of the points and then of the surface points nearest to those
- * within `reach`, their values [2 BLOCK, columns], and a surface point's value [columns]. */
+ * within `reach`, their values [2 BLOCK, columns], and a surface point's value [columns]. The eight
+ * parameters are one block and its work space. */
 static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
