@@ -37,7 +37,7 @@ static const double most_kurtosis = 1.8;
 static const double least_side = 0.12;
 
 typedef struct shape {
-  double volume, centre[3], deviation[3]; /* mm^3, mm, standard deviations in mm */
+  double volume, centre[3], deviation[3]; /* mm^3, mm, and standard deviations in mm */
   double kurtosis[3];
   double third[3][3][3]; /* third moments m_abc */
 } shape;
@@ -134,7 +134,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  for (int pass = 0; pass < 2; ++pass) { /* about the box's centre, then the centre of volume */
+  for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the volume's */
     s->volume = integrate(mesh, s->centre, sum, square, s->third, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {

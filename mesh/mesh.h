@@ -53,10 +53,10 @@ typedef struct supine_mesh_load_options {
 
 /** Result of loading. */
 typedef struct supine_mesh_report {
-  size_t degenerate_faces;      /**< faces dropped: fewer than three different corners */
-  size_t unreferenced_vertices; /**< vertices dropped: part of no triangle */
+  size_t degenerate_faces;      /**< dropped faces with fewer than three different corners */
+  size_t unreferenced_vertices; /**< dropped vertices that are part of no triangle */
   supine_axes axes;             /**< axes assumed for the file */
-  bool axes_from_tag;           /**< the axes come from a SPACE tag */
+  bool axes_from_tag;           /**< whether the axes come from a SPACE tag */
 } supine_mesh_report;
 
 /** Read one surface: PLY and VTP directly, OBJ, STL and other formats through assimp. Polygons are
@@ -107,7 +107,7 @@ typedef struct supine_topology {
   long euler_characteristic; /**< vertices - edges + triangles */
   long genus;  /**< of a closed surface, (2 * component_count - euler_characteristic) / 2; -1 if the
                   surface is not closed or this is no whole number >= 0 */
-  bool closed; /**< every edge joins exactly two triangles, with the same orientation */
+  bool closed; /**< whether every edge joins exactly two triangles of the same orientation */
 } supine_topology;
 
 /** Find edges and components, in linear time and memory except for sorting each vertex's edges.
@@ -136,8 +136,7 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
 /** Return the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
- * vertices move to `vertices` [vertex_count, 3]. Above a few in a thousand the surface looks torn.
- */
+ * vertices move to `vertices`. Above a few in a thousand the surface looks torn. */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
 /** Numbers that describe a whole surface, for the field data of VTP. */

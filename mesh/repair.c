@@ -89,7 +89,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
 }
 
 /* Link triangles across edges that belong to two of them; return false if they form a one-sided
- * surface. `closed` is set: whether every edge belongs to an even number of triangles. */
+ * surface. Set `closed` to whether every edge belongs to an even number of triangles. */
 static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides, const links *l,
                            bool *closed) {
   const size_t count = 3 * mesh->triangle_count;
@@ -254,7 +254,7 @@ size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {
 
 typedef struct piece {
   double volume;  /* mm^3, positive if it faces outwards */
-  uint32_t first; /* its first vertex */
+  uint32_t first; /* first vertex of the component */
 } piece;
 
 /* Find the first vertex and the volume of each component. */

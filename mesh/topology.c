@@ -19,7 +19,7 @@ static void sort_sides(supine_mesh_side *sides, size_t count) {
     qsort(sides, count, sizeof *sides, compare_sides);
     return;
   }
-  for (size_t i = 1; i < count; ++i) { /* stable, and `at` already ascends */
+  for (size_t i = 1; i < count; ++i) { /* insertion sort, which keeps `at` ascending */
     const supine_mesh_side side = sides[i];
     size_t j = i;
     for (; j > 0 && sides[j - 1].high > side.high; --j) {
@@ -31,7 +31,7 @@ static void sort_sides(supine_mesh_side *sides, size_t count) {
 
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
   const size_t count = 3 * mesh->triangle_count;
-  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next); /* place for the next side */
+  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next); /* next place, by lower vertex */
   supine_mesh_side *sides = malloc((count + 1) * sizeof *sides);
   if (next == NULL || sides == NULL) {
     free(next);

@@ -13,7 +13,7 @@ typedef struct image_storage {
   int64_t offset; /* bytes before the voxels, or before their compressed stream */
   int64_t skip;   /* bytes before the voxels in the unpacked stream */
   bool packed;    /* compressed by zlib or gzip */
-  bool text;      /* decimal numbers */
+  bool text;      /* voxels are decimal numbers */
   bool big;       /* most significant byte first */
   int integer;    /* 64-bit integers, read as F64: 1 signed, -1 unsigned; 0: another type */
   double slope, intercept; /* scale of the numbers; slope 0: not scaled */

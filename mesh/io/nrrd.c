@@ -43,7 +43,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                            supine_image *image, image_storage *storage, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the voxels are in another file; save them as one", path);
+                            "%s: its voxels are in another file; save both as one", path);
   }
   if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
     return supine_error_set(

@@ -30,7 +30,7 @@ typedef struct ply {
   encoding encoding;
   mesh_text text; /* part of the file not yet read */
   mesh_text line;
-  unsigned present; /* bits 1 << role of the properties of all elements with a count above 0 */
+  unsigned present; /* bits 1 << role of the properties of elements that have items */
   size_t element_count;
   size_t property_count;
   element elements[ELEMENTS_MAX];
@@ -255,7 +255,7 @@ static supine_status take_items(ply *in, const element *of) {
 
 /* Allocate the vertices that the header announces, at most as many as the file can hold. */
 static supine_status make_room(const ply *in, const element *of, supine_mesh *mesh) {
-  uint64_t least = 0; /* least bytes per item */
+  uint64_t least = 0; /* fewest bytes per item */
   for (size_t p = 0; p < of->property_count; ++p) {
     const property *item = &in->properties[of->first_property + p];
     least += in->encoding == ASCII ? 2 /* a digit and a blank */

@@ -49,7 +49,7 @@ typedef struct mesh_file {
   const char *path;
   unsigned char *bytes; /**< content of the file, then a NUL */
   size_t size;
-  bool tagged;       /**< the file has a SPACE tag */
+  bool tagged;       /**< whether the file has a SPACE tag */
   supine_axes space; /**< axes that the tag names; AUTO if unknown */
 } mesh_file;
 
@@ -60,7 +60,7 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 /* ---- faces.c: faces added to a mesh that has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< of one face, as the time to cut it grows with their square */
+  MESH_CORNERS_MAX = 1024, /**< most corners of a face, as cutting takes quadratic time */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };

@@ -15,7 +15,7 @@ typedef struct mesh_writer {
   unsigned char source[3]; /**< axis of `mesh`, 0 to 2, of each coordinate in the file */
   double factor[3];        /**< sign of each coordinate, divided by the file's unit in mm */
   bool mirrored;           /**< left-handed axes: triangles are written in reverse order */
-  double quantum;          /**< grid of lengths in the file's unit, a power of two; 0: none */
+  double quantum;          /**< step of rounded lengths in the file's unit; 0: not rounded */
   char space[4];           /**< letters of the axes: "LPS", "RAS", ... */
   char unit[24];           /**< unit of lengths: "mm", "cm", ... */
   char comment[256];       /**< one printable line, or "" */

@@ -236,7 +236,7 @@ static void write_array(const vtp *file, size_t number, FILE *out) {
 static void write_notes(const mesh_writer *writer, FILE *out) {
   (void)fprintf(out, "<!-- SPACE=%s %s ", writer->space, writer->unit);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
-    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* the last character may be cut */
+    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* UTF-8 may be cut within a character */
     if (c[0] == '-' && (c[1] == '-' || c[1] == '\0')) {
       (void)fputc(' ', out);
     }
@@ -272,7 +272,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
-  if (file->times != NULL) { /* not TimeValue, the time of a file with one frame */
+  if (file->times != NULL) { /* named time_s, as TimeValue is the time of a file with one frame */
     write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
   }
   for (size_t i = 0; i < writer->options.field_count; ++i) {
@@ -399,7 +399,7 @@ supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *e
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
   vtp_foot(series->output.file);
-  (void)fseeko(series->output.file, 0, SEEK_SET); /* checked in supine_mesh_series_open */
+  (void)fseeko(series->output.file, 0, SEEK_SET); /* succeeded in supine_mesh_series_open */
   vtp_head(&series->file, series->output.file);
   return supine_output_commit(&series->output, error);
 }

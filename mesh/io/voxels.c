@@ -12,8 +12,7 @@
 
 enum { PIECE = 1 << 16, ANY_HEADER = 32 };
 
-/* Unpack a stream: skip `skip` bytes, store the next `size` bytes in `values`, and check the
- * checksum of all. */
+/* Unpack a stream: skip `skip` bytes, keep the next `size` in `values`, check all checksums. */
 static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size) {
   unsigned char packed[PIECE];
   unsigned char discarded[PIECE]; /* bytes before and after those to store */
@@ -31,7 +30,7 @@ static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_
     const unsigned given = (unsigned)(room < PIECE ? room : PIECE);
     z.next_out = wanted ? values + (from - skip) : discarded;
     z.avail_out = given;
-    result = inflate(&z, Z_NO_FLUSH); /* Z_BUF_ERROR at the end of the file */
+    result = inflate(&z, Z_NO_FLUSH); /* returns Z_BUF_ERROR at the end of the file */
     from += given - z.avail_out;
     if (result == Z_STREAM_END && from < end) { /* another stream follows */
       result = inflateReset(&z);

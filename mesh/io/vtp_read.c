@@ -21,7 +21,7 @@ typedef struct vtp_file {
 /* An XML element. */
 typedef struct element {
   const char *at, *end; /* attributes, name="value" */
-  const char *body;     /* text after the closing > */
+  const char *body;     /* text after the > of the tag */
 } element;
 
 static supine_status malformed(const vtp_file *v, const char *what, supine_error *error) {

@@ -19,8 +19,7 @@ static const struct {
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
 
-/* Find the centre, mm, of the voxels whose labels have the side `wanted`; false if there are
- * none. */
+/* Find the centre, mm, of all voxels of the side `wanted`; false if there are none. */
 static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
                       uint8_t wanted, double centre[3]) {
   double count = 0.0;
@@ -128,7 +127,7 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
     return true;
   }
   for (size_t c = 0; c < CONVENTIONS; ++c) {
-    bool same = true; /* the labels present are exactly its own */
+    bool same = true; /* its labels are exactly those present */
     memset(side, 0, LABELS_MAX);
     (void)read_sides(conventions[c].labels, side);
     for (size_t label = 1; same && label < LABELS_MAX; ++label) {

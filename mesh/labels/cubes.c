@@ -59,7 +59,7 @@ static const float half = 0.5F; /* least share of a cube that counts as inside *
 static const float levels = 65536.0F;
 
 /* If only two opposite cubes of the four around an edge are inside, fill the fuller of the other
- * two. Return whether that was so. */
+ * two. Return whether a cube was filled. */
 static bool mend_edge(float *share, const size_t at[4]) {
   const bool in[4] = {share[at[0]] >= half, share[at[1]] >= half, share[at[2]] >= half,
                       share[at[3]] >= half};
@@ -73,7 +73,7 @@ static bool mend_edge(float *share, const size_t at[4]) {
 }
 
 /* If only two opposite cubes of the eight around a corner are inside, fill two that connect them;
- * if only two opposite ones are outside, fill one of them. Return whether that was so. */
+ * if only two opposite ones are outside, fill one of them. Return whether a cube was filled. */
 static bool mend_corner(float *share, const size_t at[8]) {
   unsigned inside = 0;
   for (unsigned c = 0; c < 8; ++c) {

@@ -8,7 +8,7 @@
 #include "mesh/labels/mask.h"
 #include "sh/base/parallel.h"
 
-static const float far_away = 1e30F; /* mm^2, in a row without voxels of the set */
+static const float far_away = 1e30F; /* squared distance, mm^2, in rows without voxels of the set */
 
 typedef struct sweep {
   const labels_mask *mask;

@@ -18,7 +18,7 @@ typedef struct supine_labels_options {
   const char *labels;
   supine_axes axes; /**< axes of the header's coordinates; AUTO: those that it names */
   double edge;      /**< approximate distance between vertices, mm; 0: SUPINE_LABELS_EDGE */
-  double close;     /**< radius of closing, mm: fills gaps narrower than twice it; 0: none */
+  double close;     /**< radius of closing, mm: gaps narrower than twice it are filled; 0: none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -35,13 +35,13 @@ typedef struct supine_labels_lung {
   double filled;   /**< volume of the cavities filled */
   double surface;  /**< volume that the surface encloses */
   long tunnels;    /**< number of tunnels through the lung: the surface's genus */
-  bool cut;        /**< the lung reaches the image's border, where it is cut off */
+  bool cut;        /**< whether the lung reaches the image's border, where it is cut off */
 } supine_labels_lung;
 
 /** Geometry and labels of a map, and how touching lungs were split. */
 typedef struct supine_labels_report {
   size_t size[3];
-  double spacing[3];  /**< mm */
+  double spacing[3];  /**< distances between voxels, mm */
   char axes[64];      /**< "i to the left, j to the back, k to the head" */
   const char *source; /**< frame_source of supine_image */
   bool frames_differ; /**< frames_differ of supine_image */

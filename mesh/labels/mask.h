@@ -23,7 +23,7 @@ enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* values of a ma
 /* ---- mask.c ---- */
 size_t supine_labels_mask_count(const labels_mask *mask);
 double supine_labels_voxel_ml(const labels_mask *mask);
-/** Extract the voxels of one value, as 1, with `margin` voxels around them; empty (at NULL) if
+/** Extract the voxels of one value, as 1, with `margin` voxels around them; mask->at is NULL if
  * there are none. @retval SUPINE_ERROR_MEMORY */
 supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
                                          labels_mask *mask);
@@ -38,7 +38,7 @@ enum { LABELS_MAX = 65536, LABELS_MARGIN = 2 };
 /** Number, sums of indices, and box of the voxels of one label. */
 typedef struct labels_tally {
   uint64_t count;
-  uint64_t sum[3];          /**< sum of their indices along each axis */
+  uint64_t sum[3];          /**< sum of the voxels' indices along each axis */
   uint32_t low[3], high[3]; /**< first and last index along each axis */
 } labels_tally;
 
@@ -76,7 +76,7 @@ typedef struct labels_run {
 
 typedef struct labels_piece {
   uint64_t count; /**< number of voxels */
-  double sum[3];  /**< sum of their indices along each axis */
+  double sum[3];  /**< sum of the voxels' indices along each axis */
 } labels_piece;
 
 typedef struct labels_pieces {

@@ -19,7 +19,7 @@ typedef struct surface_net {
   double (*at)[3];          /* position of each vertex in its cell, 0 to 1 along each axis */
   uint32_t (*neighbour)[6]; /* vertices across the cell's faces -x, +x, -y, ..., or NONE */
   size_t quad_count;
-  uint32_t (*quad)[4]; /* facing outwards if the map's axes are right-handed */
+  uint32_t (*quad)[4]; /* corners; faces outwards if the map's axes are right-handed */
 } surface_net;
 
 static const float half = 0.5F;

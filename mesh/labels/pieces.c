@@ -54,7 +54,7 @@ static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run 
   return count;
 }
 
-/* Set the piece of every run, and the number and sums of every piece. */
+/* Set the piece of every run, and the voxel count and index sums of every piece. */
 static void measure(const labels_mask *mask, labels_pieces *pieces) {
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
     for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {

@@ -115,7 +115,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
-    if (depth == step) { /* most lungs do not touch */
+    if (depth == step) { /* only for lungs that touch */
       status = supine_labels_distance(both, true, squares);
     }
     erode(both, squares, depth, eroded.at);

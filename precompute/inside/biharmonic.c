@@ -239,7 +239,7 @@ typedef struct evaluation {
   size_t count;
 } evaluation;
 
-/* Add the terms of centres [first, last) to the values of the `here` points x. */
+/* Add the terms of centres [first, last) to the values of the first `here` of the points x. */
 SUPINE_CLONES static void add_centres(const supine_inside_biharmonic *fit, size_t first,
                                       size_t last, const double (*x)[POINTS], size_t here,
                                       double *values) {

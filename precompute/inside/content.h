@@ -47,7 +47,7 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
 /** Make a grid of the nodes inside the lungs and of the nodes at most a cell's diagonal outside, so
  * that every point inside lies between nodes.
  *
- * @param like     image of whose voxels every n-th along each axis is a node; NULL: along x, y, z
+ * @param like     image of which every n-th voxel along each axis is a node; NULL: axes x, y and z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
  * @param margin   distance, mm, by which the grid extends beyond the lungs' box, for the field to
  *             fade out

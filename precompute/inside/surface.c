@@ -463,7 +463,7 @@ void supine_inside_surface_distances(const supine_inside_surface *surface, size_
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
                                                const double point[3],
                                                const supine_inside_place *near) {
-  static const double half = 6.283185307179586; /* half of 4 pi */
+  static const double half = 6.283185307179586; /* half the full solid angle of 4 pi */
   supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)

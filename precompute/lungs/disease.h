@@ -3,8 +3,7 @@
  * Diseased lungs ([Santhanam2008] VI): tumours that stiffen the tissue around them, and collapse.
  *
  * The model (model.h) stores lesions as factors on the stiffness, and collapse as each lung's share
- * of its healthy volume.
- */
+ * of its healthy volume. */
 #ifndef SUPINE_DISEASE_H
 #define SUPINE_DISEASE_H
 

@@ -11,7 +11,7 @@
 /** Where the surfaces come from. */
 typedef struct supine_lungs_source {
   const char *name;      /**< name of the first file, for messages */
-  supine_axes axes;      /**< axes of the files; AUTO: they differ */
+  supine_axes axes;      /**< axes of all files; AUTO if they differ */
   bool axes_given;       /**< whether the user gave the axes */
   bool units_given;      /**< whether the user gave the units */
   const double *midline; /**< midline for supine_lungs_create */

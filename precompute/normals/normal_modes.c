@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find a few modes that represent the normals best. */
+/* Find a small number of modes that represent the normals with the least error. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -24,8 +24,9 @@ enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
  * a time; the first lane of all is the reference surface, which is not a snapshot. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
-/* Largest mean and 99.9th percentile of the angle, degrees: a fifth below 0.1 and 1, because the
- * errors of other postures and vertices differ a little from those of the held-out ones. */
+/* Largest mean and 99.9th percentile of the angle, degrees, between the normals of the modes and
+ * the exact normals. They are a fifth below 0.1 and 1, as other states and vertices than the
+ * held-out ones have slightly different errors. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees = 57.29577951308232; /* per radian */
@@ -38,7 +39,7 @@ static const double least_new = 1e-7;
 typedef struct fit {
   size_t count;                     /* number of modes, at most MOST */
   size_t snapshots;                 /* number of snapshots, R */
-  size_t state[SNAPSHOTS];          /* [R] indices of their states */
+  size_t state[SNAPSHOTS];          /* [R] indices of the snapshots' states */
   float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share[1 + r][j] N(state_r) */
   double *weights;                  /* [MOST, 3, terms] V */
   supine_normals_rows rows;         /* polynomials of held-out vertices */
@@ -267,7 +268,7 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   const size_t states = work->held_out.count;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
-  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] */
+  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] exact normals */
   double normals[3 * HELD_OUT];
   double angles[HELD_OUT];
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,

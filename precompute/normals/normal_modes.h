@@ -29,7 +29,7 @@ typedef struct supine_normals_surface {
   size_t vertex_count, triangle_count, lung_count;
   const size_t *lung_begin;  /**< [G + 1] first vertex of each lung, then N */
   const float *vertices;     /**< [N, 3] reference surface, mm */
-  const uint32_t *triangles; /**< [M, 3] */
+  const uint32_t *triangles; /**< [M, 3] indices of vertices */
   const float *directions;   /**< [N, 3] directions of displacement, mm; NULL: a vector field */
   const supine_compression *field;  /**< coefficients [N, K] or [N, 3, K], and their modes */
   const double *resting;            /**< [G, 9] harmonics of the volume at rest, mL beyond the
@@ -41,8 +41,8 @@ typedef struct supine_normals_surface {
 /** The modes of every vertex's normal, and their error. */
 typedef struct supine_normals_modes {
   size_t count;    /**< number of modes Q; 0: no normals */
-  int16_t *modes;  /**< [N, 3, Q] n as integers; `weights` contain their units */
-  double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V */
+  int16_t *modes;  /**< [N, 3, Q] n_ij as integers, whose units are factors of the weights */
+  double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V_jc */
   double range[2]; /**< least and largest volume of the states, mL beyond the reference surface; if
                       rest is unknown, signed largest displacements, mm */
   double mean;     /**< mean angle from the exact normals, degrees, over held-out vertices and

@@ -58,7 +58,7 @@ void supine_normals_rows_free(supine_normals_rows *rows);
 typedef struct supine_normals_states {
   size_t count;    /* S: states whose volume the lungs can reach */
   size_t room;     /* states requested */
-  double *phi;     /* [G, room, 3, terms] */
+  double *phi;     /* [G, room, 3, terms] monomials of each lung in each state */
   double range[2]; /* range of the states, as in supine_normals_modes */
 } supine_normals_states;
 

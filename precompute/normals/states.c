@@ -11,7 +11,7 @@
 
 #include "precompute/normals/polynomial.h"
 
-/* Range of the largest displacement if rest is unknown, mm; negative: deflated. */
+/* Range of the states' largest displacement, mm, if rest is unknown; negative: deflated. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 

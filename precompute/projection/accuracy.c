@@ -30,14 +30,14 @@ typedef struct tally {
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] d, mm */
+  const double *directions; /* [N, 3] directions of displacement, mm */
   const double *weights;    /* [D, K] weights of the modes */
   const double *scales; /* [D, 2] gains of the full solve and the compression; NULL: open surface */
   tally *tallies;       /* [PARTS] */
-  double *space;        /* [threads, BLOCK, K + 2 D] */
+  double *space;        /* [threads, BLOCK, K + 2 D] work space */
 } accuracy_work;
 
-/* Compute out [n], the length of the differences of displacements: |a is - b should| length. */
+/* Compute the errors out [n], mm: the differences of displacements |a is - b should| length. */
 SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {

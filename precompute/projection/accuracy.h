@@ -26,16 +26,15 @@ typedef struct supine_accuracy {
  * the projection's span. */
 typedef struct supine_truth {
   size_t direction_count;
-  double *directions; /**< [D, 3] unit */
+  double *directions; /**< [D, 3] unit vectors */
   size_t rank;
   const double *columns; /**< [N, rank] owned by the projection */
-  double *functions;     /**< [D, rank] */
-  double *cubic; /**< [D, 3] coefficients of the powers 1 to 3 of the gain in the volume, mL; NULL:
-                    open surface */
+  double *functions;     /**< [D, rank] weights of the columns */
+  double *cubic;         /**< [D, 3] volume, mL, in powers 1 to 3 of the gain; NULL: open surface */
 } supine_truth;
 
 /** Find the full solve at `count` held-out directions. The projection must outlive it.
- * @param directions  [N, 3] d, mm
+ * @param directions  [N, 3] directions of displacement, mm
  * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
@@ -49,7 +48,7 @@ void supine_accuracy_truth_free(supine_truth *truth);
 void supine_accuracy_held_out_directions(size_t count, double *directions);
 
 /** Measure the error. The 95th percentiles come from a histogram whose bins are at most 0.4 % wide.
- * @param directions  [N, 3] d, mm
+ * @param directions  [N, 3] directions of displacement, mm
  * @param forms       volume forms of the compression; NULL: open surface
  * @param volume      [9] harmonics of the volume for the errors in mm, mL beyond the reference
  *             surface; it is halved until the field reaches it in every direction
@@ -65,7 +64,7 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
  * reference surface to a volume: the largest share in the six postures with gravity along an axis,
  * without those in which the field cannot reach the volume. Up to 50,000 evenly chosen triangles
  * are examined. Above a few in a thousand the surface looks torn.
- * @param directions  [N, 3] d, mm
+ * @param directions  [N, 3] directions of displacement, mm
  * @param forms       volume forms of the compression; the surface must be closed
  * @param volume      [9] harmonics of the state's volume, mL beyond the reference surface
  * @retval SUPINE_ERROR_MEMORY */

@@ -14,7 +14,7 @@
 enum { VERTICES_MAX = 4096 };
 
 /* Compute gram [R, R], the scalar products of the columns over evenly chosen vertices with weights
- * |d|^2: w' gram w is the sum of the squared displacements by the field columns x w. */
+ * |d|^2: w' gram w is the sum of the squared displacements of the field columns x w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;

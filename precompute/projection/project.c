@@ -8,7 +8,7 @@
 #include <supine/sh.h>
 
 enum {
-  LATITUDES_PER_BAND = 8, /* of the grid, which has twice as many longitudes */
+  LATITUDES_PER_BAND = 8, /* latitudes of the grid; longitudes are twice as many */
   LATITUDES_MIN = 32
 };
 

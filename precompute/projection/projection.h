@@ -43,7 +43,7 @@ typedef struct supine_compression {
   size_t band;
   size_t mode_count;   /**< K */
   float *coefficients; /**< [N, K] */
-  double *modes;       /**< [K, (band + 1)^2] */
+  double *modes;       /**< [K, (band + 1)^2] harmonics of each mode */
   double *mix;         /**< [R, K]: coefficients = columns x mix */
 } supine_compression;
 
@@ -103,7 +103,7 @@ void supine_projection_compression_field(const supine_compression *compression,
 
 /** Find the volume forms of the coefficients as they are stored, in single precision.
  * @param share       [G] each lung's share of its healthy volume; NULL: 1
- * @param directions  [N, 3] d, mm; NULL: a vector field */
+ * @param directions  [N, 3] directions of displacement, mm; NULL: a vector field */
 supine_status supine_projection_compression_volume_forms(
     const supine_compression *compression, const supine_lungs *lungs, const double *share,
     const double *directions, supine_volume_forms *forms, supine_error *error);

@@ -17,8 +17,8 @@ enum { SUPINE_SPAN_MAX = 128 };
 
 typedef struct supine_span {
   size_t rank;                                       /* number of directions, R */
-  double directions[3 * SUPINE_SPAN_MAX];            /* [R, 3] g_r */
-  size_t vertices[SUPINE_SPAN_MAX];                  /* [R] indices j */
+  double directions[3 * SUPINE_SPAN_MAX];            /* [R, 3] directions g_r */
+  size_t vertices[SUPINE_SPAN_MAX];                  /* [R] vertices j */
   double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX]; /* [R, R] inverse of the matrix f_j(g_r) */
 } supine_span;
 
