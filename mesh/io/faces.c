@@ -81,10 +81,9 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
   uint32_t corner[MESH_CORNERS_MAX];
   for (size_t k = 0; k < count; ++k) {
     if (!(corners[k] >= 0.0 && corners[k] < (double)mesh->vertex_count)) {
-      return supine_error_set(
-          error, SUPINE_ERROR_FORMAT,
-          "%s: face %zu names vertex %.0f, but there are %zu; save the mesh again", faces->path,
-          number, corners[k], mesh->vertex_count);
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: face %zu names vertex %.0f, but the mesh has %zu; save it again",
+                              faces->path, number, corners[k], mesh->vertex_count);
     }
     corner[k] = (uint32_t)corners[k];
   }

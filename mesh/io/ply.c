@@ -288,7 +288,7 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
     const element *of = &in.elements[e];
     if (of->kind == FACES && mesh->vertices == NULL) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: its faces stand before its vertices; save the mesh again",
+                                "%s: its faces come before its vertices; save the mesh again",
                                 file->path);
     }
     status = status == SUPINE_OK && of->kind == VERTICES ? make_room(&in, of, mesh) : status;

@@ -152,7 +152,7 @@ static supine_status choose(const char *path, const supine_image *image, const l
   if (wanted == NULL) {
     list_labels(tally, NULL, 0, present, sizeof present);
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: which of its labels (%s) are lungs? Give --labels, as "
+                            "%s: which of its labels (%s) are lungs? Give --labels, such as "
                             "left=10+11,right=12+13+14 or totalsegmentator",
                             path, present);
   }

@@ -193,8 +193,8 @@ static supine_status shape(size_t lung, size_t count, double *vertices) {
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error) {
   if (vertices < SUPINE_PHANTOM_VERTICES_MIN || vertices > SUPINE_PHANTOM_VERTICES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu vertices: give %d to %d", vertices,
-                            SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "vertex count %zu: give %d to %d",
+                            vertices, SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
   }
   if (!(millilitres > 0.0) || !isfinite(millilitres)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a volume of %g mL: give a positive one",
