@@ -82,8 +82,8 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
 /** Report whether `side`, mm, is a possible longest side of the bounding box of lungs.
- * @param other  output: the unit other than mm in which this number is most likely, a string
- *             literal; NULL if it is impossible in every other unit */
+ * @param other  output: the unit other than mm in which this number is most likely, as a string
+ *             literal; NULL if it is impossible in all of them */
 bool supine_mesh_unit_is_likely(double side, const char **other);
 /** Find the length in mm of "mm", "cm", "m", "um" or "in"; return false for any other name. */
 bool supine_mesh_unit_find(const char *name, double *millimetres);

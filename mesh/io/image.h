@@ -80,7 +80,7 @@ void supine_image_gather(const supine_image *image, size_t from, const size_t *i
 /** Store `count` numbers at values[begin] and after; integer types are rounded and clipped. */
 void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
-/** Interpret the header's coordinates in `axes`, not in those it names; AUTO: no change. */
+/** Interpret the header's coordinates in `axes`, not in the axes it names; AUTO: no change. */
 void supine_image_set_axes(supine_image *image, supine_axes axes);
 
 /** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */

@@ -174,7 +174,7 @@ static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t b
   (void)fwrite(out.mesh.vertices, 3 * sizeof(double), result.vertex_count, stream);
   (void)fwrite(out.mesh.triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
   (void)fflush(stream);
-  _exit(0); /* also frees the scene */
+  _exit(0); /* the end of the process frees the scene */
 }
 
 /* Read the outcome and the surface that the child process wrote. */
@@ -234,9 +234,9 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
   return import_file(file, NULL, mesh, dropped, error);
 }
 
-/* Check that three numbers follow `keyword` in every line that begins with it, as assimp does not;
- * return the number of the first line that is wrong, or 0. Turn lines with mtllib, which name a
- * file of colours, into comments. `last` is set to the first word of the last line. */
+/* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
+ * not; return the number of the first wrong line, or 0. Turn mtllib lines, which name a file of
+ * colours, into comments. `last` is set to the first word of the last line. */
 static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;

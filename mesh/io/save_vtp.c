@@ -168,7 +168,7 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
       array->put(file, i * each + k, &at);
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
-    file->sizes[3 + i] = /* 0: out of memory */
+    file->sizes[3 + i] = /* 0 if out of memory */
         compressor == NULL
             ? 0
             : libdeflate_zlib_compress(compressor, raw, (size_t)(at - raw),

@@ -8,8 +8,8 @@
 
 #include "mesh/labels/mask.h"
 
-/* Labels of segmenters: R231 and LTRCLobes of lungmask, `total` of TotalSegmentator from version
- * 2.0 on, and before it. */
+/* Labels of segmenters: R231 and LTRCLobes of lungmask; `total` of TotalSegmentator 2.0 and later,
+ * and of earlier versions. */
 static const struct {
   const char *name, *labels;
 } conventions[] = {{"lungmask", "left=2,right=1"},
@@ -127,7 +127,7 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
     return true;
   }
   for (size_t c = 0; c < CONVENTIONS; ++c) {
-    bool same = true; /* its labels are exactly those present */
+    bool same = true; /* the convention's labels are those present */
     memset(side, 0, LABELS_MAX);
     (void)read_sides(conventions[c].labels, side);
     for (size_t label = 1; same && label < LABELS_MAX; ++label) {

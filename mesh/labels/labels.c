@@ -280,8 +280,8 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, name, w->edge);
 }
 
-/* Report that the left lung does not lie left of the right one; judge by their shape whether the
- * labels or the header's axes are wrong. */
+/* Report that the left lung does not lie left of the right one; judge by the shape of the lungs
+ * whether the labels or the header's axes are wrong. */
 static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_report *report = w->report;
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);

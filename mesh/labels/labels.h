@@ -13,12 +13,12 @@
 
 typedef struct supine_labels_options {
   /** Labels of the lungs. NULL: chosen by the labels present. "one": all but 0, split into two
-   * lungs. "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1": those of a segmenter. Or
-   * a list, "left=10+11,right=12+13+14", of one or both sides. */
+   * lungs. "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1": labels of a segmenter.
+   * Or a list, "left=10+11,right=12+13+14", of one or both sides. */
   const char *labels;
-  supine_axes axes; /**< axes of the header's coordinates; AUTO: those that it names */
+  supine_axes axes; /**< axes of the header's coordinates; AUTO: the axes it names */
   double edge;      /**< approximate distance between vertices, mm; 0: SUPINE_LABELS_EDGE */
-  double close;     /**< radius of closing, mm: gaps narrower than twice it are filled; 0: none */
+  double close;     /**< closes gaps narrower than twice this radius, mm; 0: none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -43,8 +43,8 @@ typedef struct supine_labels_report {
   size_t size[3];
   double spacing[3];  /**< distances between voxels, mm */
   char axes[64];      /**< "i to the left, j to the back, k to the head" */
-  const char *source; /**< frame_source of supine_image */
-  bool frames_differ; /**< frames_differ of supine_image */
+  const char *source; /**< as in supine_image */
+  bool frames_differ; /**< as in supine_image */
   char taken[256];    /**< labels of each side: "2 left; 1 right (convention lungmask)" */
   double neck;        /**< width of the neck at which touching lungs were split, mm; 0: none */
   size_t lung_count;

@@ -51,7 +51,7 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
 
 typedef struct labels_choice {
   char *taken;  /**< [256] output: `taken` of supine_labels_report */
-  bool doubted; /**< by the header, the left lung does not lie left of the other */
+  bool doubted; /**< by the header, the left lung does not lie left of the right one */
 } labels_choice;
 
 /** Choose the side of each label, as `wanted` says or, if it is NULL, by the labels present.
@@ -82,7 +82,7 @@ typedef struct labels_piece {
 typedef struct labels_pieces {
   size_t run_count;
   size_t *row;         /**< [rows + 1] first run of each row of voxels */
-  labels_run *run;     /**< [run_count] */
+  labels_run *run;     /**< [run_count] row by row */
   labels_piece *piece; /**< [run_count] a piece at the index of its first run; 0 at other runs */
   size_t piece_count;
 } labels_pieces;
@@ -93,7 +93,7 @@ void supine_labels_pieces_free(labels_pieces *pieces);
 /** Set all pieces of nonzero voxels except the largest to 0 or, if `zero`, all pieces of zeros
  * except the outer one (cavities) to 1.
  * @param others  output: number of pieces changed
- * @param voxels  output: number of their voxels */
+ * @param voxels  output: number of voxels changed */
 supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *others, size_t *voxels);
 
 /* ---- distance.c ---- */

@@ -81,7 +81,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
 typedef struct kernel {
   size_t size;
   double *matrix; /* [size, size], the lower triangle column by column */
-  size_t done;    /* columns eliminated */
+  size_t done;    /* number of columns eliminated */
 } kernel;
 
 SUPINE_CLONES static void fill(const double *c, const kernel *k) {

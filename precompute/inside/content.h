@@ -14,7 +14,7 @@ typedef struct supine_inside_content {
   uint32_t *part; /**< [count] index of the point's part; for a grid, its node i + size[0] (j +
                    * size[1] k) */
   size_t triangle_count;
-  uint32_t *triangles; /**< [triangle_count, 3] */
+  uint32_t *triangles; /**< [triangle_count, 3] indices of points */
   size_t part_count;   /**< number of named parts; 0: a grid */
   char *names;         /**< names of the parts in order, separated by newlines */
   bool *rigid;         /**< [part_count] whether the part keeps its shape; NULL: none does */

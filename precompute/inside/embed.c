@@ -24,11 +24,11 @@ typedef struct embedding {
   unsigned char *lung;        /* [N] in the content's order */
   size_t *order;              /* [N] indices of the content's points, lung by lung */
   float *vertices;      /* [N, 3] mm at full inflation; this and all arrays below are in `order` */
-  float *coefficients;  /* [N, 3, K] */
+  float *coefficients;  /* [N, 3, K] displacement by each mode, mm */
   float *depth;         /* [N] mm below the surface */
-  uint32_t *part;       /* [N] */
+  uint32_t *part;       /* [N] index of the part */
   unsigned char *group; /* [N] index of the lung */
-  uint32_t *triangles;  /* [M, 3] */
+  uint32_t *triangles;  /* [M, 3] indices of vertices */
   uint32_t *rigid;      /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
   size_t rigid_count;
 } embedding;

@@ -30,14 +30,14 @@ enum { SUPINE_INSIDE_CENTRES = 4000 };
 typedef struct supine_inside_options {
   bool clamp;          /**< points outside a lung move like the nearest point of its surface */
   size_t centres;      /**< largest number of centres of one lung; 0: SUPINE_INSIDE_CENTRES */
-  const char *made_by; /**< for the file's metadata; optional */
+  const char *made_by; /**< optional: maker named in the file's metadata */
 } supine_inside_options;
 
 /** Result of embedding. */
 typedef struct supine_inside_report {
-  size_t count;                     /**< points in the file */
-  size_t in_lung[SUPINE_LUNGS_MAX]; /**< points in each lung or nearest to it */
-  size_t outside;                   /**< points outside every lung; for a grid, its outer nodes */
+  size_t count;                     /**< number of points in the file */
+  size_t in_lung[SUPINE_LUNGS_MAX]; /**< number of points in each lung or nearest to it */
+  size_t outside;                   /**< number of points outside every lung */
   size_t farthest;    /**< index of the outside point that is farthest from the lungs */
   double farthest_mm; /**< distance of that point from the lungs, mm */
   size_t rigid;       /**< number of rigid parts of more than one vertex */

@@ -22,7 +22,7 @@ typedef struct node {
   double low[3], high[3];
   uint32_t begin, end;
   uint32_t right; /* index of the second child (the first is the next node); 0: a leaf */
-  uint32_t leaf;  /* index into `leaves` for a leaf */
+  uint32_t leaf;  /* index of a leaf's boxes in `leaves` */
 } node;
 
 /* The triangles of a node, seen from afar. */
@@ -438,7 +438,7 @@ typedef struct distances {
   const supine_inside_surface *surface;
   const double *points;
   double *distance;
-  double *nearest; /* NULL: not wanted */
+  double *nearest; /* optional */
 } distances;
 
 static void distance_range(void *context, size_t begin, size_t end, size_t thread) {

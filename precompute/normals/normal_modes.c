@@ -331,7 +331,7 @@ static supine_status measure_all(const normals_work *work, size_t count,
 typedef struct planes_work {
   const normals_work *work;
   size_t count; /* number of modes, Q */
-  size_t first; /* state of the first lane: 0 the reference surface, 1 + r snapshot r */
+  size_t first; /* state in the first lane: 0, the reference surface; 1 + r, snapshot r */
   float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gains times weights */
   float *at;                                          /* [N, 3, LANES] positions, mm */
   float *modes;                                       /* [N, 3, Q] sums so far */

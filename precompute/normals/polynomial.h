@@ -20,8 +20,8 @@ void supine_normals_monomials(size_t modes, const double *weights, const double 
 /* The triangles around each vertex: corner[s] for begin[i] <= s < begin[i + 1] are the indices in
  * `triangles` that hold vertex i. */
 typedef struct supine_normals_fans {
-  uint32_t *begin;  /* [N + 2] */
-  uint32_t *corner; /* [3 M] */
+  uint32_t *begin;  /* [N + 2]; the last entry is work space */
+  uint32_t *corner; /* [3 M] indices into `triangles` */
 } supine_normals_fans;
 
 /* Find the triangles around each vertex. Release them with supine_normals_fans_free.

@@ -23,8 +23,8 @@ enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 /* Sums over one of the PARTS. */
 typedef struct tally {
   double field2;         /* sum of the squared displacements at gain 1, mm^2 */
-  supine_tally error;    /* at gain 1, mm */
-  supine_tally error_mm; /* at equal volumes, mm */
+  supine_tally error;    /* errors at gain 1, mm */
+  supine_tally error_mm; /* errors at equal volumes, mm */
 } tally;
 
 typedef struct accuracy_work {
@@ -92,7 +92,7 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
 }
 
 /* Find the gains at which the full solve and the compression each reach `part` times the volumes
- * [D]; return false if they do not in some direction. */
+ * [D]; return false if one of them cannot in some direction. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
                         const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {

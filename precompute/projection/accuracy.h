@@ -19,7 +19,7 @@ typedef struct supine_accuracy {
    * unknown, supine_precompute replaces it by that volume in mL. 0: the surface is open, and there
    * are no errors in mm. */
   double volume;
-  double rms_mm, p95_mm, max_mm; /**< at equal volumes */
+  double rms_mm, p95_mm, max_mm; /**< errors at equal volumes */
 } supine_accuracy;
 
 /** The full solve at D held-out directions, which no grid used: columns x functions^T, as exact as

@@ -41,7 +41,7 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
 typedef struct supine_compression {
   size_t vertex_count;
   size_t band;
-  size_t mode_count;   /**< K */
+  size_t mode_count;   /**< number of modes, K */
   float *coefficients; /**< [N, K] */
   double *modes;       /**< [K, (band + 1)^2] harmonics of each mode */
   double *mix;         /**< [R, K]: coefficients = columns x mix */
