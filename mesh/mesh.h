@@ -33,8 +33,7 @@ void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
 void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
 /** Find the axes whose matrix is the product of the matrices of `then` and `first`. */
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
-/** Report whether the axes are left-handed: triangles that face outwards in them face inwards in
- * LPS. */
+/** Report whether axes are left-handed: converted to LPS, triangles then face the other way. */
 bool supine_mesh_axes_mirrored(supine_axes axes);
 
 /** A triangle surface. Zero-initialise; release with supine_mesh_free. */
@@ -102,8 +101,7 @@ typedef struct supine_topology {
   size_t non_manifold_edges; /**< edges shared by three or more triangles */
   size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
   size_t component_count;    /**< connected components, over shared vertices */
-  uint32_t *component;       /**< [vertex_count] component of each vertex, numbered by first
-                              * appearance */
+  uint32_t *component;       /**< [vertex_count], numbered by first appearance */
   long euler_characteristic; /**< vertices - edges + triangles */
   long genus;  /**< of a closed surface, (2 * component_count - euler_characteristic) / 2; -1 if the
                   surface is not closed or this is no whole number >= 0 */

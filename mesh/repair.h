@@ -33,8 +33,7 @@ typedef struct supine_mesh_side {
   uint32_t at; /**< 3 * triangle + corner that the side starts at */
 } supine_mesh_side;
 
-/** Sort the sides of all triangles by low, then high, then at; NULL if out of memory. The caller
- * frees them. */
+/** Sort all triangles' sides by low, high, at; NULL if out of memory. The caller frees them. */
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
 
 /** Return how many of `count` sorted sides belong to the edge whose first side is i. */

@@ -110,8 +110,7 @@ static void components_find(size_t vertex_count, supine_topology *topology) {
     const uint32_t b = tree_root(parent, topology->edges[2 * e + 1]);
     parent[a > b ? a : b] = a < b ? a : b;
   }
-  /* Number the components in one pass: a vertex takes the number of its parent, whose index is
-   * lower. */
+  /* Number the components: a vertex takes the number of its parent, whose index is lower. */
   for (size_t i = 0; i < vertex_count; ++i) {
     parent[i] = parent[i] == i ? (uint32_t)topology->component_count++ : parent[parent[i]];
   }

@@ -44,8 +44,7 @@ typedef struct supine_image {
 /** Report whether the name ends in .nrrd, .nii, .nii.gz or .mha. */
 bool supine_image_supports(const char *path);
 
-/** Report whether the name ends like an image's: one that can be read, or .mhd, .nhdr, .mgz, .dcm,
- * .hdr or .img. */
+/** Report whether the name ends like an image's, readable or not (.mhd, .nhdr, .mgz, .dcm, ...). */
 bool supine_image_is_named(const char *path);
 
 /** Read an image of one number per voxel. If a NIfTI header gives a slope and an intercept, the

@@ -39,8 +39,7 @@ static bool centre_of(const supine_image *image, const labels_tally *tally, cons
   return count > 0.0;
 }
 
-/* List the labels present, as "1, 2 and 17 more"; unless `side` is NULL, only those whose side is
- * `wanted`. */
+/* List the labels present, as "1, 2 and 17 more"; with `side`, only those of side `wanted`. */
 static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t wanted, char *text,
                         size_t size) {
   enum { SHOWN = 12 };

@@ -42,8 +42,7 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
 }
 
 /* Replace the n values f(y) at line[y stride] by the minimum over y of (x - y)^2 + f(y). Work
- * space: v, indices of the lowest parabolas; z, positions in mm where each becomes the lowest; f,
- * the values. */
+ * space: v, indices of the lowest parabolas; z, where each begins, mm; f, the values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;

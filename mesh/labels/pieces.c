@@ -34,8 +34,7 @@ static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t
   }
 }
 
-/* Find the runs of zero (or nonzero) voxels of one row and return their number; if `run` is NULL,
- * only count them. */
+/* Find the runs of zero or nonzero voxels of a row; if `run` is NULL, only return their number. */
 static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run *run) {
   size_t count = 0;
   for (size_t i = 0; i < size;) {

@@ -12,8 +12,7 @@
 
 #include <supine/status.h>
 
-/** Zero-initialise; supine_inside_biharmonic_free releases what supine_inside_biharmonic_fit
- * allocates. */
+/** Zero-initialise for supine_inside_biharmonic_fit; supine_inside_biharmonic_free frees it. */
 typedef struct supine_inside_biharmonic {
   size_t count;     /**< number of centres, M */
   size_t columns;   /**< number of values per point, R */

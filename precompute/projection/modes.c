@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the best functions of orientation by a singular value decomposition through small Gram
- * matrices. */
+/* Find the best functions of orientation as singular vectors, by way of small Gram matrices. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
