@@ -4,7 +4,7 @@
 
 #include "mesh/repair.h"
 
-enum { FEW = 24 }; /* most sides for which insertion sort is faster than qsort */
+enum { FEW = 24 }; /* largest number of sides for which insertion sort is faster than qsort */
 
 static int compare_sides(const void *left, const void *right) {
   const supine_mesh_side *a = left;

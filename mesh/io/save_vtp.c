@@ -37,7 +37,7 @@ struct vtp {
   size_t array_count;
   size_t frames;
   const double *times; /* [frames] times in s; NULL: one surface, without a time */
-  uint64_t *offsets;   /* [frames, array_count] in bytes after the head */
+  uint64_t *offsets;   /* [frames, array_count] positions of arrays, bytes after the head */
   size_t next;         /* next frame to write */
   uint64_t written;    /* bytes of arrays written */
   size_t threads;
@@ -232,11 +232,12 @@ static void write_array(const vtp *file, size_t number, FILE *out) {
   }
 }
 
-/* Write the axes, the unit and a comment as one XML comment, which must not hold "--". */
+/* Write the axes, the unit and a comment as one XML comment, which must not hold "--". Non-ASCII
+ * bytes become "?", as the comment may end within a character. */
 static void write_notes(const mesh_writer *writer, FILE *out) {
   (void)fprintf(out, "<!-- SPACE=%s %s ", writer->space, writer->unit);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
-    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* UTF-8 may be cut within a character */
+    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out);
     if (c[0] == '-' && (c[1] == '-' || c[1] == '\0')) {
       (void)fputc(' ', out);
     }

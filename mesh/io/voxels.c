@@ -15,7 +15,7 @@ enum { PIECE = 1 << 16, ANY_HEADER = 32 };
 /* Unpack a stream: skip `skip` bytes, keep the next `size` in `values`, check all checksums. */
 static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size) {
   unsigned char packed[PIECE];
-  unsigned char discarded[PIECE]; /* bytes before and after those to store */
+  unsigned char discarded[PIECE]; /* bytes that are not stored */
   z_stream z = {.avail_in = 0};
   uint64_t from = 0; /* bytes unpacked so far */
   const uint64_t end = skip + size;
