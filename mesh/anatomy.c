@@ -28,8 +28,8 @@ static const double most_ratio = 0.25;
 /* A single lung is thin from side to side: its standard deviation along x is at most this multiple
  * of those along y and z. Measured ratios of x to y are 0.6 to 0.7. */
 static const double thin = 0.85;
-/* A surface holds two lungs if its standard deviation along one axis is over `wide` times those
- * along the other two, and its kurtosis along this axis below that of a uniform distribution. */
+/* A surface holds two lungs if along one axis its standard deviation is over `wide` times those
+ * along the other two, and its kurtosis is below that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
 /* Smallest |m_xxx - m_xyy - m_xzz| that determines the side of a single lung. */

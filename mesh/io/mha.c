@@ -53,7 +53,7 @@ static bool is_true(const char *value) {
   return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
 }
 
-/* Parse `count` numbers; an empty text leaves `values` as they are. False if it is malformed. */
+/* Parse `count` numbers. An empty text leaves `values` unchanged; a malformed one returns false. */
 static bool numbers(const char *text, double *values, size_t count) {
   bool good = true;
   for (size_t i = 0; i < count && good && *text != '\0'; ++i) {

@@ -63,8 +63,8 @@ typedef struct supine_labels_report {
  *
  * @param surfaces  [2] zero-initialised; those of report->lung are written, facing outwards
  * @retval SUPINE_ERROR_ARGUMENT  an edge, closing distance or list of labels that is invalid
- * @retval SUPINE_ERROR_MESH      no voxel of a lung; labels that do not tell the lungs; a left lung
- *             that does not lie left of the right one; a lung too small or too large
+ * @retval SUPINE_ERROR_MESH      no voxel of a lung; labels that do not tell which are lungs; a
+ *             left lung that does not lie left of the right one; a lung too small or too large
  * @retval SUPINE_ERROR_FORMAT    voxels that are not labels, images that differ in size or frame
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and those of supine_image_read
  * Memory: the map and 1 byte per voxel; per voxel of the lungs' box 10 bytes more to split lungs,

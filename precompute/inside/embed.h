@@ -4,7 +4,7 @@
  * result is a basis of kind vector with the modes, volume forms and metadata of the surface's
  * basis; the same weights and gains apply to both.
  *
- * To the interpolation b, its residual at the surface is added nearby,
+ * Near the surface, the residual there of the interpolation b is added,
  *
  *     u(x) = b(x) + (1 - t)^2 (1 + 2 t) (s(q) - b(q)),    t = |x - q| / reach < 1
  *
