@@ -25,7 +25,7 @@ typedef struct node {
   uint32_t leaf;  /* index of a leaf's boxes in `leaves` */
 } node;
 
-/* The triangles of a node, seen from afar. */
+/* The dipole that replaces the triangles of a node for a distant point. */
 typedef struct dipole {
   double area, centre[3]; /* mm^2; centre of area, mm */
   double normal[3];       /* sum of the triangles' unit normals times their areas, mm^2 */
@@ -43,7 +43,7 @@ struct supine_inside_surface {
   size_t triangle_count;
   uint32_t *order; /* [triangle_count] indices, leaf by leaf */
   node *nodes;
-  dipole *dipoles; /* of each node; NULL: only distances are wanted */
+  dipole *dipoles; /* [nodes]; NULL if only distances are wanted */
   uint32_t node_count;
   boxes *leaves; /* boxes of the triangles of each leaf */
   uint32_t leaf_count;
@@ -120,7 +120,7 @@ static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   }
 }
 
-/* Add a part with centre of area `centre` to a dipole, whose centre is still the first moment. */
+/* Add a part to a dipole, whose centre stays a first moment until all parts are added. */
 static void add_part(dipole *d, double area, const double centre[3], const double normal[3]) {
   d->area += area;
   for (int k = 0; k < 3; ++k) {
@@ -199,7 +199,7 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error) {
-  const size_t leaves = 2 * count / LEAF + 1; /* each at least half full */
+  const size_t leaves = 2 * count / LEAF + 1; /* most leaves, as each is at least half full */
   supine_inside_surface *s = calloc(1, sizeof *s);
   keyed *space = malloc((count + count / 2) * sizeof *space);
   *surface = NULL;

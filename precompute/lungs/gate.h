@@ -28,7 +28,8 @@ typedef struct supine_lungs_source {
  * @param meshes     [count] changed in place
  * @param axes_hold  output: whether the shape fits LPS and no other axes nearly as well
  * @retval SUPINE_ERROR_MESH  a size impossible for lungs, both lungs in one piece; and those of
- *             supine_lungs_create */
+ *             supine_lungs_create
+ * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed */
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
                                 const supine_lungs_source *source, supine_lungs *lungs,
                                 bool *axes_hold, supine_findings *findings, supine_error *error);
