@@ -30,7 +30,7 @@ typedef struct ply {
   encoding encoding;
   mesh_text text; /* part of the file not yet read */
   mesh_text line;
-  unsigned present; /* bits 1 << role of the properties of elements that have items */
+  unsigned present; /* bit 1 << role: an element with items has a property of this role */
   size_t element_count;
   size_t property_count;
   element elements[ELEMENTS_MAX];

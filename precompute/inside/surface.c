@@ -271,7 +271,7 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   }
   const double ww = supine_dot(w, w);
   const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu}; /* squared lengths of edges */
-  /* Bound on the squared distance within the plane of the triangle. */
+  /* Squared distance from x's projection beyond which the triangle is farther than `best`. */
   const double limit = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
