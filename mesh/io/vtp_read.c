@@ -76,8 +76,8 @@ static uint64_t little(const unsigned char *bytes, size_t size) {
   return value;
 }
 
-/* Decode base64 up to the first other character. Several streams may follow each other, each padded
- * to groups of four characters. Return the number of bytes.
+/* Decode base64 up to the first character that is not base64. Several streams may follow each
+ * other, each padded to groups of four characters. Return the number of bytes.
  * @param bytes  output: room for 3 bytes for each 4 characters */
 static size_t base64(const char *at, const char *end, unsigned char *bytes) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

@@ -41,7 +41,7 @@ struct supine_inside_surface {
   const double *vertices;
   const uint32_t *triangles;
   size_t triangle_count;
-  uint32_t *order; /* [triangle_count] indices, leaf by leaf */
+  uint32_t *order; /* indices of all triangles, leaf by leaf */
   node *nodes;
   dipole *dipoles; /* [nodes]; NULL if only distances are wanted */
   uint32_t node_count;

@@ -41,7 +41,7 @@ typedef struct supine_normals_surface {
 /** The modes of every vertex's normal, and their error. */
 typedef struct supine_normals_modes {
   size_t count;    /**< number of modes Q; 0: no normals */
-  int16_t *modes;  /**< [N, 3, Q] n_ij as integers, whose units are factors of the weights */
+  int16_t *modes;  /**< [N, 3, Q] n_ij as integers, in units that `weights` include */
   double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V_jc */
   double range[2]; /**< least and largest volume of the states, mL beyond the reference surface; if
                       rest is unknown, signed largest displacements, mm */
