@@ -1,16 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-/* Find which of the 48 possible axes fits the shape of lungs best.
+/* Find the axes, out of 48 possible ones, that fit the shape of lungs best.
  *
- * With the third moments of volume, m_abc = integral of a b c dV / (V sd_a sd_b sd_c) about the
- * centre, and x outwards from the midline, these sums were positive for all of nine lungs of
- * five people and two synthetic lungs:
+ * Their score is the sum of four terms in the third moments of volume about a lung's centre,
+ *
+ *     m_abc = integral of a b c dV / (V sd_a sd_b sd_c)
+ *
+ * with x outwards from the midline. All were positive for nine lungs of five people and two
+ * synthetic lungs:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
  *     deepest at the back        m_yzz - m_yyy             0.49 to 0.89
  *     narrow at the head        -m_xxz - m_yyz             0.27 to 0.45
- *     of a pair: ln(V_right / V_left) + m_xyz left - m_xyz right   0.25 to 0.40
+ *     left and right differ      ln(V_right / V_left) + m_xyz(left) - m_xyz(right)   0.25 to 0.40
  *
- * Their total was largest for the true axes in every case. */
+ * The score was largest for the true axes in every case. */
 #include <math.h>
 #include <string.h>
 
@@ -18,27 +21,27 @@
 
 #include "mesh/anatomy.h"
 
-/* Smallest lead in score that makes axes certain; the true axes led by 0.35 to 0.7. */
+/* Smallest difference of two scores that counts as clear; the true axes led by 0.35 to 0.7. */
 static const double least_lead = 0.2;
-/* Bound of |ln(V_right / V_left)| in the score, so that a collapsed lung does not decide alone. */
+/* Limit of |ln(V_right / V_left)| in the score, so that a collapsed lung does not decide alone. */
 static const double most_ratio = 0.25;
-/* Largest ratio of a single lung's standard deviation from side to side to each of the others; its
- * ratio to that from front to back is 0.6 to 0.7. */
+/* A single lung is thin from side to side: its standard deviation along x is at most this multiple
+ * of those along y and z. Measured ratios of x to y are 0.6 to 0.7. */
 static const double thin = 0.85;
-/* For two lungs in one surface: smallest ratio of the standard deviation from side to side to each
- * of the others, and largest kurtosis from side to side, that of a uniform distribution. */
+/* A surface holds two lungs if along one axis its standard deviation is over `wide` times those
+ * along the other two, and its kurtosis is below that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-/* Smallest concavity towards the heart that determines the side of a single lung. */
+/* Smallest |m_xxx - m_xyy - m_xzz| that determines the side of a single lung. */
 static const double least_side = 0.12;
 
 typedef struct shape {
-  double volume, centre[3], deviation[3]; /* mm^3, mm, mm */
+  double volume, centre[3], deviation[3]; /* mm^3, mm, and standard deviations in mm */
   double kurtosis[3];
-  double third[3][3][3]; /* m_abc */
+  double third[3][3][3]; /* third moments m_abc */
 } shape;
 
-/* Add w times the monomials of point p about an origin. */
+/* Add the monomials of degrees 1 to 3 of the coordinates of point p, times w, to the sums. */
 static void add_point(const double p[3], double w, double sum[3], double square[3],
                       double third[3][3][3]) {
   for (int a = 0; a < 3; ++a) {
@@ -52,10 +55,10 @@ static void add_point(const double p[3], double w, double sum[3], double square[
   }
 }
 
-/* Return the mean of x^4 over a tetrahedron with one corner at x = 0: the sum of all products of
- * four of the other corners' x, over 35. */
+/* Return the mean of x^4 over a tetrahedron whose corners have x = 0, a, b and c: the sum of all
+ * monomials of degree 4 in a, b and c, divided by 35. */
 static double mean_fourth(double a, double b, double c) {
-  double ab = 1.0; /* complete sums of products of degree n of a and b, and of a, b and c */
+  double ab = 1.0; /* ab, abc: sums of all monomials of degree n in a and b, and in a, b and c */
   double abc = 1.0;
   double power = 1.0;
   for (int n = 0; n < 4; ++n) {
@@ -119,7 +122,7 @@ static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
   }
 }
 
-/* Measure a surface; false if it encloses less than 0.1 % of its box. */
+/* Measure a surface. Return false if it encloses less than 0.1 % of its box. */
 static bool measure(const supine_mesh *mesh, shape *s) {
   double sum[3];
   double square[3];
@@ -130,7 +133,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  for (int pass = 0; pass < 2; ++pass) { /* the second pass is about the centre of volume */
+  for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the volume's */
     s->volume = integrate(mesh, s->centre, sum, square, s->third, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {
@@ -152,7 +155,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   return isfinite(s->deviation[0]) && isfinite(s->deviation[1]) && isfinite(s->deviation[2]);
 }
 
-/* Axes to test: their coordinate a is coordinate from[a] of the surface, times sign[a]. */
+/* Axes to test: coordinate a in them is sign[a] times coordinate from[a] of the surface. */
 typedef struct view {
   int from[3];
   double sign[3];
@@ -184,7 +187,7 @@ static double upright(const shape *s, const view *v) {
          moment(s, v, 1, 1, 2);
 }
 
-/* Score the fit of axes; -INFINITY if they are impossible. */
+/* Score how axes fit a pair of lungs; -INFINITY if the lungs are not side by side in them. */
 static double fit_pair(const shape s[2], const view *v) {
   double apart[3];
   for (int k = 0; k < 3; ++k) {
@@ -204,7 +207,7 @@ static double fit_pair(const shape s[2], const view *v) {
 static double fit_single(const shape *s, const view *v, bool mirrored) {
   const double x = s->deviation[v->from[0]];
   const bool can = x <= thin * s->deviation[v->from[1]] && x <= thin * s->deviation[v->from[2]];
-  /* a single lung and its mirror image are indistinguishable: trust the coordinates */
+  /* a mirrored left lung looks like a right lung, so left-handed axes are not considered */
   return can && !mirrored ? fabs(hollow(s, v)) + upright(s, v) : -INFINITY;
 }
 

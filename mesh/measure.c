@@ -20,7 +20,7 @@ double supine_mesh_volume(const supine_mesh *mesh) {
   supine_mesh_box(mesh, minimum, maximum);
   double sum = 0.0;
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    double p[3][3]; /* corners about the box's centre, against cancellation */
+    double p[3][3]; /* corners relative to the box's centre, to avoid cancellation */
     for (int k = 0; k < 3; ++k) {
       const double *vertex = mesh->vertices + 3 * (size_t)mesh->triangles[3 * t + (size_t)k];
       for (int axis = 0; axis < 3; ++axis) {

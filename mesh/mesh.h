@@ -27,14 +27,13 @@ typedef enum supine_axes {
 bool supine_mesh_axes_parse(const char *letters, supine_axes *axes);
 /** Write the three letters of axes and a NUL; AUTO is LPS. */
 void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
-/** Find the signed permutation from these axes to LPS; AUTO is LPS. */
+/** Find the signed permutation matrix that converts these axes to LPS; AUTO is LPS. */
 void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
-/** Convert a point or vector to LPS, times `scale`. */
+/** Convert a point or vector to LPS in place, and multiply it by `scale`. */
 void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
 /** Find the axes whose matrix is the product of the matrices of `then` and `first`. */
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
-/** Report whether the axes are left-handed: triangles that face outwards in them face inwards in
- * LPS. */
+/** Report whether axes are left-handed: converted to LPS, triangles then face the other way. */
 bool supine_mesh_axes_mirrored(supine_axes axes);
 
 /** A triangle surface. Zero-initialise; release with supine_mesh_free. */
@@ -48,15 +47,15 @@ typedef struct supine_mesh {
 /** How to read a file. Zero-initialised: axes as the file says, units of 1 mm. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
-  double millimetres_per_unit; /**< scale to mm; 0: 1 */
+  double millimetres_per_unit; /**< length of the file's unit, mm; 0: 1 mm */
 } supine_mesh_load_options;
 
 /** Result of loading. */
 typedef struct supine_mesh_report {
-  size_t degenerate_faces;      /**< faces dropped: fewer than three different corners */
-  size_t unreferenced_vertices; /**< vertices dropped: part of no triangle */
+  size_t degenerate_faces;      /**< dropped faces with fewer than three different corners */
+  size_t unreferenced_vertices; /**< dropped vertices that are part of no triangle */
   supine_axes axes;             /**< axes assumed for the file */
-  bool axes_from_tag;           /**< the axes come from a SPACE tag */
+  bool axes_from_tag;           /**< whether the axes come from a SPACE tag */
 } supine_mesh_report;
 
 /** Read one surface: PLY and VTP directly, OBJ, STL and other formats through assimp. Polygons are
@@ -64,9 +63,9 @@ typedef struct supine_mesh_report {
  * order of first appearance.
  *
  * Counts are checked against the file's size, so truncated or corrupt files are refused. assimp
- * runs in its own process, so files on which an importer crashes or exceeds its limits are
- * refused too. Positions are rounded to float32. A name without a known ending is read as PLY or
- * STL if it begins with that word.
+ * runs in its own process, so files on which an importer crashes or exceeds its limits are refused
+ * too. Positions are rounded to float32. A file whose name has no known ending is read as PLY or
+ * STL if it begins with "ply" or "solid".
  *
  * @param path     file
  * @param options  NULL: defaults
@@ -82,10 +81,10 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
 /** Report whether `side`, mm, is a possible longest side of the bounding box of lungs.
- * @param other  output: the unit other than mm, a literal, in which this number is most likely;
- *               NULL if it is impossible in all of them */
+ * @param other  output: the unit other than mm in which this number is most likely, as a string
+ *             literal; NULL if it is impossible in all of them */
 bool supine_mesh_unit_is_likely(double side, const char **other);
-/** Find the length of "mm", "cm", "m", "um" or "in" in mm; return false for any other name. */
+/** Find the length in mm of "mm", "cm", "m", "um" or "in"; return false for any other name. */
 bool supine_mesh_unit_find(const char *name, double *millimetres);
 /** Name a unit of length: "mm", "cm", "m", "um", "in" or, for any other, "2.5 mm".
  * @param text  [24] output */
@@ -94,7 +93,7 @@ void supine_mesh_unit_name(double millimetres, char *text);
 /** Free the arrays and zero the struct; a zeroed struct is legal. */
 void supine_mesh_free(supine_mesh *mesh);
 
-/** The edges and vertex adjacency of a mesh. */
+/** The edges and connected components of a mesh. */
 typedef struct supine_topology {
   size_t edge_count;
   uint32_t *edges;           /**< [edge_count, 2] vertex pairs, first < second, sorted */
@@ -102,12 +101,11 @@ typedef struct supine_topology {
   size_t non_manifold_edges; /**< edges shared by three or more triangles */
   size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
   size_t component_count;    /**< connected components, over shared vertices */
-  uint32_t *component;       /**< [vertex_count] component of each vertex, numbered by first
-                              * appearance */
-  long euler_characteristic; /**< V - E + F */
-  long genus;  /**< (2 * components - euler_characteristic) / 2 of a closed surface, else -1;
-                * also -1 if touching parts give no whole number >= 0 */
-  bool closed; /**< every edge joins exactly two triangles, consistently */
+  uint32_t *component;       /**< [vertex_count], numbered by first appearance */
+  long euler_characteristic; /**< vertices - edges + triangles */
+  long genus;  /**< of a closed surface, (2 * component_count - euler_characteristic) / 2; -1 if the
+                  surface is not closed or this is no whole number >= 0 */
+  bool closed; /**< whether every edge joins exactly two triangles of the same orientation */
 } supine_topology;
 
 /** Find edges and components, in linear time and memory except for sorting each vertex's edges.
@@ -132,17 +130,16 @@ void supine_mesh_reverse(const supine_mesh *mesh);
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 
 /** Compute the unit normal of each vertex [vertex_count, 3], the area-weighted mean of the normals
- * of its triangles; 0 if that is 0. */
+ * of its triangles, normalised; 0 where the mean is 0. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
 /** Return the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
- * vertices move to `vertices` [vertex_count, 3]. Above a few in a thousand the surface looks torn.
- */
+ * vertices move to `vertices`. Above a few in a thousand the surface looks torn. */
 double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
 /** Numbers that describe a whole surface, for the field data of VTP. */
 typedef struct supine_mesh_field {
-  const char *name; /**< including its unit: "volume_mL" */
+  const char *name; /**< name with a unit: "volume_mL" */
   size_t count;
   const double *values; /**< [frames, count]; one frame except in a series */
 } supine_mesh_field;
@@ -153,16 +150,17 @@ typedef struct supine_mesh_save_options {
   const double *from;  /**< optional [vertex_count, 3] starting points of displacements, mm: VTP
                             and PLY files then contain displacements and their magnitudes */
   const char *comment; /**< optional, one line */
-  double millimetres_per_unit; /**< unit of positions and displacements in the file; 0: 1 */
-  const float *expected_error; /**< optional [vertex_count], mm in every unit: point data
-                                    "expected_error_mm" of VTP and PLY */
+  double millimetres_per_unit; /**< unit of positions and displacements; 0: 1 mm */
+  const float *expected_error; /**< optional [vertex_count] in mm, whatever the file's unit: point
+                                  data "expected_error_mm" of VTP and PLY */
   /** @{ For VTP only, all optional. */
   const float *normals;            /**< [vertex_count, 3] point data "Normals" */
   const unsigned char *lung;       /**< [vertex_count] index of the lung, point data "lung" */
   const supine_mesh_field *fields; /**< [field_count] */
   size_t field_count;
-  double rounding; /**< mm: lengths are rounded to multiples of the largest power of two, in the
-                        file's unit, not above it, and normals to 1/256; 0: exact */
+  double rounding; /**< lengths are rounded to multiples of the largest power of two, in the file's
+                      unit, that is not above this length in mm, and normals to 1/256; 0: not
+                      rounded */
   /** @} */
 } supine_mesh_save_options;
 
@@ -176,14 +174,14 @@ typedef struct supine_mesh_save_options {
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
-/** Surfaces of one topology over time in one VTP file, in the form of time that VTK and ParaView
- * read: triangles once, every array compressed. The field data holds the times, "time_s", and each
- * of the fields, with one tuple for each frame. The file appears whole or not at all. */
+/** A VTP file of a surface that moves over time, in the form that VTK and ParaView read: the
+ * triangles once, every array compressed. The field data hold the times, "time_s", and all fields,
+ * with one tuple for each frame. The file appears completely or not at all. */
 typedef struct supine_mesh_series supine_mesh_series;
 
-/** Begin a series. All arguments must outlive it; before each frame the caller updates the
- * arrays of `mesh->vertices` and `options->normals`.
- * @param times  [frames] s
+/** Begin a series. All arguments must outlive it; before each frame the caller updates the arrays
+ * `mesh->vertices` and `options->normals`.
+ * @param times  [frames] in s
  * @retval SUPINE_ERROR_WRITE  also if the path is a pipe or device: offsets are written last
  * @retval those of supine_mesh_save
  * @retval SUPINE_ERROR_MEMORY */
@@ -207,7 +205,7 @@ void supine_mesh_series_close(supine_mesh_series *series);
 #define SUPINE_MESH_ENDING(name) "." #name
 #define SUPINE_MESH_NEXT_ENDING(name) ", ." #name
 
-/** Report whether `path` has one of those endings. */
+/** Report whether `path` ends in one of SUPINE_MESH_ENDINGS. */
 bool supine_mesh_save_supports(const char *path);
 
 #endif

@@ -13,7 +13,7 @@
 static const double most_loose = 0.01;
 
 typedef struct links {
-  uint32_t *parent; /* [triangles] union-find tree of each surface */
+  uint32_t *parent; /* [triangles] union-find forest: a tree for each surface */
   uint8_t *turned;  /* [triangles] 1 if a triangle faces against its parent, else 0 */
 } links;
 
@@ -38,7 +38,7 @@ static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sid
   }
 }
 
-/* Mark triangles that share no edge with exactly one other triangle. */
+/* Mark triangles without an edge that exactly two triangles share; none if there are too many. */
 static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -89,7 +89,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
 }
 
 /* Link triangles across edges that belong to two of them; return false if they form a one-sided
- * surface. `closed` is true if every edge belongs to an even number of triangles. */
+ * surface. Set `closed` to whether every edge belongs to an even number of triangles. */
 static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides, const links *l,
                            bool *closed) {
   const size_t count = 3 * mesh->triangle_count;
@@ -253,11 +253,11 @@ size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {
 }
 
 typedef struct piece {
-  double volume;  /* mm^3, about its first vertex */
-  uint32_t first; /* vertex */
+  double volume;  /* mm^3, positive if it faces outwards */
+  uint32_t first; /* first vertex of the component */
 } piece;
 
-/* Find the volume of each component about its first vertex. */
+/* Find the first vertex and the volume of each component. */
 static void find_volumes(const supine_mesh *mesh, const supine_topology *topology, piece *pieces) {
   for (size_t i = mesh->vertex_count; i-- > 0;) {
     pieces[topology->component[i]].first = (uint32_t)i;

@@ -6,17 +6,17 @@
 #include "mesh/mesh.h"
 
 typedef struct supine_mesh_repair_report {
-  size_t duplicates; /**< triangles dropped: same corners as an earlier one */
-  size_t loose;      /**< triangles dropped: none of its edges has exactly two triangles */
+  size_t duplicates; /**< dropped triangles with the corners of an earlier one */
+  size_t loose;      /**< dropped triangles without an edge that exactly two triangles share */
   size_t reversed;   /**< triangles reversed to face like most of their surface */
-  size_t separated;  /**< vertices added where closed surfaces shared one */
+  size_t separated;  /**< vertices added where closed surfaces shared a vertex */
 } supine_mesh_repair_report;
 
 /** Repair a surface in place. A surface without defects is not changed.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
-/** Drop vertices in no triangle, keeping the order of the others; return how many.
+/** Drop vertices in no triangle, keeping the order of the others; return the number dropped.
  * @param space  [vertex_count] work space */
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
@@ -33,8 +33,7 @@ typedef struct supine_mesh_side {
   uint32_t at; /**< 3 * triangle + corner that the side starts at */
 } supine_mesh_side;
 
-/** Sort the sides of all triangles by low, then high, then at; NULL if out of memory. The caller
- * frees them. */
+/** Sort all triangles' sides by low, high, at; NULL if out of memory. The caller frees them. */
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
 
 /** Return how many of `count` sorted sides belong to the edge whose first side is i. */

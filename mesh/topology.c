@@ -4,7 +4,7 @@
 
 #include "mesh/repair.h"
 
-enum { FEW = 24 }; /* up to so many sides, insertion sort is faster than qsort */
+enum { FEW = 24 }; /* largest number of sides for which insertion sort is faster than qsort */
 
 static int compare_sides(const void *left, const void *right) {
   const supine_mesh_side *a = left;
@@ -13,13 +13,13 @@ static int compare_sides(const void *left, const void *right) {
                             : (a->at > b->at) - (a->at < b->at);
 }
 
-/* Sort sides with the same lower end. */
+/* Sort sides with the same lower vertex by their higher vertex, then by `at`. */
 static void sort_sides(supine_mesh_side *sides, size_t count) {
   if (count > FEW) {
     qsort(sides, count, sizeof *sides, compare_sides);
     return;
   }
-  for (size_t i = 1; i < count; ++i) { /* insertion; equal ends keep their order */
+  for (size_t i = 1; i < count; ++i) { /* insertion sort, which keeps `at` ascending */
     const supine_mesh_side side = sides[i];
     size_t j = i;
     for (; j > 0 && sides[j - 1].high > side.high; --j) {
@@ -31,15 +31,14 @@ static void sort_sides(supine_mesh_side *sides, size_t count) {
 
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
   const size_t count = 3 * mesh->triangle_count;
-  uint32_t *next =
-      calloc(mesh->vertex_count + 2, sizeof *next); /* index for the next side of a vertex */
+  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next); /* index of a vertex's next side */
   supine_mesh_side *sides = malloc((count + 1) * sizeof *sides);
   if (next == NULL || sides == NULL) {
     free(next);
     free(sides);
     return NULL;
   }
-  for (int pass = 0; pass < 2; ++pass) { /* count, then place */
+  for (int pass = 0; pass < 2; ++pass) { /* count the sides, then place them */
     for (size_t i = 0; i < count; ++i) {
       const uint32_t a = mesh->triangles[i];
       const uint32_t b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];
@@ -92,7 +91,7 @@ static void edges_fill(const supine_mesh_side *sides, size_t count, uint32_t *ed
   }
 }
 
-/* Find the first vertex of i's tree, with path compression. */
+/* Find the root of i's tree, the lowest index in it, with path compression. */
 static uint32_t tree_root(uint32_t *parent, uint32_t i) {
   while (parent[i] != i) {
     parent[i] = parent[parent[i]];
@@ -111,8 +110,7 @@ static void components_find(size_t vertex_count, supine_topology *topology) {
     const uint32_t b = tree_root(parent, topology->edges[2 * e + 1]);
     parent[a > b ? a : b] = a < b ? a : b;
   }
-  /* Number the components in one pass: a vertex takes the number of its parent, whose index is
-   * lower. */
+  /* Number the components: a vertex takes the number of its parent, whose index is lower. */
   for (size_t i = 0; i < vertex_count; ++i) {
     parent[i] = parent[i] == i ? (uint32_t)topology->component_count++ : parent[parent[i]];
   }

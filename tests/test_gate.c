@@ -238,7 +238,7 @@ TEST(test_gate_many_pieces_reported) {
     append(&mesh, 4, at[0], 4, tetrahedron[0], true);
   }
   outcome out = pass(&mesh, NULL);
-  expect_said(&out, "warning: 8 pieces; remove those that are not lung");
+  expect_said(&out, "warning: 8 pieces; remove the pieces that are not lung");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }

@@ -620,7 +620,7 @@ TEST(test_labels_bad_maps_refused) {
       {"left=-1", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=1,right=2", SUPINE_ERROR_MESH, "the other way round"},
       {"left=2,right=3", SUPINE_ERROR_MESH, "gives the right lung"},
-      {"totalsegmentator", SUPINE_ERROR_MESH, "the left lung; the labels there are 1, 2"},
+      {"totalsegmentator", SUPINE_ERROR_MESH, "the left lung; the labels present are 1, 2"},
       {"left=9", SUPINE_ERROR_MESH, "gives the left lung"},
   };
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);

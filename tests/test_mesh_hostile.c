@@ -263,7 +263,7 @@ TEST(test_ply_list_of_negative_length_refused) {
   static const char ascii[] = PLY_ASCII
       "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
       "property list int int vertex_indices\nend_header\n1 2 3\n-3 0 0 0\n";
-  refuse_bytes(state, ascii, sizeof ascii - 1, "the length of a list is -3");
+  refuse_bytes(state, ascii, sizeof ascii - 1, "a list has the length -3");
   unsigned char bytes[512] = {0};
   static const char *const types[] = {"char", "short", "int"};
   for (int k = 0; k < 3; ++k) {
@@ -275,7 +275,7 @@ TEST(test_ply_list_of_negative_length_refused) {
     memset(bytes + head, 0, sizeof bytes - head);
     memset(bytes + head + 12, 0xFF, (size_t)1 << k);
     bytes[head + 12 + ((size_t)1 << k) - 1] = 0xFD;
-    refuse_bytes(state, bytes, sizeof bytes, "the length of a list is -3");
+    refuse_bytes(state, bytes, sizeof bytes, "a list has the length -3");
   }
 }
 

@@ -62,7 +62,7 @@ SUPINE_CLONES void supine_image_gather(const supine_image *image, size_t from, c
 
 static double clip(double value, double low, double high) {
   const double whole = rint(value);
-  return whole > low ? (whole < high ? whole : high) : low; /* low if it is not a number */
+  return whole > low ? (whole < high ? whole : high) : low; /* NaN becomes `low` */
 }
 
 #define PUT(type, number)                                                                          \
@@ -103,7 +103,7 @@ void supine_image_set_axes(supine_image *image, supine_axes axes) {
   supine_mesh_axes_matrix(image->axes, from);
   for (int v = 0; v < 4; ++v) {
     const double p[3] = {vectors[v][0], vectors[v][1], vectors[v][2]};
-    for (int k = 0; k < 3; ++k) { /* as in the header */
+    for (int k = 0; k < 3; ++k) { /* back to the header's coordinates */
       vectors[v][k] = from[0][k] * p[0] + from[1][k] * p[1] + from[2][k] * p[2];
     }
     supine_mesh_axes_apply(axes, 1.0, vectors[v]);

@@ -23,7 +23,7 @@ static const struct {
 
 enum { FORMATS = sizeof formats / sizeof *formats };
 
-/* Return the index of the format by the ending; FORMATS if there is none. */
+/* Return the index of the format with the path's ending; FORMATS if there is none. */
 static size_t format_of(const char *path) {
   size_t f = 0;
   while (f < FORMATS && !supine_text_ends_in_any_case(path, formats[f].ending)) {
@@ -45,8 +45,8 @@ bool supine_image_is_named(const char *path) {
   return is;
 }
 
-/* Report whether the frame is finite and its three directions are independent: they span a volume
- * of more than a thousandth of that of orthogonal ones. */
+/* Report whether the frame is finite and its steps are independent: the volume they span must
+ * exceed a thousandth of the product of their lengths. */
 static bool is_frame(const supine_image *image) {
   double lengths = 1.0;
   for (int a = 0; a < 3; ++a) {
@@ -67,7 +67,7 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   if (!supine_image_supports(path)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert "
-                            "others, as by 3D Slicer or 'plastimatch convert'",
+                            "others, for example with 3D Slicer",
                             path);
   }
   if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {

@@ -10,16 +10,16 @@
 
 /* How a file stores its voxels. */
 typedef struct image_storage {
-  int64_t offset;          /* bytes before the voxels, or before their compressed stream */
-  int64_t skip;            /* bytes before the voxels in the compressed stream */
-  bool packed;             /* compressed by zlib or gzip */
-  bool text;               /* decimal numbers */
-  bool big;                /* most significant byte first */
-  int integer;             /* 64-bit integers, read as F64: 1 signed, -1 unsigned; else 0 */
-  double slope, intercept; /* of the numbers; slope 0: none */
+  int64_t offset; /* bytes before the voxels, or before their compressed stream */
+  int64_t skip;   /* bytes before the voxels in the unpacked stream */
+  bool packed;    /* compressed by zlib or gzip */
+  bool text;      /* voxels are decimal numbers */
+  bool big;       /* most significant byte first */
+  int integer;    /* 64-bit integers, read as F64: 1 signed, -1 unsigned; 0: another type */
+  double slope, intercept; /* scale of the numbers; slope 0: not scaled */
 } image_storage;
 
-/* Read the header: fill the image except its voxels, and how these are stored.
+/* Read the header, and fill `storage` and the image except its voxels.
  * Return SUPINE_ERROR_FORMAT, SUPINE_ERROR_READ or SUPINE_ERROR_MEMORY. */
 typedef supine_status image_describe(const char *path, supine_image *image, image_storage *storage,
                                      supine_error *error);
@@ -34,19 +34,19 @@ image_write supine_image_write_nrrd, supine_image_write_nifti, supine_image_writ
 /* Formats of compressed streams; the values are zlib's window bits. */
 enum { IMAGE_ZLIB = 15, IMAGE_GZIP = 31 };
 
-/* Read the voxels; refuse more than a file of `file_size` bytes can hold, streams that are
- * incomplete, and wrong checksums.
+/* Read the voxels. Refuse more voxels than a file of `file_size` bytes can hold, incomplete
+ * streams, and wrong checksums.
  * Return SUPINE_ERROR_FORMAT, SUPINE_ERROR_READ or SUPINE_ERROR_MEMORY. */
 supine_status supine_image_read_voxels(const char *path, size_t file_size,
                                        const image_storage *storage, supine_image *image,
                                        supine_error *error);
 
-/* Compress `head` and the voxels into the file, as IMAGE_ZLIB or IMAGE_GZIP; return
+/* Compress `head` and the voxels `values` into the file, as IMAGE_ZLIB or IMAGE_GZIP; return
  * SUPINE_ERROR_MEMORY if that fails. */
 supine_status supine_image_pack(int format, const void *head, size_t head_size,
                                 const supine_image *image, const void *values, FILE *file);
 
-/* Return the size of the voxels, bytes. */
+/* Return the size of the voxels in bytes. */
 size_t supine_image_bytes(const supine_image *image);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Run assimp in its own process: on a corrupt file its importers may crash, leak, or use all
- * time and memory, which then ends only that process. */
+/* Run assimp in a process of its own: on a corrupt file its importers may crash, leak, or exceed
+ * their time or memory, which then ends only that process. */
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -65,7 +65,7 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           length == 0 ? "the importer failed" : line);
 }
 
-/* Import the bytes of a file in the format `kind`, or, if that is NULL, the file itself. */
+/* Import a file: its bytes in the format `kind`, or, if `kind` is NULL, from its path. */
 static const struct aiScene *import(const assimp *ai, const mesh_file *file, const char *kind) {
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Without this, importers add a surface to files that hold only a skeleton. */
@@ -101,7 +101,7 @@ static bool take_vertices(const struct aiMesh *part, const struct aiMatrix4x4 *t
   return true;
 }
 
-/* Add the faces of a part, whose vertices are the last ones of the mesh. */
+/* Add the faces of a part whose vertices have just been added to the mesh. */
 static bool take_faces(const struct aiMesh *part, bool mirrored, gathering *out) {
   const size_t first = out->mesh.vertex_count - part->mNumVertices;
   bool good = true;
@@ -139,13 +139,13 @@ static void confine(size_t bytes) {
   const struct rlimit none = {0, 0};
   (void)setrlimit(RLIMIT_CPU, &time);
   (void)setrlimit(RLIMIT_CORE, &none);
-#ifndef SUPINE_SANITIZED /* sanitizers reserve terabytes */
+#ifndef SUPINE_SANITIZED /* sanitizers reserve terabytes of addresses */
   const struct rlimit memory = {(rlim_t)GIGABYTES_MOST << 30, (rlim_t)GIGABYTES_MOST << 30};
   (void)setrlimit(RLIMIT_AS, &memory);
 #endif
   static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
   for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
-    (void)signal(signals[i], SIG_DFL); /* handlers of the parent would delete its outputs */
+    (void)signal(signals[i], SIG_DFL); /* the parent's handlers delete its output files */
   }
   (void)alarm(10 * (unsigned)seconds); /* ends the process if it blocks */
   (void)freopen("/dev/null", "w", stderr);
@@ -174,7 +174,7 @@ static _Noreturn void be_child(const mesh_file *file, const char *kind, size_t b
   (void)fwrite(out.mesh.vertices, 3 * sizeof(double), result.vertex_count, stream);
   (void)fwrite(out.mesh.triangles, 3 * sizeof(uint32_t), result.triangle_count, stream);
   (void)fflush(stream);
-  _exit(0); /* also frees the scene */
+  _exit(0); /* the end of the process frees the scene */
 }
 
 /* Read the outcome and the surface that the child process wrote. */
@@ -234,9 +234,9 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
   return import_file(file, NULL, mesh, dropped, error);
 }
 
-/* Check that every line beginning with `keyword` has three numbers, as assimp accepts others;
- * return the number of a bad line, or 0. Turn lines that name a file of materials into comments,
- * because a surface needs no colours. `last` is set to the first word of the last line. */
+/* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
+ * not; return the number of the first wrong line, or 0. Turn mtllib lines, which name a file of
+ * colours, into comments. `last` is set to the first word of the last line. */
 static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;

@@ -16,7 +16,7 @@ static supine_status cannot_read(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
 }
 
-/* Return the reader by the ending of the name, else by the first word of the file; NULL if none. */
+/* Return the reader for the name's ending, or else the file's first word; NULL if none. */
 static mesh_reader *find_reader(const mesh_file *file) {
   static const struct {
     const char *ending;
@@ -69,7 +69,7 @@ static supine_status check_file(const char *path, size_t *size, supine_error *er
                     : SUPINE_OK;
 }
 
-/* Find the axes named in the file's head as 3D Slicer writes them, SPACE=LPS. */
+/* Find the axes in the head of the file, where 3D Slicer writes SPACE=LPS. */
 static void find_space(mesh_file *file) {
   char head[4096];
   char letters[4] = "";
@@ -131,8 +131,8 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   }
   if (file->tagged && file->space == SUPINE_AXES_AUTO) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its SPACE tag is not three letters such as LPS or RAS; name "
-                            "them, as --axes LPS",
+                            "%s: its SPACE tag is not three letters such as LPS or RAS; give "
+                            "the axes, for example --axes LPS",
                             file->path);
   }
   report->axes = file->tagged ? file->space : SUPINE_AXES_LPS;
@@ -143,7 +143,7 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
 /* Largest coordinate, mm, that single precision resolves to 1 mm. */
 static const double farthest = 1e7;
 
-/* Convert to millimetres and LPS. */
+/* Convert the vertices to millimetres and LPS. */
 static supine_status convert(const char *path, double scale, supine_axes axes, supine_mesh *mesh,
                              supine_error *error) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {

@@ -17,7 +17,7 @@ enum { HEADER_MAX = 1 << 16 };
 static const struct {
   const char *name;
   supine_image_voxel voxel;
-  bool wide; /* 64-bit integers, read as F64 */
+  bool wide; /* 64-bit integers, which are read as F64 */
 } types[] = {{"MET_CHAR", SUPINE_VOXEL_I8, false},      {"MET_UCHAR", SUPINE_VOXEL_U8, false},
              {"MET_SHORT", SUPINE_VOXEL_I16, false},    {"MET_USHORT", SUPINE_VOXEL_U16, false},
              {"MET_INT", SUPINE_VOXEL_I32, false},      {"MET_UINT", SUPINE_VOXEL_U32, false},
@@ -29,14 +29,14 @@ enum { TYPES = sizeof types / sizeof *types };
 
 enum { KEYS_MAX = 128 };
 
-/* Lines "Key = value" of a header, in the text itself. */
+/* The "Key = value" lines of a header, as pointers into its text. */
 typedef struct header {
   size_t count;
   const char *key[KEYS_MAX], *value[KEYS_MAX];
   size_t length; /* bytes before the voxels */
 } header;
 
-/* Find the last value of any of up to three keys; "" if there is none. */
+/* Find the last value of any of up to three keys (unused ones: ""); return "" if there is none. */
 static const char *value_of(const header *h, const char *key, const char *second,
                             const char *third) {
   const char *value = "";
@@ -53,7 +53,7 @@ static bool is_true(const char *value) {
   return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
 }
 
-/* Parse a list of `count` numbers; an empty text leaves them as they are. */
+/* Parse `count` numbers. An empty text leaves `values` unchanged; a malformed one returns false. */
 static bool numbers(const char *text, double *values, size_t count) {
   bool good = true;
   for (size_t i = 0; i < count && good && *text != '\0'; ++i) {
@@ -98,10 +98,10 @@ static const char *check(const header *h) {
   const char *object = value_of(h, "ObjectType", "", "");
   const char *binary = value_of(h, "BinaryData", "", "");
   if (*object != '\0' && strcasecmp(object, "Image") != 0) {
-    return "it is not an image; give one";
+    return "it is not an image; give an image";
   }
   if (strcasecmp(value_of(h, "ElementDataFile", "", ""), "LOCAL") != 0) {
-    return "the voxels are in another file; save them in one (.mha)";
+    return "the voxels are in another file; save header and voxels in one .mha";
   }
   if (*binary != '\0' && !is_true(binary)) {
     return "voxels as text are not read; save them as binary";
@@ -131,14 +131,14 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
     return "a list of its header has too few numbers; save it again";
   }
   if (channels != 1.0 || (n == 4 && size[3] != 1.0)) {
-    return channels != 1.0 ? "several numbers per voxel; give one" : "several volumes; give one";
+    return channels != 1.0 ? "several numbers per voxel; save one" : "several volumes; save one";
   }
   size_t type = 0;
   while (type < TYPES && strcmp(name, types[type].name) != 0) {
     ++type;
   }
   if (type == TYPES) {
-    return "its ElementType is not read; save it as MET_SHORT";
+    return "its ElementType is not supported; save it as MET_SHORT";
   }
   bool framed = false;
   *type_index = type;
@@ -225,7 +225,7 @@ static void write_header(const supine_image *image, const char *note, size_t pac
 
 supine_status supine_image_write_mha(const char *path, const supine_image *image, const char *note,
                                      FILE *file, supine_error *error) {
-  char *packed = NULL; /* the header states its size */
+  char *packed = NULL; /* compressed in memory, as the header states the compressed size */
   size_t size = 0;
   FILE *memory = open_memstream(&packed, &size);
   supine_status status = memory == NULL

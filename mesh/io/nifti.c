@@ -34,7 +34,7 @@ static bool forms_differ(const nifti_image *nifti) {
   return nifti->sform_code > 0 && nifti->qform_code > 0 && farthest >= 0.5 * voxel;
 }
 
-/* Check size, type and frame; NIfTI is RAS. */
+/* Check size and type, and convert the frame from RAS, NIfTI's axes. */
 static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
                            image_storage *storage, supine_error *error) {
   const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
@@ -46,7 +46,7 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
   if (nifti->ndim < 3 || nifti->nx * nifti->ny * nifti->nz != nifti->nvox) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: %d axes; give an image with one number per voxel, three axes and one volume", path,
+        "%s: ndim is %d; give an image with one number per voxel, three axes and one volume", path,
         (int)nifti->ndim);
   }
   if (nifti->sform_code <= 0 && nifti->qform_code <= 0) {
@@ -102,7 +102,7 @@ supine_status supine_image_describe_nifti(const char *path, supine_image *image,
   return status;
 }
 
-/* Make the header of 348 bytes, and 4 bytes 0: no extension follows. */
+/* Make the header: 348 bytes, then four zero bytes, which say that no extension follows. */
 static void make_header(const supine_image *image, const char *note, unsigned char header[352]) {
   nifti_1_header h = {0};
   static const short bits[SUPINE_VOXEL_COUNT] = {8, 8, 16, 16, 32, 32, 32, 64};
@@ -128,7 +128,7 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
     }
     rows[a][3] = (float)(a < 2 ? -image->origin[a] : image->origin[a]);
   }
-  if (image->channels == 3) { /* the fifth axis is the vector's in this format */
+  if (image->channels == 3) { /* NIfTI stores the components of vectors along the fifth axis */
     h.dim[0] = 5;
     h.dim[5] = 3;
     h.pixdim[4] = h.pixdim[5] = 1.0F;
@@ -140,9 +140,9 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
   memcpy(header, &h, sizeof h);
 }
 
-/* Separate the components of the vectors; NULL if out of memory. They stay in LPS: ITK and ANTs do
- * not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the first component of
- * NIFTI_INTENT_DISPVECT. */
+/* Store each component of the vectors contiguously; NULL if out of memory. The vectors stay in LPS:
+ * ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the first
+ * component of NIFTI_INTENT_DISPVECT. */
 static float *planes(const supine_image *image) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   float *made = malloc(3 * count * sizeof *made);
@@ -159,8 +159,8 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
   if ((image->channels != 1 && !vectors) || image->size[0] > INT16_MAX ||
       image->size[1] > INT16_MAX || image->size[2] > INT16_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: NIfTI-1 has one number or a vector of three per voxel and at most "
-                            "%d voxels a side: write .nrrd",
+                            "%s: NIfTI-1 holds one number or a 3-vector per voxel, and at most "
+                            "%d voxels along an axis: write .nrrd",
                             path, INT16_MAX);
   }
   float *planar = vectors ? planes(image) : NULL;

@@ -43,13 +43,13 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                            supine_image *image, image_storage *storage, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: the voxels are in another file; save them in one", path);
+                            "%s: its voxels are in another file; save both as one", path);
   }
   if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        nrrd->dim != 3 ? "%s: %u axes; give an image with one number per voxel and three axes"
-                       : "%s: the header has no space directions of its %u axes",
+        nrrd->dim != 3 ? "%s: dimension %u; give an image with one number per voxel and three axes"
+                       : "%s: the header has no space directions for its %u axes",
         path, nrrd->dim);
   }
   double turn = 0.0;

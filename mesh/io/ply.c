@@ -12,7 +12,7 @@ typedef enum kind { VERTICES, FACES, STRIPS, OTHER } kind;
 typedef enum role { X, Y, Z, CORNERS, NONE } role;
 
 typedef struct property {
-  const mesh_type *count; /* NULL: not a list */
+  const mesh_type *count; /* type of the length of a list; NULL: not a list */
   const mesh_type *type;
   role role;
 } property;
@@ -28,9 +28,9 @@ typedef struct ply {
   const mesh_file *file;
   supine_error *error;
   encoding encoding;
-  mesh_text text; /* not yet read; in ASCII, `line` is the rest of the line */
+  mesh_text text; /* part of the file not yet read */
   mesh_text line;
-  unsigned present; /* bit 1 << role: an element with items has a property of that role */
+  unsigned present; /* bit 1 << role: an element with items has a property of this role */
   size_t element_count;
   size_t property_count;
   element elements[ELEMENTS_MAX];
@@ -38,7 +38,7 @@ typedef struct ply {
   mesh_faces faces;
 } ply;
 
-/* Find the index of a word in a NULL-terminated list, or of the NULL if it is not there. */
+/* Find the index of a word in a NULL-terminated list; if it is absent, the index of the NULL. */
 static int find_name(mesh_text word, const char *const *names) {
   int index = 0;
   while (names[index] != NULL && !supine_mesh_text_is(word, names[index])) {
@@ -55,7 +55,7 @@ static bool add_element(ply *in, mesh_text name, mesh_text count) {
   element *added = &in->elements[in->element_count];
   *added = (element){.kind = (kind)find_name(name, kinds), .first_property = in->property_count};
   for (size_t e = 0; added->kind != OTHER && e < in->element_count; ++e) {
-    if (in->elements[e].kind == added->kind) { /* a second one would be ambiguous */
+    if (in->elements[e].kind == added->kind) { /* ambiguous: two elements of one kind */
       return false;
     }
   }
@@ -63,7 +63,7 @@ static bool add_element(ply *in, mesh_text name, mesh_text count) {
   return supine_mesh_text_count(count, &added->count);
 }
 
-/* Add a property by the words after "property". */
+/* Add the property that the words after "property" describe. */
 static bool add_property(ply *in, const mesh_text *word, size_t words) {
   static const char *const columns[] = {"x", "y", "z", NULL};
   static const char *const corners[] = {"vertex_indices", "vertex_index", NULL};
@@ -148,7 +148,7 @@ static supine_status check_header(const ply *in) {
   static const unsigned needed = 1U << X | 1U << Y | 1U << Z | 1U << CORNERS;
   const char *path = in->file->path;
   for (size_t e = 0; e < in->element_count; ++e) {
-    if (in->elements[e].property_count == 0) { /* items without bytes, of any count */
+    if (in->elements[e].property_count == 0) { /* items of 0 bytes: any count would fit */
       return supine_error_set(
           in->error, SUPINE_ERROR_FORMAT,
           "%s: element %zu of the PLY header has no property; save the mesh again", path, e + 1);
@@ -212,7 +212,7 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
   }
   if (length < 0.0 || length > (double)INT64_MAX / 2) {
     return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                            "%s: the length of a list is %.0f; save the mesh again", in->file->path,
+                            "%s: a list has the length %.0f; save the mesh again", in->file->path,
                             length);
   }
   const uint64_t count = (uint64_t)length;
@@ -236,7 +236,7 @@ static supine_status take_items(ply *in, const element *of) {
   supine_status status = SUPINE_OK;
   for (uint64_t i = 0; status == SUPINE_OK && i < of->count; ++i) {
     if (in->encoding == ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
-      return cut_short(in, of, i); /* an item takes one line */
+      return cut_short(in, of, i); /* each item needs a line */
     }
     for (size_t p = 0; p < of->property_count && status == SUPINE_OK; ++p) {
       const property *item = &in->properties[of->first_property + p];
@@ -255,7 +255,7 @@ static supine_status take_items(ply *in, const element *of) {
 
 /* Allocate the vertices that the header announces, at most as many as the file can hold. */
 static supine_status make_room(const ply *in, const element *of, supine_mesh *mesh) {
-  uint64_t least = 0; /* bytes per item */
+  uint64_t least = 0; /* fewest bytes per item */
   for (size_t p = 0; p < of->property_count; ++p) {
     const property *item = &in->properties[of->first_property + p];
     least += in->encoding == ASCII ? 2 /* a digit and a blank */
@@ -288,7 +288,7 @@ supine_status supine_mesh_read_ply(mesh_file *file, supine_mesh *mesh, size_t *d
     const element *of = &in.elements[e];
     if (of->kind == FACES && mesh->vertices == NULL) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: its faces stand before its vertices; save the mesh again",
+                                "%s: its faces come before its vertices; save the mesh again",
                                 file->path);
     }
     status = status == SUPINE_OK && of->kind == VERTICES ? make_room(&in, of, mesh) : status;

@@ -24,7 +24,7 @@ static supine_status no_memory(const reading *r) {
   return supine_error_set(r->error, SUPINE_ERROR_MEMORY, "%s: out of memory", r->path);
 }
 
-/* Append a point given in the file's own axes. */
+/* Append a point given in the file's axes and unit, unless the options name others. */
 static supine_status add(reading *r, const double at[3], const char *name, supine_axes axes,
                          double unit) {
   supine_mesh_points *p = &r->points;
@@ -51,7 +51,7 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
   if (p->names[p->count] == NULL) {
     return no_memory(r);
   }
-  for (char *c = p->names[p->count]; *c != '\0'; ++c) { /* names are stored as lines */
+  for (char *c = p->names[p->count]; *c != '\0'; ++c) { /* names are stored one per line */
     *c = (unsigned char)*c < ' ' ? ' ' : *c;
   }
   ++p->count;

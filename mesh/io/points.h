@@ -7,8 +7,8 @@
 
 typedef struct supine_mesh_points {
   size_t count;
-  double *at;   /**< [count, 3] mm, LPS */
-  char **names; /**< [count] never NULL; numbered from 1 if the file has none */
+  double *at;   /**< [count, 3] positions, mm, LPS */
+  char **names; /**< [count] never NULL; "1", "2", ... if the file has no names */
 } supine_mesh_points;
 
 /** Read points from a CSV file with the columns x,y,z and optionally name (or label), or from 3D

@@ -11,22 +11,22 @@
 
 /* ---- tokens.c: lines and words of a file with any content. ---- */
 
-/** The bytes from `at` up to `end`, not NUL-terminated. */
+/** A text: the bytes from `at` up to `end`, not NUL-terminated. */
 typedef struct mesh_text {
   const unsigned char *at;
   const unsigned char *end;
 } mesh_text;
 
-/** Remove the next line, without its LF or CRLF, from `text`; false at the end. */
+/** Remove the next line from `text`, and return it without its LF or CRLF; false at the end. */
 bool supine_mesh_text_line(mesh_text *text, mesh_text *line);
 /** Remove the next word between blanks from `text`; false at the end. */
 bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
-/** Report whether the word is `expected`, in any case. */
+/** Report whether the word is `expected`, ignoring case. */
 bool supine_mesh_text_is(mesh_text word, const char *expected);
-/** Parse decimal digits; return false for anything else or values beyond 2^63. */
+/** Parse decimal digits; return false for anything else, or for a value near or above 2^63. */
 bool supine_mesh_text_count(mesh_text word, uint64_t *value);
-/** Remove the next word from `text` and parse it as a number as strtod does; false if there is
- * none or it is invalid. A 0 byte must follow the file's last. */
+/** Remove the next word from `text` and parse it with strtod; false if there is none or it is not a
+ * number. A NUL must follow the text. */
 bool supine_mesh_text_number(mesh_text *text, double *value);
 /** Parse three numbers, rounded to single precision. */
 bool supine_mesh_text_position(mesh_text *text, double position[3]);
@@ -34,33 +34,33 @@ bool supine_mesh_text_position(mesh_text *text, double position[3]);
 /** A type of binary numbers. */
 typedef struct mesh_type {
   const char *name;
-  unsigned size;  /**< bytes */
-  bool is_signed; /**< may be negative */
+  unsigned size; /**< in bytes */
+  bool is_signed;
   bool is_real;
 } mesh_type;
 
-/** Return the type with this name in PLY or VTP, in any case, or NULL. */
+/** Return the type that PLY or VTP calls `name`, ignoring case; NULL if there is none. */
 const mesh_type *supine_mesh_type_find(mesh_text name);
-/** Decode a number; big: most significant byte first. */
+/** Decode a number; `big` says that its most significant byte comes first. */
 double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big);
 
 /** A file being read. */
 typedef struct mesh_file {
   const char *path;
-  unsigned char *bytes; /**< the file, then a 0 */
+  unsigned char *bytes; /**< content of the file, then a NUL */
   size_t size;
-  bool tagged;       /**< the file has a SPACE tag */
+  bool tagged;       /**< whether the file has a SPACE tag */
   supine_axes space; /**< axes that the tag names; AUTO if unknown */
 } mesh_file;
 
-/** Refuse a text with NUL bytes or with a CR that no LF follows, which other readers would split
+/** Refuse a text with NUL bytes, or with a CR without an LF, which other readers would split
  * differently. Return false, with SUPINE_ERROR_FORMAT set, if it is refused. */
 bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
 /* ---- faces.c: faces added to a mesh that has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< corners of a face: the time to cut it grows with their square */
+  MESH_CORNERS_MAX = 1024, /**< most corners of a face, as cutting takes quadratic time */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
@@ -73,8 +73,8 @@ typedef struct mesh_faces {
   size_t dropped;  /**< points and lines skipped */
 } mesh_faces;
 
-/** Add a face, cut into triangles. If `count` exceeds MESH_CORNERS_MAX, `corners` may hold
- * fewer.
+/** Cut a face into triangles, and add them. If `count` exceeds MESH_CORNERS_MAX, so that the face
+ * is refused, `corners` may be shorter.
  * @retval SUPINE_ERROR_FORMAT  a corner that is not a vertex, too many corners */
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
@@ -83,7 +83,7 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
 
 /** Read a surface in the file's units and axes, not welded, in single precision. The caller frees
  * `mesh`, also after a failure. `dropped` is set to the number of faces that are points or lines.
- * A SPACE tag in a place that only this format has is noted in `file`. */
+ * If the format has its own place for a SPACE tag, the tag is stored in `file`. */
 typedef supine_status mesh_reader(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                   supine_error *error);
 mesh_reader supine_mesh_read_ply;
@@ -98,7 +98,7 @@ bool supine_mesh_import_knows(const char *ending);
 /* ---- weld.c ---- */
 
 /** Weld vertices at equal positions (the caller has turned -0 into 0), drop degenerate triangles,
- * then unused vertices, in place. Add to the counts of the report. */
+ * then unused vertices, in place. Add their numbers to the counts of the report. */
 supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
 
 #endif

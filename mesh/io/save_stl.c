@@ -9,7 +9,7 @@
 
 enum { HEADER = 80, FACET = 50 };
 
-/* Find the unit normal of three corners, 0 if they are collinear. */
+/* Find the unit normal of a triangle; 0 if its corners are collinear. */
 static void facet_normal(float corners[3][3], float normal[3]) {
   double side[2][3];
   for (int k = 0; k < 2; ++k) {

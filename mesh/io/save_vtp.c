@@ -20,14 +20,14 @@ typedef struct vtp vtp;
 /* Write the bytes of item `i` of an array to *at, and advance *at. */
 typedef void vtp_put(const vtp *file, size_t i, unsigned char **at);
 
-/* One array in all frames. */
+/* An array of the file, in all frames. */
 typedef struct vtp_array {
   const char *type;
   const char *name;
   unsigned components;
   size_t item; /* bytes per point or triangle: 1, 4 or 12 */
   size_t count;
-  bool constant; /* equal in all frames: written once */
+  bool constant; /* equal in all frames, so written once */
   vtp_put *put;
 } vtp_array;
 
@@ -36,19 +36,19 @@ struct vtp {
   vtp_array arrays[VTP_ARRAYS]; /* points, connectivity, offsets, then point data */
   size_t array_count;
   size_t frames;
-  const double *times; /* [frames] s; NULL: one surface, without a time */
-  uint64_t *offsets;   /* [frames, array_count] */
-  size_t next;         /* frame to write */
+  const double *times; /* [frames] times in s; NULL: one surface, without a time */
+  uint64_t *offsets;   /* [frames, array_count] positions of arrays, bytes after the head */
+  size_t next;         /* next frame to write */
   uint64_t written;    /* bytes of arrays written */
   size_t threads;
-  unsigned char *raw;       /* a block for each thread */
-  unsigned char *packed;    /* room for the blocks of any array */
-  uint64_t *sizes;          /* header of an array: 3 numbers, then the packed size of each block */
+  unsigned char *raw;    /* [threads, BLOCK] blocks before compression */
+  unsigned char *packed; /* compressed blocks of one array */
+  uint64_t *sizes;       /* header of an array: three numbers, then each block's compressed size */
   const vtp_array *packing; /* array being compressed */
 };
 
-/* BLOCK: bytes compressed together, a multiple of every item's size. LEVEL of libdeflate: 2 takes
- * 1.5 times as long for files 5 % smaller. */
+/* BLOCK: bytes compressed together, a multiple of every item's size. LEVEL of libdeflate: level 2
+ * takes 1.5 times as long for files 5 % smaller. */
 enum { BLOCK = 3 << 18, LEVEL = 1 };
 
 static size_t room_of_block(void) {
@@ -168,7 +168,7 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
       array->put(file, i * each + k, &at);
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
-    file->sizes[3 + i] = /* 0: out of memory */
+    file->sizes[3 + i] = /* 0 if out of memory */
         compressor == NULL
             ? 0
             : libdeflate_zlib_compress(compressor, raw, (size_t)(at - raw),
@@ -232,12 +232,12 @@ static void write_array(const vtp *file, size_t number, FILE *out) {
   }
 }
 
-/* Write the axes as the array SPACE for 3D Slicer, and as a comment for readers of text. "--" is
- * not allowed in an XML comment. */
+/* Write the axes, the unit and a comment as one XML comment, which must not hold "--". Non-ASCII
+ * bytes become "?", as the comment may end within a character. */
 static void write_notes(const mesh_writer *writer, FILE *out) {
   (void)fprintf(out, "<!-- SPACE=%s %s ", writer->space, writer->unit);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
-    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out); /* may end within a character */
+    (void)fputc((unsigned char)*c < 0x80 ? *c : '?', out);
     if (c[0] == '-' && (c[1] == '-' || c[1] == '\0')) {
       (void)fputc(' ', out);
     }
@@ -273,7 +273,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
-  if (file->times != NULL) { /* with one frame, "TimeValue" would be read as its time */
+  if (file->times != NULL) { /* named time_s, as TimeValue is the time of a file with one frame */
     write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
   }
   for (size_t i = 0; i < writer->options.field_count; ++i) {
@@ -400,7 +400,7 @@ supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *e
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
   vtp_foot(series->output.file);
-  (void)fseeko(series->output.file, 0, SEEK_SET); /* a failure shows in the stream */
+  (void)fseeko(series->output.file, 0, SEEK_SET); /* succeeded in supine_mesh_series_open */
   vtp_head(&series->file, series->output.file);
   return supine_output_commit(&series->output, error);
 }

@@ -72,7 +72,7 @@ static double rounded(const mesh_writer *writer, double length) {
 }
 
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
-  static const double steps = 256.0; /* a grid for normals of 0.1 degrees, if lengths have one */
+  static const double steps = 256.0; /* if lengths are rounded, so are normals, to 1/256 */
   for (size_t axis = 0; axis < 3; ++axis) {
     const double value = (double)writer->options.normals[3 * i + writer->source[axis]];
     const double turned = copysign(value, value * writer->factor[axis]);
@@ -81,7 +81,7 @@ void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal
 }
 
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
-  for (size_t axis = 0; axis < 3; ++axis) { /* + 0 turns -0 into 0 */
+  for (size_t axis = 0; axis < 3; ++axis) { /* adding 0 turns -0 into 0 */
     position[axis] =
         (float)(rounded(writer, writer->factor[axis] *
                                     writer->mesh->vertices[3 * i + writer->source[axis]]) +

@@ -5,19 +5,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ZLIB_CONST /* next_in is const */
+#define ZLIB_CONST /* makes zlib declare next_in const */
 #include <zlib.h>
 
 #include "mesh/io/image_formats.h"
 
 enum { PIECE = 1 << 16, ANY_HEADER = 32 };
 
-/* Read `size` bytes after the first `skip` of the stream, and check its checksum. */
+/* Unpack a stream: skip `skip` bytes, keep the next `size` in `values`, check all checksums. */
 static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size) {
   unsigned char packed[PIECE];
-  unsigned char discarded[PIECE]; /* bytes before and after the wanted ones */
+  unsigned char discarded[PIECE]; /* bytes that are not stored */
   z_stream z = {.avail_in = 0};
-  uint64_t from = 0; /* bytes unpacked */
+  uint64_t from = 0; /* bytes unpacked so far */
   const uint64_t end = skip + size;
   int result = inflateInit2(&z, ANY_HEADER + MAX_WBITS);
   while (result == Z_OK) {
@@ -30,7 +30,7 @@ static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_
     const unsigned given = (unsigned)(room < PIECE ? room : PIECE);
     z.next_out = wanted ? values + (from - skip) : discarded;
     z.avail_out = given;
-    result = inflate(&z, Z_NO_FLUSH); /* Z_BUF_ERROR at the end of the file */
+    result = inflate(&z, Z_NO_FLUSH); /* returns Z_BUF_ERROR at the end of the file */
     from += given - z.avail_out;
     if (result == Z_STREAM_END && from < end) { /* another stream follows */
       result = inflateReset(&z);
@@ -60,7 +60,7 @@ static void widen(unsigned char *at, size_t count, bool is_signed) {
   }
 }
 
-/* Convert the voxels to F32, slope x number + intercept, unless that changes nothing. */
+/* Convert the voxels to F32 as slope x number + intercept, unless that changes nothing. */
 static supine_status rescale(const char *path, const image_storage *storage, supine_image *image,
                              supine_error *error) {
   const double slope = storage->slope;
@@ -96,7 +96,7 @@ static bool read_text(FILE *file, supine_image *image, size_t count) {
 supine_status supine_image_read_voxels(const char *path, size_t file_size,
                                        const image_storage *storage, supine_image *image,
                                        supine_error *error) {
-  static const double gzip_ratio = 1032.0; /* largest expansion of a byte */
+  static const double gzip_ratio = 1032.0; /* most bytes that one byte expands to */
   const size_t each = supine_image_voxel_size(image->voxel);
   const double bytes =
       (double)image->size[0] * (double)image->size[1] * (double)image->size[2] * (double)each;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Read VTK XML PolyData as Supine, VTK and 3D Slicer write it: one piece, points and polygons in
- * arrays that are text, base64 or appended, raw or base64, plain or compressed by zlib. */
+/* Read VTK XML PolyData as Supine, VTK and 3D Slicer write it: one piece, whose arrays are text,
+ * base64, or appended (raw or base64), and uncompressed or compressed by zlib. */
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,22 +13,22 @@
 typedef struct vtp_file {
   const mesh_file *file;
   const char *bytes, *end; /* `bytes` ends with a NUL, but may contain others */
-  const char *appended;    /* first byte after the underscore; NULL: none */
+  const char *appended;    /* first byte of the appended data; NULL: none */
   bool appended_raw, compressed;
-  size_t header_size; /* bytes of each size before an array: 4 or 8 */
+  size_t header_size; /* bytes of each integer in the header of an array: 4 or 8 */
 } vtp_file;
 
 /* An XML element. */
 typedef struct element {
-  const char *at, *end; /* its attributes, name="value" */
-  const char *body;     /* the text after its > */
+  const char *at, *end; /* attributes, name="value" */
+  const char *body;     /* text after the > of the tag */
 } element;
 
 static supine_status malformed(const vtp_file *v, const char *what, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", v->file->path, what);
 }
 
-/* Find the first element of this name between two places; false if there is none. */
+/* Find the first element of this name between `from` and `to`; false if there is none. */
 static bool find_element(const char *from, const char *to, const char *name, element *found) {
   const size_t length = strlen(name);
   for (const char *at = from; at < to && (at = memchr(at, '<', (size_t)(to - at))) != NULL; ++at) {
@@ -45,7 +45,7 @@ static bool find_element(const char *from, const char *to, const char *name, ele
   return false;
 }
 
-/* Copy the value of an attribute, cut off at `size`; false if there is none. */
+/* Copy the value of an attribute, truncated to `size` bytes; false if there is none. */
 static bool attribute(const element *e, const char *name, char *value, size_t size) {
   const size_t length = strlen(name);
   for (const char *at = e->at; at + length + 2 < e->end; ++at) {
@@ -76,9 +76,9 @@ static uint64_t little(const unsigned char *bytes, size_t size) {
   return value;
 }
 
-/* Decode base64 up to the first other character; streams may follow each other, each padded to
- * whole groups. Return the number of bytes.
- * @param bytes  room for 3 bytes for each 4 characters */
+/* Decode base64 up to the first character that is not base64. Several streams may follow each
+ * other, each padded to groups of four characters. Return the number of bytes.
+ * @param bytes  output: room for 3 bytes for each 4 characters */
 static size_t base64(const char *at, const char *end, unsigned char *bytes) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   unsigned char *to = bytes;
@@ -106,9 +106,9 @@ static size_t base64(const char *at, const char *end, unsigned char *bytes) {
   return (size_t)(to - bytes);
 }
 
-/* Unpack the bytes of an array into out [wanted]. A plain array is its size and the numbers. A
- * compressed one is the number of blocks, the size of a block, the size of a shorter last block (0:
- * none), the compressed size of each block, and the blocks. */
+/* Unpack the bytes of an array into out [wanted]. An uncompressed array is its size, then the
+ * numbers. A compressed one is the number of blocks, the size of a block, the size of a shorter
+ * last block (0: none), the compressed size of each block, and the blocks. */
 static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, size_t wanted,
                    unsigned char *out) {
   const size_t h = v->header_size;
@@ -182,7 +182,7 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   const mesh_type *type =
       strcmp(name, character.name) == 0 ? &character : supine_mesh_type_find(word);
   *numbers = NULL;
-  /* zlib expands a byte to at most 1032 */
+  /* zlib expands a byte to at most 1032 bytes */
   if (type == NULL || count > 1032 * (size_t)(v->end - v->bytes)) {
     return malformed(
         v, "an array of its points or polygons has an unknown type or is too large; save it again",
@@ -328,9 +328,9 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   return SUPINE_OK;
 }
 
-/* Note the axes that 3D Slicer and Supine name in a string array SPACE. */
+/* Read the axes from the string array SPACE that 3D Slicer and Supine write. */
 static void note_space(const vtp_file *v, const element *piece, mesh_file *file) {
-  enum { SIZE = 4 }; /* including its NUL */
+  enum { SIZE = 4 }; /* three letters and a NUL */
   element e;
   double *codes = NULL;
   for (const char *at = v->bytes; find_element(at, piece->at, "Array", &e); at = e.body) {
@@ -378,7 +378,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     }
     mesh->vertex_count = count[0];
   }
-  for (size_t i = 0; i < 3 * count[0]; ++i) { /* to single precision, as in all formats */
+  for (size_t i = 0; i < 3 * count[0]; ++i) { /* in single precision, as from all formats */
     mesh->vertices[i] = (double)(float)mesh->vertices[i];
   }
   mesh_faces faces = {.path = file->path, .mesh = mesh};

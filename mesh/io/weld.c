@@ -12,7 +12,7 @@ static uint64_t hash_position(const double position[3]) {
   uint64_t bits[3];
   memcpy(bits, position, sizeof bits);
   uint64_t hash = 0;
-  for (int k = 0; k < 3; ++k) { /* odd multipliers; each step mixes the high bits down */
+  for (int k = 0; k < 3; ++k) { /* mix the high bits into the low ones */
     hash = (hash ^ bits[k]) * UINT64_C(0x9E3779B97F4A7C15);
     hash ^= hash >> 32;
   }
@@ -23,7 +23,8 @@ static bool same_position(const double a[3], const double b[3]) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Move the first vertex at each position to the front; remap: old to new index. */
+/* Keep the first vertex at each position, moved to the front; return their number. Write the new
+ * index of each old vertex into `remap`. `slots` is a hash table, initially all free_slot. */
 static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t slot_count) {
   const size_t mask = slot_count - 1;
   double *vertices = mesh->vertices;

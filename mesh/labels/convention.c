@@ -8,8 +8,8 @@
 
 #include "mesh/labels/mask.h"
 
-/* Labels of segmenters: R231 and LTRCLobes of lungmask, `total` of TotalSegmentator from 2.0 on and
- * before. */
+/* Labels of segmenters: R231 and LTRCLobes of lungmask; `total` of TotalSegmentator 2.0 and later,
+ * and of earlier versions. */
 static const struct {
   const char *name, *labels;
 } conventions[] = {{"lungmask", "left=2,right=1"},
@@ -19,7 +19,7 @@ static const struct {
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
 
-/* Find the centre of a side's labels, mm; false if it has no voxel. */
+/* Find the centre, mm, of all voxels of the side `wanted`; false if there are none. */
 static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
                       uint8_t wanted, double centre[3]) {
   double count = 0.0;
@@ -39,8 +39,7 @@ static bool centre_of(const supine_image *image, const labels_tally *tally, cons
   return count > 0.0;
 }
 
-/* Write a list such as "1, 2 and 17 more" of the labels present; unless `side` is NULL, only those
- * whose side is `wanted`. */
+/* List the labels present, as "1, 2 and 17 more"; with `side`, only those of side `wanted`. */
 static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t wanted, char *text,
                         size_t size) {
   enum { SHOWN = 12 };
@@ -63,7 +62,7 @@ static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t 
   }
 }
 
-/* Parse "10+11" up to a comma or the end; NULL if it is invalid. */
+/* Parse labels such as "10+11", and set their sides. Return where they end; NULL if invalid. */
 static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   for (;; ++at) {
     char *end;
@@ -79,7 +78,7 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   }
 }
 
-/* Parse "left=10+11,right=12" into the sides of the labels, which are 0 before. */
+/* Parse "left=10+11,right=12" into the sides of the labels, initially 0; false if invalid. */
 static bool read_sides(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};
@@ -97,8 +96,8 @@ static bool read_sides(const char *wanted, uint8_t *side) {
   }
 }
 
-/* Choose by the labels present: one label is both lungs, two are a lung each, more must be exactly
- * those of a convention. Return false if they are not. */
+/* Choose by the labels present: one label is both lungs, two labels are a lung each, and more must
+ * be exactly those of a convention. Return false if they are not. */
 static bool choose_by_presence(const supine_image *image, const labels_tally *tally, uint8_t *side,
                                const char **name) {
   size_t present[2] = {0, 0};
@@ -127,7 +126,7 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
     return true;
   }
   for (size_t c = 0; c < CONVENTIONS; ++c) {
-    bool same = true; /* exactly its labels are present */
+    bool same = true; /* the convention's labels are those present */
     memset(side, 0, LABELS_MAX);
     (void)read_sides(conventions[c].labels, side);
     for (size_t label = 1; same && label < LABELS_MAX; ++label) {
@@ -152,7 +151,7 @@ static supine_status choose(const char *path, const supine_image *image, const l
   if (wanted == NULL) {
     list_labels(tally, NULL, 0, present, sizeof present);
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: which of its labels (%s) are lungs? Give --labels, as "
+                            "%s: which of its labels (%s) are lungs? Give --labels, such as "
                             "left=10+11,right=12+13+14 or totalsegmentator",
                             path, present);
   }
@@ -176,8 +175,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
   return SUPINE_OK;
 }
 
-/* Check that every lung that is named is present; set `doubted` if both are present and the left
- * one does not lie left of the other. */
+/* Check that each lung with labels has voxels. If both have, set `doubted` to whether the left lung
+ * does not lie left of the right one. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
                            const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};
@@ -192,7 +191,7 @@ static supine_status check(const char *path, const supine_image *image, const la
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
           "%s: no voxel has a label that --labels gives the %s lung; the labels "
-          "there are %s: correct --labels, or name one lung alone, as --labels "
+          "present are %s: correct --labels, or name only one lung: --labels "
           "%s=1+2",
           path, names[s], present, names[1 - s]);
     }

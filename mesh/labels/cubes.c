@@ -8,9 +8,9 @@
 
 enum { LAYERS = 2 }; /* layers of empty cubes around the mask */
 
-/* Average along one axis over cubes, from `in` [outer, n, inner] into `out` [outer, m, inner]; a
- * cube is `ratio` voxels wide. A cube narrower than a voxel is widened to one voxel, which
- * interpolates linearly between centres. */
+/* Average `in` [outer, n, inner] along its middle axis over cubes of `ratio` voxels, into `out`
+ * [outer, m, inner]. Cubes narrower than a voxel take the average over the width of one voxel,
+ * which interpolates linearly between voxel centres. */
 static void average(const float *in, size_t outer, size_t n, size_t inner, size_t m, double ratio,
                     float *out) {
   const double width = fmax(1.0, ratio);
@@ -35,7 +35,7 @@ static void average(const float *in, size_t outer, size_t n, size_t inner, size_
   }
 }
 
-/* Average the mask along the first axis into `out` [rows, m]. */
+/* Average the mask [rows, n] in the same way along its rows, into `out` [rows, m]. */
 static void average_rows(const labels_mask *mask, size_t m, double ratio, float *out) {
   const size_t n = mask->size[0];
   const double width = fmax(1.0, ratio);
@@ -55,11 +55,11 @@ static void average_rows(const labels_mask *mask, size_t m, double ratio, float 
 }
 
 static const float half = 0.5F; /* least share of a cube that counts as inside */
-/* Shares are rounded to multiples of 1 / levels, so that all processors agree on a half. */
+/* Shares are multiples of 1 / levels, so that all processors find the same cubes inside. */
 static const float levels = 65536.0F;
 
 /* If only two opposite cubes of the four around an edge are inside, fill the fuller of the other
- * two. */
+ * two. Return whether a cube was filled. */
 static bool mend_edge(float *share, const size_t at[4]) {
   const bool in[4] = {share[at[0]] >= half, share[at[1]] >= half, share[at[2]] >= half,
                       share[at[3]] >= half};
@@ -72,8 +72,8 @@ static bool mend_edge(float *share, const size_t at[4]) {
   return true;
 }
 
-/* If only two opposite cubes of the eight around a corner are inside, join them by a path of
- * two; if only they are outside, fill one. */
+/* If only two opposite cubes of the eight around a corner are inside, fill two that connect them;
+ * if only two opposite ones are outside, fill one of them. Return whether a cube was filled. */
 static bool mend_corner(float *share, const size_t at[8]) {
   unsigned inside = 0;
   for (unsigned c = 0; c < 8; ++c) {
@@ -95,7 +95,7 @@ static bool mend_corner(float *share, const size_t at[8]) {
   return false;
 }
 
-/* Correct every edge and corner; return whether any changed. */
+/* Correct every edge and corner; return whether any was wrong. */
 static bool mend(const size_t size[3], float *share) {
   const size_t stride[3] = {1, size[0], size[0] * size[1]};
   bool mended = false;
@@ -129,7 +129,7 @@ static bool mend(const size_t size[3], float *share) {
   return mended;
 }
 
-/* Remove islands and cavities of the cubes, left by averaging or correction. */
+/* Remove islands and fill cavities of the cubes, which averaging and correction may leave. */
 static supine_status one_piece(labels_cubes *cubes) {
   labels_mask inside = {.size = {cubes->size[0], cubes->size[1], cubes->size[2]}};
   const size_t count = supine_labels_mask_count(&inside);

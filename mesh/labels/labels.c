@@ -10,18 +10,18 @@
 #include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
-static const double least_edge = 0.2;      /* mm: gives ten million vertices */
-static const double most_edge = 20.0;      /* mm: larger cubes leave little of a lung */
-static const double most_closing = 20.0;   /* mm */
+static const double least_edge = 0.2;      /* mm; gives some ten million vertices */
+static const double most_edge = 20.0;      /* mm; larger cubes leave little of a lung */
+static const double most_closing = 20.0;   /* largest radius, mm */
 static const double least_lung = 1.0;      /* least volume of a lung, mL */
-static const double longest_lung = 1000.0; /* mm; beyond it the header's voxel size is wrong */
+static const double longest_lung = 1000.0; /* mm; if longer, the header's voxel size is wrong */
 
 typedef struct work {
   const char *path; /* first file, for messages */
   const supine_labels_options *options;
   supine_labels_report *report;
   double edge;
-  supine_image image; /* the map; freed once `both` is cut from it */
+  supine_image image; /* the label map; freed once `both` is cut from it */
   labels_mask both;
   bool doubted; /* by the header, the left lung does not lie left of the right one */
 } work;
@@ -35,7 +35,7 @@ static supine_status advance(work *w, double fraction, supine_error *error) {
                                 "interrupted: nothing was written");
 }
 
-/* Report whether two images have the same size and their corners agree to 0.01 voxels. */
+/* Report whether two images have the same size, and the same corners within 0.01 voxels. */
 static bool same_frame(const supine_image *a, const supine_image *b) {
   if (memcmp(a->size, b->size, sizeof a->size) != 0) {
     return false;
@@ -185,7 +185,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   return status;
 }
 
-/* Clear the voxels that closing added to a lung inside the other lung. */
+/* Clear the voxels that closing added to a lung but that belong to the other lung. */
 static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mask) {
   const long *offset = mask->from;
   for (long k = 0; k < (long)mask->size[2]; ++k) {
@@ -280,7 +280,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, name, w->edge);
 }
 
-/* Refuse lungs of which the left one does not lie left of the other, and say by their shape
+/* Report that the left lung does not lie left of the right one; judge by the shape of the lungs
  * whether the labels or the header's axes are wrong. */
 static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_report *report = w->report;
@@ -294,7 +294,8 @@ static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, su
                           found.axes == SUPINE_AXES_LPS
                               ? "Name the labels the other way round, --labels "
                                 "left=...,right=..., or give the header's axes, --axes ABC"
-                              : "Their shape fits other axes: if the labels are right, add --axes ",
+                              : "Their shape fits other axes: if the labels are correct, add "
+                                "--axes ",
                           found.axes == SUPINE_AXES_LPS ? "" : letters);
 }
 

@@ -12,13 +12,13 @@
 #define SUPINE_LABELS_EDGE 2.0
 
 typedef struct supine_labels_options {
-  /** Which labels are lungs. NULL: by the labels present. "one": all but 0, split into two
-   * lungs; "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1"; or a list,
-   * "left=10+11,right=12+13+14", of one or both sides. */
+  /** Labels of the lungs. NULL: chosen by the labels present. "one": all but 0, split into two
+   * lungs. "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1": labels of a segmenter.
+   * Or a list, "left=10+11,right=12+13+14", of one or both sides. */
   const char *labels;
-  supine_axes axes; /**< of the header's coordinates, instead of its own; AUTO: by the header */
+  supine_axes axes; /**< axes of the header's coordinates; AUTO: the axes it names */
   double edge;      /**< approximate distance between vertices, mm; 0: SUPINE_LABELS_EDGE */
-  double close;     /**< close gaps and channels narrower than twice this, mm; 0: none */
+  double close;     /**< closes gaps narrower than twice this radius, mm; 0: none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -35,36 +35,36 @@ typedef struct supine_labels_lung {
   double filled;   /**< volume of the cavities filled */
   double surface;  /**< volume that the surface encloses */
   long tunnels;    /**< number of tunnels through the lung: the surface's genus */
-  bool cut;        /**< the lung reaches the image's border, where it is cut off */
+  bool cut;        /**< whether the lung reaches the image's border, where it is cut off */
 } supine_labels_lung;
 
-/** Geometry and labels read from a map, and what was repaired. */
+/** Geometry and labels of a map, and how touching lungs were split. */
 typedef struct supine_labels_report {
   size_t size[3];
-  double spacing[3];  /**< mm */
+  double spacing[3];  /**< distances between voxels, mm */
   char axes[64];      /**< "i to the left, j to the back, k to the head" */
-  const char *source; /**< frame_source of the image, a literal */
-  bool frames_differ; /**< frames_differ of the image */
+  const char *source; /**< as in supine_image */
+  bool frames_differ; /**< as in supine_image */
   char taken[256];    /**< labels of each side: "2 left; 1 right (convention lungmask)" */
   double neck;        /**< width of the neck at which touching lungs were split, mm; 0: none */
   size_t lung_count;
-  supine_labels_lung lung[2]; /**< the left one first if both are present */
-  supine_axes coordinates;    /**< coordinates assumed for the header */
+  supine_labels_lung lung[2]; /**< the left lung first if there are two */
+  supine_axes coordinates;    /**< axes assumed for the header's coordinates */
 } supine_labels_report;
 
 /** Make the surfaces of the lungs from a label map (.nrrd, .nii, .nii.gz, .mha), or from several
- * masks in one frame, each a part given by its nonzero voxels.
+ * masks in one frame, whose nonzero voxels get the labels 1, 2, ... in their order.
  *
  * The largest piece of each lung is kept and its cavities are filled. The map is averaged over
  * cubes with sides of `edge` along the map's axes. Cubes at least half filled are inside; they are
- * corrected so that no two meet only in an edge or corner, which makes the surface net
- * [Gibson1998] a closed manifold. The net is smoothed without shrinking [Taubin1995], each vertex
- * within its cell.
+ * corrected so that no two meet only in an edge or corner, which makes the surface net [Gibson1998]
+ * a closed manifold. The net is smoothed without shrinking [Taubin1995], each vertex within its
+ * cell.
  *
- * @param surfaces  [2] zero-initialised; report->lung_count are written, in its order, outwards
+ * @param surfaces  [2] zero-initialised; those of report->lung are written, facing outwards
  * @retval SUPINE_ERROR_ARGUMENT  an edge, closing distance or list of labels that is invalid
- * @retval SUPINE_ERROR_MESH      no lungs, one where two are named, labels that are not two
- *         lungs', a left lung that does not lie left of the other, one too small or too large
+ * @retval SUPINE_ERROR_MESH      no voxel of a lung; labels that do not tell which are lungs; a
+ *             left lung that does not lie left of the right one; a lung too small or too large
  * @retval SUPINE_ERROR_FORMAT    voxels that are not labels, images that differ in size or frame
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and those of supine_image_read
  * Memory: the map and 1 byte per voxel; per voxel of the lungs' box 10 bytes more to split lungs,

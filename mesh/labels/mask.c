@@ -23,7 +23,7 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
   }
 }
 
-/* Find the box of a value; false if it is absent. */
+/* Find the first and last index of a value along each axis; false if it is absent. */
 static bool box_of(const labels_mask *mask, uint8_t value, size_t low[3], size_t high[3]) {
   bool any = false;
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
@@ -77,8 +77,7 @@ supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value,
   return SUPINE_OK;
 }
 
-/* Read the labels of one row; if a voxel is not a label, set `bad` to its value and return false.
- */
+/* Read the labels of a row; if a voxel is not a label, set `bad` to its value and return false. */
 static bool read_row(const supine_image *image, size_t row, uint16_t *labels, double *bad) {
   const size_t size = image->size[0];
   for (size_t i = 0; i < size; ++i) {
@@ -92,7 +91,7 @@ static bool read_row(const supine_image *image, size_t row, uint16_t *labels, do
   return true;
 }
 
-/* Add the voxels of one row to the tally, run by run. */
+/* Add the voxels of one row to the tally of each label, run by run. */
 static void count_row(const supine_image *image, size_t row, const uint16_t *labels,
                       labels_tally *tally) {
   const size_t size = image->size[0];

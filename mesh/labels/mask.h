@@ -13,8 +13,8 @@ typedef struct labels_mask {
   size_t size[3];
   long from[3];      /**< index of voxel 0 in the image or mask that the box was cut from */
   double origin[3];  /**< centre of voxel 0, mm, LPS */
-  double step[3][3]; /**< mm, LPS */
-  double spacing[3]; /**< the steps' lengths, mm */
+  double step[3][3]; /**< from a voxel to the next along each axis, mm, LPS */
+  double spacing[3]; /**< lengths of the steps, mm */
   uint8_t *at;       /**< [size[2], size[1], size[0]] values */
 } labels_mask;
 
@@ -23,7 +23,7 @@ enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* values of a ma
 /* ---- mask.c ---- */
 size_t supine_labels_mask_count(const labels_mask *mask);
 double supine_labels_voxel_ml(const labels_mask *mask);
-/** Extract the voxels of one value, as 1, with `margin` voxels around them; empty (at NULL) if
+/** Extract the voxels of one value, as 1, with `margin` voxels around them; mask->at is NULL if
  * there are none. @retval SUPINE_ERROR_MEMORY */
 supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
                                          labels_mask *mask);
@@ -35,10 +35,10 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
 
 enum { LABELS_MAX = 65536, LABELS_MARGIN = 2 };
 
-/** Number, sum and box of the voxels of one label. */
+/** Number, sums of indices, and box of the voxels of one label. */
 typedef struct labels_tally {
   uint64_t count;
-  uint64_t sum[3];          /**< sum of their indices along each axis */
+  uint64_t sum[3];          /**< sum of the voxels' indices along each axis */
   uint32_t low[3], high[3]; /**< first and last index along each axis */
 } labels_tally;
 
@@ -50,40 +50,40 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                                   supine_error *error);
 
 typedef struct labels_choice {
-  char *taken;  /**< [256] the `taken` of supine_labels_report, written */
-  bool doubted; /**< by the header, the left lung does not lie left of the other */
+  char *taken;  /**< [256] output: `taken` of supine_labels_report */
+  bool doubted; /**< by the header, the left lung does not lie left of the right one */
 } labels_choice;
 
-/** Choose the side of each label: as `wanted`, or by the labels present if that is NULL.
+/** Choose the side of each label, as `wanted` says or, if it is NULL, by the labels present.
  * @param side     [LABELS_MAX] output: 0, LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER */
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
                                    labels_choice *choice, supine_error *error);
 
-/** Cut the box of voxels low to high from a counted image, with LABELS_MARGIN around it; on
- * SUPINE_ERROR_MEMORY `at` is NULL.
+/** Cut the box from voxel `low` to voxel `high`, with a margin of LABELS_MARGIN, from an image that
+ * supine_labels_count has checked; on SUPINE_ERROR_MEMORY `at` is NULL.
  * @param value  [LABELS_MAX] value of each label in the mask */
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
                                      const size_t high[3], const uint8_t *value, labels_mask *mask);
 
 /* ---- pieces.c: pieces of equal voxels that share faces ---- */
 
-/** Equal voxels begin <= i < end of a row. */
+/** A run of equal voxels, begin <= i < end, of a row. */
 typedef struct labels_run {
   uint32_t begin, end;
   uint32_t parent; /**< first run of the piece */
 } labels_run;
 
 typedef struct labels_piece {
-  uint64_t count; /**< voxels */
-  double sum[3];  /**< sum of their indices along each axis */
+  uint64_t count; /**< number of voxels */
+  double sum[3];  /**< sum of the voxels' indices along each axis */
 } labels_piece;
 
 typedef struct labels_pieces {
   size_t run_count;
   size_t *row;         /**< [rows + 1] first run of each row of voxels */
-  labels_run *run;     /**< [run_count] */
-  labels_piece *piece; /**< [run_count] each piece is at the index of its first run; others are 0 */
+  labels_run *run;     /**< [run_count] row by row */
+  labels_piece *piece; /**< [run_count] a piece at the index of its first run; 0 at other runs */
   size_t piece_count;
 } labels_pieces;
 
@@ -93,7 +93,7 @@ void supine_labels_pieces_free(labels_pieces *pieces);
 /** Set all pieces of nonzero voxels except the largest to 0 or, if `zero`, all pieces of zeros
  * except the outer one (cavities) to 1.
  * @param others  output: number of pieces changed
- * @param voxels  output: number of their voxels */
+ * @param voxels  output: number of voxels changed */
 supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *others, size_t *voxels);
 
 /* ---- distance.c ---- */

@@ -11,26 +11,28 @@
 
 #define NONE UINT32_MAX
 
-/* A surface net: a vertex in each cell between eight cubes that are partly inside. */
+/* A surface net. A cell lies between the centres of eight cubes, and has a vertex if some of them
+ * are inside and some outside. */
 typedef struct surface_net {
   size_t count;
-  uint32_t (*cell)[3];      /* lowest cube of each vertex's cell */
-  double (*at)[3];          /* position in the cell, 0 to 1 along each axis */
-  uint32_t (*neighbour)[6]; /* across each face of the cell: -x, +x, -y, ...; or NONE */
+  uint32_t (*cell)[3];      /* indices of the lowest cube of each vertex's cell */
+  double (*at)[3];          /* position of each vertex in its cell, 0 to 1 along each axis */
+  uint32_t (*neighbour)[6]; /* vertices across the cell's faces -x, +x, -y, ..., or NONE */
   size_t quad_count;
-  uint32_t (*quad)[4]; /* outwards where the map's axes are right-handed */
+  uint32_t (*quad)[4]; /* corners; faces outwards if the map's axes are right-handed */
 } surface_net;
 
 static const float half = 0.5F;
 
 typedef struct build {
   const labels_cubes *cubes;
-  size_t stride[3]; /* from a cube to the next along each axis */
+  size_t stride[3]; /* index step from a cube to the next along each axis */
   uint32_t *vertex; /* [cubes] vertex of the cell at each cube, or NONE */
   surface_net *net;
 } build;
 
-/* Find the mean crossing of the surface with the cell's edges, 0 to 1; false if there is none. */
+/* Find the mean of the points where the surface crosses edges of the cell, 0 to 1 along each axis;
+ * false if there are none. */
 static bool crossing(const build *b, size_t cell, double mean[3]) {
   const float *share = b->cubes->share;
   double sum[3] = {0.0, 0.0, 0.0};
@@ -40,7 +42,7 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
     inside += share[cell + (c & 1U) * b->stride[0] + (c >> 1U & 1U) * b->stride[1] +
                     (c >> 2U) * b->stride[2]] >= half;
   }
-  if (inside == 0 || inside == 8) { /* most cells */
+  if (inside == 0 || inside == 8) {
     return false;
   }
   for (size_t c = 0; c < 8; ++c) {
@@ -160,7 +162,7 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
     net_free(&made);
     return SUPINE_ERROR_MEMORY;
   }
-  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* NONE */
+  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* all NONE */
   find_vertices(&b, true);
   find_quads(&b, true);
   free(b.vertex);
@@ -172,7 +174,7 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
  * 16 cubes, and removes the steps between slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
-enum { TURNS = 40 }; /* each shrinks, then inflates */
+enum { TURNS = 40 }; /* each shrinks the net, then inflates it */
 
 /* Move every vertex by a share of the way to the mean of its neighbours, within its cell. */
 static void step(const surface_net *net, double share, double (*next)[3]) {
@@ -220,7 +222,7 @@ static void in_voxels(const surface_net *net, const labels_cubes *cubes, size_t 
   }
 }
 
-/* Cut the net into triangles, in mm. */
+/* Cut the net into triangles, and convert it to mm. */
 static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes,
                                const labels_mask *mask, supine_mesh *mesh) {
   const bool turned = supine_triple(mask->step[0], mask->step[1], mask->step[2]) < 0.0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Find pieces of voxels that share faces, by runs along the rows: islands and cavities. */
+/* Find pieces of voxels that share faces, by runs along the rows. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,7 +13,7 @@ static uint32_t root(labels_run *run, uint32_t i) {
   return i;
 }
 
-/* Unite the pieces of two runs under the earlier root. */
+/* Unite the pieces of two runs; the earlier root becomes the root of both. */
 static void unite(labels_run *run, uint32_t a, uint32_t b) {
   a = root(run, a);
   b = root(run, b);
@@ -34,8 +34,7 @@ static void unite_rows(labels_run *run, size_t a, size_t a_end, size_t b, size_t
   }
 }
 
-/* Find the runs of zero (or nonzero) voxels of one row and return their number; if `run` is NULL,
- * only count them. */
+/* Find the runs of zero or nonzero voxels of a row; if `run` is NULL, only return their number. */
 static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run *run) {
   size_t count = 0;
   for (size_t i = 0; i < size;) {
@@ -54,7 +53,7 @@ static size_t runs_of_row(const uint8_t *at, size_t size, bool zero, labels_run 
   return count;
 }
 
-/* Set the piece of every run and the size of every piece. */
+/* Set the piece of every run, and the voxel count and index sums of every piece. */
 static void measure(const labels_mask *mask, labels_pieces *pieces) {
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {
     for (size_t r = pieces->row[row]; r < pieces->row[row + 1]; ++r) {
@@ -122,7 +121,7 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
   if (status != SUPINE_OK) {
     return status;
   }
-  uint32_t kept = 0; /* its first run; the first run of zeros lies in the margin */
+  uint32_t kept = 0; /* first run of the piece to keep; run 0 of zeros lies in the margin */
   for (size_t r = 1; !zero && r < pieces.run_count; ++r) {
     kept = pieces.piece[r].count > pieces.piece[kept].count ? (uint32_t)r : kept;
   }

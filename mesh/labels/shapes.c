@@ -9,12 +9,12 @@
 
 enum { ALL_MOST = 256 }; /* an image with more values is probably no label map */
 
-/* Distance between vertices over the cube root of the volume, for large parts: 15,000 vertices in a
- * lobe. */
+/* Distance between vertices of large parts, divided by the cube root of the volume; gives 15,000
+ * vertices in a lobe. */
 static const double edge_share = 0.02;
 
 /* Make the surface of one label.
- * @param value  [LABELS_MAX] work space, zeros before and after */
+ * @param value  [LABELS_MAX] work space, zero before and after the call */
 static supine_status make_part(const supine_image *image, const labels_tally *tally, uint8_t *value,
                                supine_labels_shape *part) {
   const size_t low[3] = {tally->low[0], tally->low[1], tally->low[2]};

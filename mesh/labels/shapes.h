@@ -11,12 +11,14 @@ typedef struct supine_labels_shape {
   supine_mesh surface;
 } supine_labels_shape;
 
-/** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz, .mha): surface nets as by
- * supine_labels_surfaces, with all pieces and cavities. Vertices are about one voxel apart, or in
- * large parts 1/50 of the cube root of the volume.
+/** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz, .mha), as supine_labels_surfaces
+ * does, but with all pieces and cavities. Vertices are about one voxel apart, or in large parts
+ * 1/50 of the cube root of the volume.
  * @param wanted  labels, 1 to 65535; count 0: all labels present
- * @param parts   [*count] written, in the given order, or by label; supine_labels_shapes_free
- * @retval SUPINE_ERROR_MESH    a label has no voxels, all voxels are 0, or over 256 labels of all
+ * @param parts   [*count] output in the order of `wanted`, or of all labels; release with
+ *             supine_labels_shapes_free
+ * @retval SUPINE_ERROR_MESH    a label has no voxels, all voxels are 0, or more than 256 labels are
+ *             present but none is named
  * @retval SUPINE_ERROR_FORMAT  voxels that are not labels
  * @retval SUPINE_ERROR_MEMORY, and those of supine_image_read */
 supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,

@@ -13,12 +13,12 @@ static const double least_share = 0.1;
 static const double widest_neck = 40.0;
 
 typedef struct pair {
-  uint32_t piece[2];   /* index of the first run, left piece first */
-  double centre[2][3]; /* mm, larger piece first */
+  uint32_t piece[2];   /* first run of each piece, left piece first */
+  double centre[2][3]; /* centre of each piece, mm, larger piece first */
 } pair;
 
-/* Find the two largest pieces; false unless they lie beside each other and differ by less than a
- * factor of ten in volume. */
+/* Find the two largest pieces; false unless they lie beside each other and the smaller has at least
+ * a tenth of the larger one's volume. */
 static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
   uint32_t top[2] = {0, 0};
   for (uint32_t r = 1; r < pieces->run_count; ++r) {
@@ -50,7 +50,7 @@ static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair
          fabs(apart) > fabs(found->centre[0][2] - found->centre[1][2]);
 }
 
-/* Set `eroded` to the voxels of the mask deeper than `depth`, mm.
+/* Set `eroded` to 1 at the voxels of the mask deeper than `depth`, mm, else to 0.
  * @param squares  squared depth of each voxel, mm^2; not read for depth 0 */
 static void erode(const labels_mask *both, const float *squares, double depth, uint8_t *eroded) {
   const size_t count = supine_labels_mask_count(both);
@@ -75,7 +75,7 @@ static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, cons
 }
 
 /* Assign every voxel of the mask to the nearer marked piece.
- * @param squares  [size] work space */
+ * @param squares  [voxels] work space */
 static supine_status share_out(labels_mask *both, uint8_t *marks, float *squares) {
   const size_t count = supine_labels_mask_count(both);
   labels_mask one = *both;
@@ -115,7 +115,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
-    if (depth == step) { /* not needed by most lungs, which do not touch */
+    if (depth == step) { /* only for lungs that touch */
       status = supine_labels_distance(both, true, squares);
     }
     erode(both, squares, depth, eroded.at);

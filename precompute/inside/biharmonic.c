@@ -14,11 +14,11 @@
 
 #include "precompute/inside/biharmonic.h"
 
-/* Number of affine terms, of columns of the matrix that are eliminated together, and of points and
- * centres in a tile of sums. */
+/* AFFINE: number of affine terms. COLUMNS: columns of the matrix that are eliminated together.
+ * POINTS, CENTRES: size of a tile in the evaluation. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
-/* Set the middle of the points' box, and half its diagonal as the unit. */
+/* Set `middle` to the middle of the points' box, and `unit` to half its diagonal. */
 static void frame(size_t count, const double *points, supine_inside_biharmonic *fit) {
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -73,7 +73,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
   return SUPINE_OK;
 }
 
-/* The matrix of the centres, positive definite as they lie within a distance of 1 of the middle:
+/* The matrix K of the centres p_i, which is positive definite because |p_i| <= 1:
  *
  *     K_ij = ALPHA - |p_i - p_j|,    ALPHA > 2
  *
@@ -81,7 +81,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
 typedef struct kernel {
   size_t size;
   double *matrix; /* [size, size], the lower triangle column by column */
-  size_t done;    /* columns eliminated */
+  size_t done;    /* number of columns eliminated */
 } kernel;
 
 SUPINE_CLONES static void fill(const double *c, const kernel *k) {
@@ -129,14 +129,14 @@ static lapack_int factorise(kernel *k) {
   return failed;
 }
 
-/* Find the weights. With P = (1, x, y, z) of the centres, u = -sum of w_j |x - p_j| + P b passes
- * through the values f if K w + P b = f and P' w = 0:
+/* Find the weights w, b of u(x) = -sum over j of w_j |x - p_j| + (1, x) b. With a row of P = (1, x)
+ * for each centre, u passes through the values f if K w + P b = f and P' w = 0:
  *
  *     K y = f,    K z = P,    (P' z) b = P' y,    w = y - z b
  *
  * The weights are stored as -w, then b.
- * @param p  [4, size] column by column, then f [R, size]; overwritten by z and y
- * @retval SUPINE_ERROR_NUMERICAL  K is singular, or P' z, as all centres lie in one plane */
+ * @param p  P [4, size] column by column, then f [R, size]; overwritten by z and y
+ * @retval SUPINE_ERROR_NUMERICAL  K or P' z is singular, as all centres lie in one plane */
 static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {
   static const double flat = 1e-5;
   const int n = (int)k->size;
@@ -239,7 +239,7 @@ typedef struct evaluation {
   size_t count;
 } evaluation;
 
-/* Add the sum over centres [first, last) to the values of the `here` points x. */
+/* Add the terms of centres [first, last) to the values of the first `here` of the points x. */
 SUPINE_CLONES static void add_centres(const supine_inside_biharmonic *fit, size_t first,
                                       size_t last, const double (*x)[POINTS], size_t here,
                                       double *values) {

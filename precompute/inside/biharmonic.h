@@ -12,13 +12,12 @@
 
 #include <supine/status.h>
 
-/** Zero-initialise; supine_inside_biharmonic_free releases what supine_inside_biharmonic_fit
- * allocates. */
+/** Zero-initialise for supine_inside_biharmonic_fit; supine_inside_biharmonic_free frees it. */
 typedef struct supine_inside_biharmonic {
   size_t count;     /**< number of centres, M */
   size_t columns;   /**< number of values per point, R */
   size_t *chosen;   /**< [M] indices of the centres among the points, in order of choice */
-  double *centres;  /**< [M, 3] in units of `unit` about `middle` */
+  double *centres;  /**< [M, 3] positions relative to `middle`, divided by `unit` */
   double *weights;  /**< [R, M + 4] weights of the centres, then of 1, x, y, z */
   double middle[3]; /**< centre of the points' box, mm */
   double unit;      /**< half the diagonal of the points' box, mm */

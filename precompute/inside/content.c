@@ -64,8 +64,7 @@ supine_status supine_inside_content_points(const char *path,
   return status;
 }
 
-/* Find the name of a mesh in its path, as "airways" in "/scans/airways.ply"; it is not terminated.
- */
+/* Find a mesh's name in its path, such as "airways" in "/scans/airways.ply", and its length. */
 static const char *part_name(const char *path, size_t *length) {
   const char *slash = strrchr(path, '/');
   const char *name = slash != NULL ? slash + 1 : path;
@@ -132,8 +131,8 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
     }
     if (!found) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--rigid: no part is named '%.*s': give the name of a mesh's file, "
-                              "or a label as in --labels",
+                              "--rigid: no part is named '%.*s': give a mesh's file name without "
+                              "its ending, or a label as in --labels",
                               (int)length, at);
     }
     at += length;

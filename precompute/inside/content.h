@@ -14,11 +14,11 @@ typedef struct supine_inside_content {
   uint32_t *part; /**< [count] index of the point's part; for a grid, its node i + size[0] (j +
                    * size[1] k) */
   size_t triangle_count;
-  uint32_t *triangles; /**< [triangle_count, 3] */
+  uint32_t *triangles; /**< [triangle_count, 3] indices of points */
   size_t part_count;   /**< number of named parts; 0: a grid */
   char *names;         /**< names of the parts in order, separated by newlines */
   bool *rigid;         /**< [part_count] whether the part keeps its shape; NULL: none does */
-  supine_image grid;   /**< size, origin and step of its nodes */
+  supine_image grid;   /**< if the content is a grid: size, origin and step of its nodes */
 } supine_inside_content;
 
 /** Append the points of a file, each as one part; options and statuses as
@@ -47,10 +47,10 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
 /** Make a grid of the nodes inside the lungs and of the nodes at most a cell's diagonal outside, so
  * that every point inside lies between nodes.
  *
- * @param like     gives the axes: nodes are every n-th node of it, within its box. NULL:
- *                 along x, y, z
- * @param spacing  mm between nodes; with `like`, rounded to a multiple of its spacing, at least 1
- * @param margin   mm by which the grid's box extends beyond the lungs'; the field fades out there
+ * @param like     image of which every n-th voxel along each axis is a node; NULL: axes x, y and z
+ * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
+ * @param margin   distance, mm, by which the grid extends beyond the lungs' box, for the field to
+ *             fade out
  * @param content  zero-initialised
  * @retval SUPINE_ERROR_ARGUMENT  a spacing that is not positive, more than 2^31 nodes
  * @retval SUPINE_ERROR_MESH      no node is inside a lung

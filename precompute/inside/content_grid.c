@@ -10,7 +10,7 @@
 
 static const double nodes_max = 2147483648.0;
 
-/* Find the box of the lungs with the margin, in steps of `grid`. */
+/* Find the box of the lungs, extended by the margin, in voxel coordinates of `grid`. */
 static void cover(const supine_inside_shells *shells, const supine_image *grid, double margin,
                   double low[3], double high[3]) {
   for (int k = 0; k < 3; ++k) {
@@ -34,7 +34,7 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
   }
 }
 
-/* Make the grid that covers the lungs, along the axes or from every n-th node of another grid. */
+/* Make the grid that covers the lungs, along x, y, z or of every n-th voxel of the image `like`. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
                                double spacing, double margin, supine_image *grid,
                                supine_error *error) {
@@ -82,7 +82,7 @@ typedef struct search {
   const supine_inside_shells *shells;
   const supine_image *grid;
   double limit;        /* largest distance of a kept node from the lungs, mm */
-  unsigned char *keep; /* [nodes] 2 inside a lung, 1 outside within the limit, 0 dropped */
+  unsigned char *keep; /* [nodes] 2: inside a lung; 1: outside within the limit; 0: dropped */
 } search;
 
 static void search_rows(void *context, size_t begin, size_t end, size_t thread) {
@@ -144,7 +144,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
     return status;
   }
   double diagonal = 0.0;
-  for (int k = 0; k < 3; ++k) { /* bounds the longest diagonal of an oblique cell */
+  for (int k = 0; k < 3; ++k) { /* a cell's edges together exceed its diagonals */
     diagonal += supine_length(grid.step[k]);
   }
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];

@@ -19,16 +19,16 @@ typedef struct embedding {
   const supine_inside_shells *shells;
   const supine_inside_content *content;
   const supine_inside_options *options;
-  size_t columns;             /* values per point, 3 K */
+  size_t columns;             /* values per point: 3 K for K modes */
   supine_inside_place *place; /* [N] in the content's order */
   unsigned char *lung;        /* [N] in the content's order */
   size_t *order;              /* [N] indices of the content's points, lung by lung */
   float *vertices;      /* [N, 3] mm at full inflation; this and all arrays below are in `order` */
-  float *coefficients;  /* [N, 3, K] */
+  float *coefficients;  /* [N, 3, K] displacement by each mode, mm */
   float *depth;         /* [N] mm below the surface */
-  uint32_t *part;       /* [N] */
-  unsigned char *group; /* [N] lung */
-  uint32_t *triangles;  /* [M, 3] */
+  uint32_t *part;       /* [N] index of the part */
+  unsigned char *group; /* [N] index of the lung */
+  uint32_t *triangles;  /* [M, 3] indices of vertices */
   uint32_t *rigid;      /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
   size_t rigid_count;
 } embedding;
@@ -63,7 +63,7 @@ static void gather_parts(embedding *e) {
   }
 }
 
-/* Sort the points by lung, in their own order within each; renumber the triangles. */
+/* Sort the points by lung, keeping their order within each lung, and renumber the triangles. */
 static supine_status sort_points(embedding *e, supine_inside_report *report) {
   const size_t n = e->content->count;
   uint32_t *position = malloc(n * sizeof *position);
@@ -109,7 +109,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
   return SUPINE_OK;
 }
 
-/* Interpolate the displacements of the surface, mode by mode, in the triangle of a place. */
+/* Interpolate the surface's displacement by each mode linearly in the triangle of a place. */
 static void surface_motion(const embedding *e, const supine_inside_shell *shell,
                            const double *displacement, const supine_inside_place *place,
                            double *motion) {
@@ -122,7 +122,7 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
   }
 }
 
-/* Move the points [begin, end) from the scan to full inflation. */
+/* Compute vertices [begin, end) at full inflation: positions in the scan less displacements. */
 static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
                            const double *values) {
   const size_t modes = e->columns / 3;
@@ -138,10 +138,10 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
   }
 }
 
-/* Find the motion of points [begin, end) of the order, all of one lung, at most BLOCK. `space`
- * holds positions [2 BLOCK, 3], values [2 BLOCK, R] and one motion [R]; the nearest surface points
- * of the points within `reach` follow the points. Eight parameters: one block and its work space.
- */
+/* Find the displacements of points [begin, end) of `order`, at most BLOCK, all of one lung. `space`
+ * holds positions [2 BLOCK, 3], of the points and then of the surface points nearest to those
+ * within `reach`, their values [2 BLOCK, columns], and a surface point's value [columns]. The eight
+ * parameters are one block and its work space. */
 static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
@@ -184,7 +184,7 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
                                 supine_error *error) {
-  static const double reach_spacings = 2.0; /* reach over the centres' spacing plus an edge */
+  static const double reach_spacings = 2.0; /* reach / (centres' spacing + mean edge) */
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
@@ -212,9 +212,9 @@ cleanup:
   return status;
 }
 
-/* Find a rigid part at full inflation: its given shape, rotated and shifted so that the field at
- * the scan's weights returns it to the scan. The rotation is iterated, as the field acts on the
- * vertices at full inflation. */
+/* Find a rigid part at full inflation: its shape in the scan, rotated and shifted so that the field
+ * at the scan's weights moves it back to the scan. The rotation is found by iteration, as the
+ * field's rotation of the part depends on it. */
 static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
@@ -230,7 +230,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double *scan = e->content->points + 3 * e->order[i];
       double p[3];
-      for (size_t a = 0; a < 3; ++a) { /* R' (scan - its mean) */
+      for (size_t a = 0; a < 3; ++a) { /* R' (position in the scan - mean) */
         p[a] = r[a] * (scan[0] - given[0]) + r[3 + a] * (scan[1] - given[1]) +
                r[6 + a] * (scan[2] - given[2]);
       }
@@ -247,7 +247,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Report whether metadata describes the surface alone, and not its content. */
+/* Report whether this metadata describes the surface alone, and not its content. */
 static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};

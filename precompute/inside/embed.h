@@ -2,49 +2,49 @@
 /** @file Embed content in the lungs so that it moves with them. A point's displacement is the
  * biharmonic interpolation of its lung's surface displacement (biharmonic.h), mode by mode. The
  * result is a basis of kind vector with the modes, volume forms and metadata of the surface's
- * basis; the same weights and gains move both.
+ * basis; the same weights and gains apply to both.
  *
- * Near the surface, the residual of the interpolation is added,
+ * Near the surface, the residual there of the interpolation b is added,
  *
  *     u(x) = b(x) + (1 - t)^2 (1 + 2 t) (s(q) - b(q)),    t = |x - q| / reach < 1
  *
- * with q the surface's point nearest to x, s(q) its motion, linear in its triangle, and reach twice
- * the sum of the centres' spacing and the mean edge: points on the surface move with it exactly,
- * although only some vertices are centres of b.
+ * where q is the surface point nearest to x, s(q) its displacement (linear in a triangle), and
+ * reach twice the sum of the centres' spacing and the mean edge. So points on the surface move
+ * exactly with it, although only some vertices are centres of b.
  *
  * A rigid part belongs to the lung with most of its vertices (runtime/rigid.h).
  *
- * Content, x and q are given in the scan. The file holds the content at full inflation, as it
- * does the surface: x minus u at the scan's weights and gains. */
+ * Content, x and q are given in the scan. The file holds the content at full inflation, as it does
+ * the surface: x minus u at the scan's weights and gains. */
 #ifndef SUPINE_INSIDE_EMBED_H
 #define SUPINE_INSIDE_EMBED_H
 
 #include "precompute/inside/content.h"
 #include "precompute/inside/shells.h"
 
-/** Default of the largest number of centres of one lung, which are chosen from its vertices. On two
- * lungs of 20,000 vertices with a spreading length of 10 mm (--reach), the error is 0.2 % of the
+/** Default largest number of centres per lung, which are chosen from its vertices. On two lungs of
+ * 20,000 vertices with a spreading length of 10 mm (--reach), the error is 0.2 % of the
  * displacement at the other vertices and 0.05 % inside; this takes a few seconds. */
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 
 typedef struct supine_inside_options {
-  bool clamp;          /**< points outside move as the nearest point of the surface */
+  bool clamp;          /**< points outside a lung move like the nearest point of its surface */
   size_t centres;      /**< largest number of centres of one lung; 0: SUPINE_INSIDE_CENTRES */
-  const char *made_by; /**< for the file's metadata; optional */
+  const char *made_by; /**< optional: maker named in the file's metadata */
 } supine_inside_options;
 
 /** Result of embedding. */
 typedef struct supine_inside_report {
-  size_t count;                     /**< points in the file */
-  size_t in_lung[SUPINE_LUNGS_MAX]; /**< points in each lung or nearest to it */
-  size_t outside;                   /**< points outside every lung; for a grid, its outer nodes */
+  size_t count;                     /**< number of points in the file */
+  size_t in_lung[SUPINE_LUNGS_MAX]; /**< number of points in each lung or nearest to it */
+  size_t outside;                   /**< number of points outside every lung */
   size_t farthest;    /**< index of the outside point that is farthest from the lungs */
-  double farthest_mm; /**< its distance from them, mm */
-  size_t rigid;       /**< rigid parts of more than one vertex */
+  double farthest_mm; /**< distance of that point from the lungs, mm */
+  size_t rigid;       /**< number of rigid parts of more than one vertex */
 } supine_inside_report;
 
-/** Embed content in the lungs of an open basis, and write its basis file, with these additional
- * tensors
+/** Embed content in the lungs of an open basis, and write a basis file of the content, with these
+ * additional tensors
  *
  *     part       U32 [N]     index of the point's name; for a grid, of its node
  *     depth      F32 [N]     mm below the surface in the scan, negative outside
@@ -54,7 +54,6 @@ typedef struct supine_inside_report {
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)
  *
  * and the metadata "content": "points", "mesh" or "grid".
- * @param content  not changed
  * @retval SUPINE_ERROR_MESH  no content
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY, SUPINE_ERROR_WRITE
  * Cost: see biharmonic.h; in parallel. */

@@ -124,8 +124,8 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-/* Find a point's place in one lung, starting from the place of the last point; keep that place if
- * the point is farther than `far` from the surface, on the same side. */
+/* Update a walk's place in one lung for the next point. Keep it unchanged if it implies that the
+ * point is farther than `far` from the surface, on the same side. */
 static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
                     double far, supine_inside_walk *walk) {
   supine_inside_place *place = &walk->place[lung];

@@ -27,8 +27,8 @@ typedef struct supine_inside_shells {
   supine_pose scan; /**< the scan's state, in which content is given */
 } supine_inside_shells;
 
-/** Extract each lung's surface, in its state in the scan.
- * @param shells  written; supine_inside_shells_free releases it
+/** Extract each lung's surface as it is in the scan.
+ * @param shells  output; release with supine_inside_shells_free
  * @retval SUPINE_ERROR_MESH       a lung has no triangle, or a triangle joins two lungs
  * @retval SUPINE_ERROR_FORMAT     the basis is itself content of lungs, not their surface
  * @retval SUPINE_ERROR_NUMERICAL  the basis cannot reach the scan's volume
@@ -38,7 +38,7 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
 void supine_inside_shells_free(supine_inside_shells *shells);
 
 /** Find the displacements of a lung's vertices by each of the K modes, at weight 1 and gain 1.
- * @param displacement  [vertex_count, 3, K] mm, written */
+ * @param displacement  [vertex_count, 3, K] output, mm */
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);
 

@@ -15,21 +15,21 @@ enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 /* Distance, in radii of a box, beyond which a dipole replaces its triangles: the winding number
  * errs by less than 1 %, and its threshold is 50 %. */
 static const double dipole_distance = 2.0;
-/* Distance, mm, at which a point counts as on the surface, whose positions are float32. */
+/* Largest distance, mm, at which a point counts as on the surface, whose positions are float32. */
 static const double on_surface = 1e-3;
 
 typedef struct node {
   double low[3], high[3];
   uint32_t begin, end;
-  uint32_t right; /* second child; the first is the next node; 0: a leaf */
-  uint32_t leaf;  /* index of a leaf's boxes */
+  uint32_t right; /* index of the second child (the first is the next node); 0: a leaf */
+  uint32_t leaf;  /* index of a leaf's boxes in `leaves` */
 } node;
 
-/* The triangles of a node, seen from afar. */
+/* The dipole that replaces the triangles of a node for a distant point. */
 typedef struct dipole {
-  double area, centre[3]; /* centre of area, mm */
+  double area, centre[3]; /* mm^2; centre of area, mm */
   double normal[3];       /* sum of the triangles' unit normals times their areas, mm^2 */
-  double radius;          /* of the box, about the centre */
+  double radius;          /* of a ball about `centre` that contains the box, mm */
 } dipole;
 
 /* The boxes of a leaf's triangles, rounded outwards: least and greatest x, y and z. */
@@ -41,9 +41,9 @@ struct supine_inside_surface {
   const double *vertices;
   const uint32_t *triangles;
   size_t triangle_count;
-  uint32_t *order; /* triangles, leaf by leaf */
+  uint32_t *order; /* indices of all triangles, leaf by leaf */
   node *nodes;
-  dipole *dipoles; /* of each node; NULL: only distances are wanted */
+  dipole *dipoles; /* [nodes]; NULL if only distances are wanted */
   uint32_t node_count;
   boxes *leaves; /* boxes of the triangles of each leaf */
   uint32_t leaf_count;
@@ -60,8 +60,8 @@ typedef struct keyed {
   uint32_t triangle;
 } keyed;
 
-/* Stable merge sort by key, without a function call for each comparison.
- * @param space  [count / 2] */
+/* Sort by key: a stable merge sort without a function call for each comparison.
+ * @param space  [count / 2] work space */
 static void sort(keyed *item, size_t count, keyed *space) {
   const size_t half = count / 2;
   if (half == 0) {
@@ -120,7 +120,7 @@ static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   }
 }
 
-/* Add a part with centre of area `centre` to a dipole, whose centre is still the first moment. */
+/* Add a part to a dipole, whose centre stays a first moment until all parts are added. */
 static void add_part(dipole *d, double area, const double centre[3], const double normal[3]) {
   d->area += area;
   for (int k = 0; k < 3; ++k) {
@@ -199,7 +199,7 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error) {
-  const size_t leaves = 2 * count / LEAF + 1; /* each at least half full */
+  const size_t leaves = 2 * count / LEAF + 1; /* most leaves, as each is at least half full */
   supine_inside_surface *s = calloc(1, sizeof *s);
   keyed *space = malloc((count + count / 2) * sizeof *space);
   *surface = NULL;
@@ -238,19 +238,19 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   }
 }
 
-/* Find the parameter of an edge's nearest point to x, 0 at its start and 1 at its end; `offset`
- * leads from its start to x. */
+/* Find the parameter, 0 at the start to 1 at the end, of the point of an edge nearest to x.
+ * `offset` leads from the edge's start to x. */
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
   const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
   return t > 1.0 ? 1.0 : t > 0.0 ? t : 0.0;
 }
 
-/* Find the barycentric coordinates of the triangle's point nearest to x; false if a lower
- * bound of its squared distance, from the plane and an edge's line, exceeds `best`. */
+/* Find the barycentric coordinates of the triangle's point nearest to x; false if a lower bound of
+ * its squared distance from x exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  static const double slender = 1e-4; /* below it, coordinates are too inexact for the bound */
+  static const double slender = 1e-4; /* sin^2 of a corner below which b is too inexact */
   double u[3];
   double v[3];
   double w[3];
@@ -266,12 +266,12 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   b[1] = (vv * uw - uv * vw) / determinant;
   b[2] = (uu * vw - uv * uw) / determinant;
   b[0] = 1.0 - b[1] - b[2];
-  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* false where the triangle has no area */
+  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* NaN if the triangle has no area */
     return true;
   }
   const double ww = supine_dot(w, w);
-  const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu}; /* squared edges */
-  /* Bound on the squared distance within the plane of the triangle. */
+  const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu}; /* squared lengths of edges */
+  /* Squared distance from x's projection beyond which the triangle is farther than `best`. */
   const double limit = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
@@ -328,7 +328,7 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
   }
 }
 
-/* Search below node `at` for a triangle whose squared distance is below *best. */
+/* Search below node `at` for the triangle nearest to x, if its squared distance is below *best. */
 static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];
@@ -424,7 +424,7 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
                                                   const supine_inside_place *near) {
   supine_inside_place place = {.point = {point[0], point[1], point[2]}};
   double best = INFINITY;
-  if (near != NULL) { /* bound: the distance to `near` plus its depth */
+  if (near != NULL) { /* upper bound: the distance to `near` plus its depth */
     const double limit =
         (fabs(near->depth) + supine_distance(point, near->point)) * (1.0 + 1e-9) + 1e-9;
     best = limit * limit;
@@ -438,7 +438,7 @@ typedef struct distances {
   const supine_inside_surface *surface;
   const double *points;
   double *distance;
-  double *nearest; /* NULL: not wanted */
+  double *nearest; /* optional */
 } distances;
 
 static void distance_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -463,11 +463,11 @@ void supine_inside_surface_distances(const supine_inside_surface *surface, size_
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,
                                                const double point[3],
                                                const supine_inside_place *near) {
-  static const double half = 6.283185307179586; /* half of 4 pi */
+  static const double half = 6.283185307179586; /* half the full solid angle of 4 pi */
   supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)
-                           ? near->depth > 0.0 /* no surface lies between: the same side */
+                           ? near->depth > 0.0 /* no surface between them: the same side */
                            : angle(surface, 0, point) > half);
   place.depth = inside ? place.depth : -place.depth;
   return place;

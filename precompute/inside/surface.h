@@ -23,7 +23,7 @@ typedef struct supine_inside_place {
 /** Build a tree of boxes over the triangles.
  * @param vertices   [., 3] mm, must outlive the tree
  * @param triangles  [count, 3], 0 < count < 2^31, facing outwards; must outlive the tree
- * @param sides      true: supine_inside_surface_find will be called, which needs more memory
+ * @param sides      whether supine_inside_surface_find will be called, which needs more memory
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
@@ -31,7 +31,7 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
 /** Free the tree; NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
-/** Find the surface's nearest point; depth is positive on both sides. Thread-safe.
+/** Find the surface's nearest point; `depth` is positive on both sides. Thread-safe.
  * @param near  the place of a nearby point, to save work; NULL: none */
 supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
                                                   const double point[3],

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Weight lesions, and shrink collapsed lungs (VI). */
+/* Weight lesions, and shrink collapsed lungs ([Santhanam2008] VI). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

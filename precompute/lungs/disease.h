@@ -3,14 +3,13 @@
  * Diseased lungs ([Santhanam2008] VI): tumours that stiffen the tissue around them, and collapse.
  *
  * The model (model.h) stores lesions as factors on the stiffness, and collapse as each lung's share
- * of its healthy volume.
- */
+ * of its healthy volume. */
 #ifndef SUPINE_DISEASE_H
 #define SUPINE_DISEASE_H
 
 #include "precompute/lungs/lungs.h"
 
-/** A region of changed stiffness. With r the distance to its centre, E is multiplied by
+/** A region of changed stiffness. With r the distance to its centre, stiffness is multiplied by
  *
  *     factor^w     w = 1 for r <= radius/2,  0 for r >= radius,  3 q^2 - 2 q^3 between
  *                  q = 2 (1 - r / radius)
@@ -26,29 +25,28 @@ typedef struct supine_lesion {
 /** Multiply a lesion into `factors` [N], which start as 1 everywhere. Factors apply after stiffness
  * was scaled to geometric mean 1: scaling with the lesion included would soften all other tissue,
  * by 4 % for a lesion of factor 10 over 2 % of the vertices. At a given breath scale other tissue
- * therefore moves as before; at a given volume all of it moves more, by one ratio, to make up for
+ * therefore moves as before; at a given volume all tissue moves more, by one ratio, to make up for
  * the lesion.
  *
  * @param reached  optional output: number of vertices nearer than the radius; 0: no effect
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
- *                                positive and finite
- */
+ *             positive and finite */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                                        double *factors, size_t *reached, supine_error *error);
 
-/** Compute the surface with collapsed lungs (pneumothorax). `mesh` of the lungs keeps the healthy
- * shape, on which forces, heights and links are based.
+/** Compute the surface with collapsed lungs (pneumothorax). lungs->mesh keeps the healthy shape, on
+ * which forces, heights and links are based.
  *
  * A lung of share < 1 is shrunk about its hilum, the mean of the vertices in the quarter of its
- * width nearest the midline: lengths, and displacements with them, by k = share^(1/3), after the
- * field was solved on the healthy shape. So at any breath scale s
+ * width nearest the midline. Lengths, and displacements with them, are multiplied by share^(1/3)
+ * after the field was solved on the healthy shape, so at any breath scale s the volume of lung j is
  *
  *     V_j(s, g) = share x healthy V_j(s, g)
  *
- * exactly, for every direction of gravity, and for the surface itself.
+ * exactly, for every direction g of gravity, and for the surface itself.
  *
  * @param share     [lungs] volume over the healthy volume, 0 < share <= 1; 1: healthy
- * @param vertices  [N, 3] mm, written */
+ * @param vertices  [N, 3] output, mm */
 void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
 /** Scale directions of displacement [N, 3] from the healthy to the collapsed lungs, in place. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute expandability by a regional model (III-E), or read it from a file. */
+/* Compute expandability by a regional model ([Santhanam2008] III-E), or read it from a file. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -24,8 +24,8 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
     return SUPINE_OK;
   }
   if (law->axis < 0 || law->axis > 2) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "expandability: no axis %d: give 0, 1 or 2", law->axis);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "expandability: axis %d: give 0, 1 or 2",
+                            law->axis);
   }
   if (!positive(law->from) || !positive(law->to)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

@@ -11,7 +11,7 @@
 
 #include "precompute/lungs/lungs.h"
 
-/** Variation of expandability along an axis. */
+/** Expandability a as a function of a box coordinate t. */
 typedef enum supine_expandability_shape {
   SUPINE_EXPANDABILITY_UNIFORM = 0, /**< a = 1 */
   SUPINE_EXPANDABILITY_LINEAR,      /**< a = from + (to - from) t */
@@ -33,12 +33,12 @@ supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
                                                    const supine_expandability_law *law, double *a,
                                                    supine_error *error);
 
-/** Read a [N] from a CSV file: a header line, then either one value a line in the model's order, or
- * `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin with
- * #, are skipped.
+/** Read a [N] from a CSV file: a header line, then either one value per line in the model's order,
+ * or `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin
+ * with #, are skipped.
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice
- *                              or not in the model: the message names line and vertex
+ *             or not in the model: the message names line and vertex
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
                                                supine_error *error);

@@ -51,8 +51,8 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         pieces == 1 ? " is" : "s are");
   }
   if (pieces > 6) { /* two lungs have five lobes */
-    supine_findings_add(findings, "%s: warning: %zu pieces; remove those that are not lung", name,
-                        pieces);
+    supine_findings_add(findings, "%s: warning: %zu pieces; remove the pieces that are not lung",
+                        name, pieces);
   }
   return SUPINE_OK;
 }
@@ -166,7 +166,7 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
   return SUPINE_OK;
 }
 
-/* Choose the side of a single lung by its shape, or else by its place. */
+/* Choose the side of a single lung by its shape or, if that is unclear, by its position. */
 static supine_status take_side(const supine_mesh *meshes, size_t count,
                                const supine_lungs_source *source, int side, supine_lungs *lungs,
                                supine_findings *findings, supine_error *error) {

@@ -8,18 +8,18 @@
 
 /* A component with less than this share of the vertices does not make a lung. */
 static const double significant_share = 0.05;
-/* Boxes whose faces differ by less than this share of their size belong to the same lung: a mesh of
- * half the resolution has a box that differs by thousandths; those of two lobes or lungs differ by
- * far more. */
+/* If the faces of two boxes differ by less than this share of their size, both hold the same lung:
+ * a mesh of half the resolution has a box that differs by thousandths; the boxes of two lobes or
+ * lungs differ by far more. */
 static const double same_box_share = 0.01;
 /* Least ratio of the longest sides of two surfaces: lobes and lungs of one chest differ by less
  * than a factor of ten. */
 static const double least_side_share = 0.05;
-/* Largest extent of a lung beyond the midline over its extent on its own side: lungs reach across
+/* Largest ratio of a lung's extent beyond the midline to that on its own side: lungs reach across
  * the midline behind the breastbone. */
 static const double most_beyond_share = 0.5;
 
-/* A surface and the mean x of its vertices: surfaces are joined from left to right. */
+/* A surface and the mean x of its vertices. Surfaces are joined from left to right. */
 typedef struct placed_mesh {
   const supine_mesh *mesh;
   double mean_x;
@@ -115,7 +115,7 @@ double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topolo
 }
 
 /* Group vertices and triangles by lung, left first, keeping their order within each.
- * @param left  [components] */
+ * @param left  [components] whether a component lies left of the midline */
 static supine_status group(supine_lungs *lungs, const uint8_t *left, supine_error *error) {
   supine_mesh *mesh = &lungs->mesh;
   const size_t n = mesh->vertex_count;
@@ -170,8 +170,7 @@ static supine_status group(supine_lungs *lungs, const uint8_t *left, supine_erro
   return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for edges");
 }
 
-/* Refuse one lung given twice, even at two resolutions, and a surface that is tiny beside another.
- */
+/* Refuse a lung that is given twice, even at two resolutions, and a surface tiny beside another. */
 static supine_status check_surfaces(const supine_mesh *meshes, size_t count, supine_error *error) {
   for (size_t m = 1; m < count; ++m) {
     for (size_t i = 0; i < m; ++i) {
@@ -191,8 +190,8 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
       if (side[!first] < least_side_share * side[first]) {
         return supine_error_set(
             error, SUPINE_ERROR_MESH,
-            "surface %zu is %.3g mm long beside %.3g mm: it was not read "
-            "whole, is in other units, or does not belong here; leave it out or correct it",
+            "surface %zu is %.3g mm long beside another of %.3g mm: it is incomplete, "
+            "in other units, or no lung; correct it or leave it out",
             first ? i + 1 : m + 1, side[!first], side[first]);
       }
     }
@@ -201,7 +200,7 @@ static supine_status check_surfaces(const supine_mesh *meshes, size_t count, sup
 }
 
 /* Refuse a given midline that runs through a lung, or leaves both lungs on one side.
- * @param two_sided  the surfaces are two lungs */
+ * @param two_sided  whether the surfaces are two lungs */
 static supine_status check_midline(const supine_lungs *lungs, bool two_sided, supine_error *error) {
   if (two_sided && lungs->lung_count < 2) {
     return supine_error_set(error, SUPINE_ERROR_MESH,

@@ -13,7 +13,7 @@ typedef struct supine_lungs {
   supine_topology topology;
   size_t lung_count;        /**< 1 or 2 */
   size_t lung_begin[3];     /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
-  size_t triangle_begin[3]; /**< likewise its triangles */
+  size_t triangle_begin[3]; /**< triangles of lung j, in the same way */
   int side[2];              /**< +1 left, -1 right */
   bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
   double minimum[3];        /**< bounding box over all lungs, mm */
@@ -68,8 +68,8 @@ static inline supine_mesh supine_lungs_part(const supine_lungs *lungs, size_t lu
                        lungs->triangle_begin[lung + 1] - begin, lungs->mesh.triangles + 3 * begin};
 }
 
-/** Compute the box coordinates of (15)-(18), each 0 to 1: X from the midline outwards, Y from the
- * back to the front, Z from the apex to the base. */
+/** Compute the box coordinates of [Santhanam2008] (15)-(18), each 0 to 1: X from the midline
+ * outwards, Y from the back to the front, Z from the apex to the base. */
 void supine_lungs_box_coordinates(const supine_lungs *lungs, size_t vertex, double box[3]);
 
 #endif

@@ -2,9 +2,9 @@
 /* Make a synthetic pair of lungs: the radius about an inner centre, mm, is a sum of real spherical
  * harmonics to band 12.
  *
- * Fitted, to 5 mm RMS, to the surfaces of one adult's lungs in deep inspiration, derived from the
- * lung test data of Chaste (BSD-3-Clause, copyright University of Oxford and the Chaste authors).
- */
+ * The sums were fitted, to 5 mm RMS, to the surfaces of one adult's lungs in deep inspiration,
+ * derived from the lung test data of Chaste (BSD-3-Clause, (c) University of Oxford and Chaste
+ * authors). */
 #include <math.h>
 #include <stdlib.h>
 
@@ -31,7 +31,7 @@ size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
 /* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
-  const size_t axis = index / 4; /* of the coordinate +-1; the coordinate before it is 0 */
+  const size_t axis = index / 4; /* axis of the coordinate +-1; the axis before it has 0 */
   const double one = index % 2 == 0 ? -1.0 : 1.0;
   const double far = index % 4 < 2 ? golden : -golden;
   p[axis % 3] = one;
@@ -79,7 +79,7 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
       }
     }
   }
-  const size_t row = (i - 1) * (f - 1) - (i - 1) * i / 2; /* rows hold f - 2, f - 3, ... */
+  const size_t row = (i - 1) * (f - 1) - (i - 1) * i / 2; /* rows have f - 2, f - 3, ... vertices */
   return CORNERS + EDGES * (f - 1) + face * ((f - 1) * (f - 2) / 2) + row + (j - 1);
 }
 
@@ -123,7 +123,7 @@ enum { BAND = 12, TERMS = (BAND + 1) * (BAND + 1) };
 /* Centres of the left and the right lung, mm, LPS. */
 static const double centre[2][3] = {{97.4, -135.2, -98.5}, {-114.3, -153.7, -85.5}};
 
-/* Coefficients of the radius, mm, of the left, then the right lung; that of Y(l, m) is at
+/* Coefficients of the radius, mm, of the left, then the right lung; Y(l, m) has the coefficient at
  * l * l + l + m. */
 static const double radii[2][TERMS] = {
     {
@@ -193,8 +193,8 @@ static supine_status shape(size_t lung, size_t count, double *vertices) {
 supine_status supine_phantom_create(size_t vertices, double millilitres, supine_mesh *mesh,
                                     supine_error *error) {
   if (vertices < SUPINE_PHANTOM_VERTICES_MIN || vertices > SUPINE_PHANTOM_VERTICES_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu vertices: give %d to %d", vertices,
-                            SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "vertex count %zu: give %d to %d",
+                            vertices, SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
   }
   if (!(millilitres > 0.0) || !isfinite(millilitres)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a volume of %g mL: give a positive one",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the best few modes of the normals. */
+/* Find a small number of modes that represent the normals with the least error. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -24,8 +24,9 @@ enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
  * a time; the first lane of all is the reference surface, which is not a snapshot. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
-/* Largest mean and 99.9th percentile of the angle, degrees: a fifth below 0.1 and 1, as the error
- * of other postures and vertices differs a little from that of the held-out ones. */
+/* Largest mean and 99.9th percentile of the angle, degrees, between the normals of the modes and
+ * the exact normals. They are a fifth below 0.1 and 1, as other states and vertices than the
+ * held-out ones have slightly different errors. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees = 57.29577951308232; /* per radian */
@@ -34,14 +35,14 @@ static const double degrees = 57.29577951308232; /* per radian */
  * another snapshot. */
 static const double least_new = 1e-7;
 
-/* One lung's modes before they are rounded; A, n and V as in normals.h. */
+/* One lung's modes before they are rounded; A, n and V as in normal_modes.h. */
 typedef struct fit {
   size_t count;                     /* number of modes, at most MOST */
-  size_t snapshots;                 /* R */
-  size_t state[SNAPSHOTS];          /* [R] indices of their states */
+  size_t snapshots;                 /* number of snapshots, R */
+  size_t state[SNAPSHOTS];          /* [R] indices of the snapshots' states */
   float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share[1 + r][j] N(state_r) */
   double *weights;                  /* [MOST, 3, terms] V */
-  supine_normals_rows rows;         /* of held-out vertices */
+  supine_normals_rows rows;         /* polynomials of held-out vertices */
   float *modes;                     /* [rows, 3, MOST] n of the held-out vertices */
 } fit;
 
@@ -54,8 +55,8 @@ typedef struct normals_work {
   fit fits[SUPINE_LUNGS_MAX];
 } normals_work;
 
-/* Compute out [count, 3, n] = in [count, 3, terms] times matrix_c^T, matrix [n, 3, terms], for
- * each component c. */
+/* Compute out [count, 3, n] = in_c [count, 3, terms] times the transpose of matrix_c [n, 3, terms],
+ * for each component c. */
 static void apply_rows(const double *in, size_t count, size_t terms, const double *matrix, size_t n,
                        double *out) {
   for (size_t c = 0; c < 3; ++c) {
@@ -86,11 +87,11 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
                                       double coefficients[MOST * SNAPSHOTS]) {
   lapack_int pivots[STATES];
   lapack_int rank = 0;
-  double gram[SNAPSHOTS * SNAPSHOTS]; /* L^T L */
+  double gram[SNAPSHOTS * SNAPSHOTS]; /* L^T L, then overwritten */
   double values[SNAPSHOTS];
   const lapack_int info = LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product,
                                          (lapack_int)s, pivots, &rank, least_new);
-  if (info < 0) { /* above 0: the rank is lower than S */
+  if (info < 0) { /* above 0 if the rank is below S */
     return supine_lapack_status(info);
   }
   const size_t r = rank < SNAPSHOTS ? (size_t)rank : SNAPSHOTS;
@@ -258,7 +259,7 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
 }
 
 /* Add the angular errors of a lung's held-out vertices in the held-out states to `tally` and `sum`.
- * modes [rows, 3, count] and weights [count, 3, terms] are those of the file. */
+ * modes [rows, 3, count] and weights [count, 3, terms] are as in the file. */
 static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
                     const double *weights, supine_tally *tally, double *sum) {
   enum { BLOCK = 16 }; /* vertices whose exact normals are computed at a time */
@@ -267,7 +268,7 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   const size_t states = work->held_out.count;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
-  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] */
+  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] exact normals */
   double normals[3 * HELD_OUT];
   double angles[HELD_OUT];
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
@@ -329,12 +330,12 @@ static supine_status measure_all(const normals_work *work, size_t count,
 /* Work of make_modes: every vertex's modes, summed over the snapshots. */
 typedef struct planes_work {
   const normals_work *work;
-  size_t count; /* Q */
-  size_t first; /* state in the first lane: 0 the reference, 1 + r snapshot r */
+  size_t count; /* number of modes, Q */
+  size_t first; /* state in the first lane: 0, the reference surface; 1 + r, snapshot r */
   float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gains times weights */
   float *at;                                          /* [N, 3, LANES] positions, mm */
   float *modes;                                       /* [N, 3, Q] sums so far */
-  float *lengths;                                     /* [N] of the reference surface's normals */
+  float *lengths;                                     /* [N] length of each reference normal */
 } planes_work;
 
 static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
@@ -406,8 +407,8 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Set each lane's gains times weights. The monomials have them: those of axis a are in component
- * a + 2, modulo 3. */
+/* Set each lane's gains times weights, from the monomials: for axis a, they are terms 1 to K of
+ * component a + 2, modulo 3. */
 static void find_steer(const planes_work *planes) {
   const normals_work *work = planes->work;
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {

@@ -27,33 +27,33 @@
 /** The surface and the field that a basis file will hold. */
 typedef struct supine_normals_surface {
   size_t vertex_count, triangle_count, lung_count;
-  const size_t *lung_begin;         /**< [G + 1] */
-  const float *vertices;            /**< [N, 3] */
-  const uint32_t *triangles;        /**< [M, 3] */
-  const float *directions;          /**< [N, 3]; NULL: a vector field */
+  const size_t *lung_begin;  /**< [G + 1] first vertex of each lung, then N */
+  const float *vertices;     /**< [N, 3] reference surface, mm */
+  const uint32_t *triangles; /**< [M, 3] indices of vertices */
+  const float *directions;   /**< [N, 3] directions of displacement, mm; NULL: a vector field */
   const supine_compression *field;  /**< coefficients [N, K] or [N, 3, K], and their modes */
   const double *resting;            /**< [G, 9] harmonics of the volume at rest, mL beyond the
                                        reference surface; NULL: unknown, and `forms` is not used */
-  const supine_volume_forms *forms; /**< of the field */
-  double bend[3];                   /**< see supine_volume_bend */
+  const supine_volume_forms *forms; /**< volume forms of the field */
+  double bend[3]; /**< bend of the path from full inflation to rest (supine_volume_bend) */
 } supine_normals_surface;
 
 /** The modes of every vertex's normal, and their error. */
 typedef struct supine_normals_modes {
   size_t count;    /**< number of modes Q; 0: no normals */
-  int16_t *modes;  /**< [N, 3, Q] n as integers; `weights` contain their units */
-  double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V */
+  int16_t *modes;  /**< [N, 3, Q] n_ij as integers, in units that `weights` include */
+  double *weights; /**< [G, Q, 3, 1 + 2 K + K (K + 1) / 2] V_jc */
   double range[2]; /**< least and largest volume of the states, mL beyond the reference surface; if
                       rest is unknown, signed largest displacements, mm */
   double mean;     /**< mean angle from the exact normals, degrees, over held-out vertices and
                       states */
-  double p999;     /**< 99.9th percentile of that angle */
+  double p999;     /**< 99.9th percentile of that angle, degrees */
 } supine_normals_modes;
 
 /** Find the fewest modes, SUPINE_NORMALS_FEW to SUPINE_NORMALS_MOST in steps of 3 (three share a
- * word in an open basis), whose mean error is at most 0.08 degrees and the 99.9th percentile at
- * most 0.8, measured on up to 4096 vertices of each lung; the largest number if none reach that. A
- * field with more than SUPINE_NORMALS_FIELD_MAX modes gets no modes of normals. Cost: the surface
+ * word in an open basis), with a mean error of at most 0.08 degrees and a 99.9th percentile of at
+ * most 0.8, measured on up to 4096 vertices of each lung; the largest number if none achieves that.
+ * A field with more than SUPINE_NORMALS_FIELD_MAX modes gets no modes of normals. Cost: the surface
  * is deformed about 50 times. Uses all cores.
  * @param made  release with supine_normals_modes_free
  * @retval SUPINE_ERROR_NUMERICAL  an eigenvalue problem failed

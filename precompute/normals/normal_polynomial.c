@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute normals as polynomials: area vectors of triangles whose corners are linear in the weights
- * times the gains. */
+/* Compute normals, sums of triangles' area vectors, as polynomials of the weights and gains. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -20,8 +20,8 @@ void supine_normals_monomials(size_t modes, const double *weights, const double 
 /* The triangles around each vertex: corner[s] for begin[i] <= s < begin[i + 1] are the indices in
  * `triangles` that hold vertex i. */
 typedef struct supine_normals_fans {
-  uint32_t *begin;  /* [N + 2] */
-  uint32_t *corner; /* [3 M] */
+  uint32_t *begin;  /* [N + 2]; the last entry is work space */
+  uint32_t *corner; /* [3 M] indices into `triangles` */
 } supine_normals_fans;
 
 /* Find the triangles around each vertex. Release them with supine_normals_fans_free.
@@ -41,9 +41,9 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
 
 /* The polynomials of some vertices of one lung. */
 typedef struct supine_normals_rows {
-  size_t count;     /* R */
-  uint32_t *vertex; /* [R] */
-  double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normals.h) */
+  size_t count;     /* number of vertices, R */
+  uint32_t *vertex; /* [R] indices of the vertices */
+  double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normal_modes.h) */
 } supine_normals_rows;
 
 /* Find the polynomials of every `stride`-th vertex of a lung from `offset` on, without those whose
@@ -58,8 +58,8 @@ void supine_normals_rows_free(supine_normals_rows *rows);
 typedef struct supine_normals_states {
   size_t count;    /* S: states whose volume the lungs can reach */
   size_t room;     /* states requested */
-  double *phi;     /* [G, room, 3, terms] */
-  double range[2]; /* see supine_normals_modes */
+  double *phi;     /* [G, room, 3, terms] monomials of each lung in each state */
+  double range[2]; /* range of the states, as in supine_normals_modes */
 } supine_normals_states;
 
 /* Spread up to `count` states over the sphere and over the volumes from rest to the reference

@@ -11,7 +11,7 @@
 
 #include "precompute/normals/polynomial.h"
 
-/* Range of the largest displacement if rest is unknown, mm; negative: deflated. */
+/* Range of the states' largest displacement, mm, if rest is unknown; negative: deflated. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 
@@ -42,7 +42,7 @@ static double largest(const supine_normals_surface *s, const double *w) {
 
 /* Find each lung's gains at a share, 0 to 1, of its volume from rest to the reference surface, and
  * the volume of all lungs, `amount`, in mL beyond that surface. y [9] are the harmonics of gravity.
- * Return false if the surface folds before. */
+ * Return false if the surface folds before it reaches the volume. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
   *amount = 0.0;

@@ -16,28 +16,28 @@
 #include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 
-/* Number of vertices in a block, number of parts into which sums are divided (fixed, so that sums
- * do not depend on the number of threads), and largest number of halvings of a volume. */
+/* BLOCK: vertices in a block. PARTS: parts into which sums are divided, a fixed number, so that
+ * sums do not depend on the number of threads. VOLUME_HALVINGS: most halvings of a volume. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
 /* Sums over one of the PARTS. */
 typedef struct tally {
   double field2;         /* sum of the squared displacements at gain 1, mm^2 */
-  supine_tally error;    /* at gain 1, mm */
-  supine_tally error_mm; /* at equal volumes, mm */
+  supine_tally error;    /* errors at gain 1, mm */
+  supine_tally error_mm; /* errors at equal volumes, mm */
 } tally;
 
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] */
-  const double *weights;    /* [D, K] */
+  const double *directions; /* [N, 3] directions of displacement, mm */
+  const double *weights;    /* [D, K] weights of the modes */
   const double *scales; /* [D, 2] gains of the full solve and the compression; NULL: open surface */
   tally *tallies;       /* [PARTS] */
-  double *space;        /* [threads, BLOCK, K + 2 D] */
+  double *space;        /* [threads, BLOCK, K + 2 D] work space */
 } accuracy_work;
 
-/* Compute out = |a is - b should| length. */
+/* Compute the errors out [n], mm: the differences of displacements |a is - b should| length. */
 SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {
@@ -92,7 +92,7 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
 }
 
 /* Find the gains at which the full solve and the compression each reach `part` times the volumes
- * [D]; return false if they do not in some direction. */
+ * [D]; return false if one of them cannot in some direction. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
                         const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {

@@ -15,26 +15,26 @@
 typedef struct supine_accuracy {
   size_t direction_count;
   double relative_rms, relative_p95, relative_max; /**< at equal gains, over the RMS displacement */
-  /** Fraction, 0 to 1, of the requested volume at which the errors in mm were measured;
-   * supine_precompute states it in mL if rest is unknown. 0: the surface is open, and there are no
-   * errors in mm. */
+  /** Fraction, 0 to 1, of the requested volume at which the errors in mm were measured; if rest is
+   * unknown, supine_precompute replaces it by that volume in mL. 0: the surface is open, and there
+   * are no errors in mm. */
   double volume;
-  double rms_mm, p95_mm, max_mm; /**< at equal volumes */
+  double rms_mm, p95_mm, max_mm; /**< errors at equal volumes */
 } supine_accuracy;
 
 /** The full solve at D held-out directions, which no grid used: columns x functions^T, as exact as
  * the projection's span. */
 typedef struct supine_truth {
   size_t direction_count;
-  double *directions; /**< [D, 3] unit */
+  double *directions; /**< [D, 3] unit vectors */
   size_t rank;
   const double *columns; /**< [N, rank] owned by the projection */
-  double *functions;     /**< [D, rank] */
-  double *cubic; /**< [D, 3] coefficients of the volume, mL, in the gain; NULL: open surface */
+  double *functions;     /**< [D, rank] weights of the columns */
+  double *cubic;         /**< [D, 3] volume, mL, in powers 1 to 3 of the gain; NULL: open surface */
 } supine_truth;
 
 /** Find the full solve at `count` held-out directions. The projection must outlive it.
- * @param directions  [N, 3] d, mm
+ * @param directions  [N, 3] directions of displacement, mm
  * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supine_model *model,
@@ -48,10 +48,10 @@ void supine_accuracy_truth_free(supine_truth *truth);
 void supine_accuracy_held_out_directions(size_t count, double *directions);
 
 /** Measure the error. The 95th percentiles come from a histogram whose bins are at most 0.4 % wide.
- * @param directions  [N, 3] d, mm
+ * @param directions  [N, 3] directions of displacement, mm
  * @param forms       volume forms of the compression; NULL: open surface
- * @param volume      [9] harmonics of the volume for the errors in mm, mL beyond the reference; it
- * is halved until the field reaches it in every direction
+ * @param volume      [9] harmonics of the volume for the errors in mm, mL beyond the reference
+ *             surface; it is halved until the field reaches it in every direction
  * @retval SUPINE_ERROR_NUMERICAL  not even a thousandth of the volume is reached
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
@@ -61,12 +61,12 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       supine_error *error);
 
 /** Find the share, 0 to 1, of the triangles whose normal turns by more than a right angle from the
- * reference surface to a volume: the largest over the postures with gravity along an axis in which
- * the field reaches that volume. Up to 50,000 evenly chosen triangles are examined. Above a few in
- * a thousand the surface looks torn.
- * @param directions  [N, 3] d, mm
+ * reference surface to a volume: the largest share in the six postures with gravity along an axis,
+ * without those in which the field cannot reach the volume. Up to 50,000 evenly chosen triangles
+ * are examined. Above a few in a thousand the surface looks torn.
+ * @param directions  [N, 3] directions of displacement, mm
  * @param forms       volume forms of the compression; the surface must be closed
- * @param volume      [9] harmonics of the state's volume, mL beyond the reference
+ * @param volume      [9] harmonics of the state's volume, mL beyond the reference surface
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
@@ -75,9 +75,9 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
 
 /** Relative RMS errors at the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
-  size_t band_count;                        /**< L + 1 */
+  size_t band_count;                        /**< number of bands, L + 1 */
   double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [L + 1] error with the first (l + 1)^2 harmonics */
-  size_t mode_count;                        /**< K */
+  size_t mode_count;                        /**< number of modes, K */
   double modes[SUPINE_MODES_MADE_MAX];      /**< [K] error with the first k + 1 modes */
 } supine_error_table;
 

@@ -84,7 +84,7 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
   return SUPINE_OK;
 }
 
-/* Keep the first `count` of `width` values in each row, without gaps; `size` is bytes per value. */
+/* Keep the first `count` of `width` values of `size` bytes in each row, and close the gaps. */
 static void keep_columns(void *data, size_t rows, size_t width, size_t count, size_t size) {
   unsigned char *bytes = data;
   for (size_t r = 1; r < rows; ++r) {

@@ -13,8 +13,8 @@
 
 enum { VERTICES_MAX = 4096 };
 
-/* Compute gram [R, R], the scalar products of the columns with weights |d|^2 over evenly chosen
- * vertices: w' gram w is the squared displacement, summed over them, of the field columns x w. */
+/* Compute gram [R, R], the scalar products of the columns over evenly chosen vertices with weights
+ * |d|^2: w' gram w is the sum of the squared displacements of the field columns x w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
@@ -35,7 +35,7 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
   return cblas_ddot((int)rank, coefficients, 1, image, 1);
 }
 
-/* Compute residual -= part x weights; the rows of part [rank, count] are `stride` numbers apart. */
+/* Compute residual -= part x weights; rows of part [rank, count] are `stride` values apart. */
 static void subtract(const double *part, size_t stride, size_t count, const double *weights,
                      size_t rank, double *residual) {
   cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, (int)count, -1.0, part, (int)stride, weights,
@@ -63,7 +63,7 @@ supine_status supine_accuracy_error_table_create(const supine_truth *truth,
   find_gram(truth, compression->vertex_count, directions, gram);
   for (size_t d = 0; d < truth->direction_count; ++d) {
     const double *functions = truth->functions + d * rank;
-    (void)supine_sh_evaluate(projection->band, truth->directions + 3 * d, y); /* a unit vector */
+    (void)supine_sh_evaluate(projection->band, truth->directions + 3 * d, y); /* cannot fail */
     supine_projection_compression_weights(compression, truth->directions + 3 * d, weights);
     all += square_of(gram, rank, functions);
     memcpy(residual, functions, rank * sizeof *residual);

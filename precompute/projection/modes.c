@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the best functions of orientation by a singular value decomposition through small Gram
- * matrices. */
+/* Find the best functions of orientation as singular vectors, by way of small Gram matrices. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -15,8 +14,7 @@
  * values. */
 static const double rank_tolerance = 1e-7;
 
-/* Compute gram = columns^T diag(weight) columns, [R, R], its lower triangle in column-major order.
- */
+/* Compute the lower triangle, by columns, of gram [R, R] = columns^T diag(weight) columns. */
 static supine_status gram_matrix(const supine_projection *projection, const double *weight,
                                  double *gram) {
   enum { BLOCK = 1024 };
@@ -72,9 +70,10 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
 }
 
 /* Find the squares [R] of the singular values of C = sqrt(W) columns x functions, its leading right
- * singular vectors, modes [count, P], and the sum of all squares. C shares them with A = H
- * functions, where H^T H = columns^T W columns, because C^T C = A^T A. A has only R rows, so an R x
- * R eigenproblem of A A^T gives them. gram [R, R], columns^T W columns, is overwritten. */
+ * singular vectors, modes [count, P], and the sum of all squares. These are also those of A = H
+ * functions with H^T H = columns^T W columns, because C^T C = A^T A. As A has only R rows, the R x
+ * R matrix A A^T gives them: its eigenvalues sigma_k^2 and eigenvectors U_k. gram [R, R], columns^T
+ * W columns, is overwritten. */
 static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = projection->rank;
@@ -89,7 +88,7 @@ static supine_status find_modes(const supine_projection *projection, double *gra
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  /* The rows of H are eigenvectors times the roots of their eigenvalues. */
+  /* The rows of H are eigenvectors of gram times the roots of their eigenvalues. */
   for (size_t k = 0; k < rank; ++k) {
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
   }
@@ -102,7 +101,7 @@ static supine_status find_modes(const supine_projection *projection, double *gra
     *total += gram[r * rank + r];
   }
   status = supine_projection_leading_eigenpairs(rank, gram, rank, values, vectors);
-  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* A^T U_k / sigma_k */
+  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* mode k: A^T U_k / sigma_k */
     const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
                 vectors + k * rank, 1, 0.0, modes + k * terms, 1);

@@ -8,7 +8,7 @@
 #include <supine/sh.h>
 
 enum {
-  LATITUDES_PER_BAND = 8, /* of the grid; it has twice as many longitudes */
+  LATITUDES_PER_BAND = 8, /* latitudes of the grid; longitudes are twice as many */
   LATITUDES_MIN = 32
 };
 
@@ -21,13 +21,12 @@ void supine_projection_free(supine_projection *projection) {
 
 /* --- functions of gravity -------------------------------------------------------------------- */
 
-/* Directions of the grid [count, 3], and the lungs' least and largest g.p along each [count], mm.
- */
+/* Directions of the grid [count, 3], and the lungs' least and largest g.p along each, mm. */
 typedef struct grid_heights {
   double *directions, *minimum, *maximum;
 } grid_heights;
 
-/* Find the extents along half of the directions, and negate them for the opposite ones. */
+/* Find the heights along half of the directions, and negate them for the opposite directions. */
 static supine_status find_heights(const supine_lungs *lungs, bool pair, const supine_sh_grid *grid,
                                   grid_heights *made) {
   const size_t width = grid->longitudes;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Project the field over orientation on spherical harmonics:
+ * Project the field F_i of each vertex i over orientation on spherical harmonics:
  *
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
@@ -29,8 +29,8 @@ void supine_projection_free(supine_projection *projection);
 /** Project the field. The span's weights have kinks where another vertex becomes the lowest or
  * highest; a grid eight times finer than the band keeps them from aliasing. The caller frees the
  * projection with supine_projection_free.
- * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach, a band above
- *                                   SUPINE_SH_BAND_MAX, bad stiffness
+ * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach (model.h), a
+ *             band above SUPINE_SH_BAND_MAX, invalid stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
                                        size_t band, supine_projection *projection,
@@ -41,9 +41,9 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
 typedef struct supine_compression {
   size_t vertex_count;
   size_t band;
-  size_t mode_count;   /**< K */
+  size_t mode_count;   /**< number of modes, K */
   float *coefficients; /**< [N, K] */
-  double *modes;       /**< [K, (band + 1)^2] */
+  double *modes;       /**< [K, (band + 1)^2] harmonics of each mode */
   double *mix;         /**< [R, K]: coefficients = columns x mix */
 } supine_compression;
 
@@ -61,8 +61,8 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
  *
  * @param weight     [N] weight of each vertex's square, such as |d_i|^2; NULL: 1
  * @param mode_max   largest number of modes, 1 to SUPINE_MODES_MADE_MAX; there are fewer if the
- *                   matrix has lower rank
- * @param singular   [mode_max] singular values of the modes found, falling, then 0; optional
+ *             matrix has lower rank
+ * @param singular   [mode_max] singular values of the modes, in falling order, then 0; optional
  * @param total      sum of the squares of all singular values; optional
  * @retval SUPINE_ERROR_ARGUMENT   `mode_max` is out of range
  * @retval SUPINE_ERROR_NUMERICAL  the field is zero, or an eigenvalue problem failed
@@ -86,9 +86,9 @@ supine_status supine_projection_compression_create(const supine_projection *proj
 void supine_projection_compression_mix(const supine_projection *projection,
                                        supine_compression *made);
 
-/** Find the `count` leading eigenpairs of a symmetric matrix [n, n], largest eigenvalue first: the
- * first `count` of values [n], which is also work space, and vectors [count, n]. The matrix is
- * overwritten; only its lower triangle in column-major order is read.
+/** Find the `count` leading eigenpairs of a symmetric matrix [n, n], largest eigenvalue first, into
+ * vectors [count, n] and the first `count` of values [n]; the other values are work space. The
+ * matrix is overwritten; only its lower triangle in column-major order is read.
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, size_t count,
                                                    double *values, double *vectors);
@@ -103,7 +103,7 @@ void supine_projection_compression_field(const supine_compression *compression,
 
 /** Find the volume forms of the coefficients as they are stored, in single precision.
  * @param share       [G] each lung's share of its healthy volume; NULL: 1
- * @param directions  [N, 3] d, mm; NULL: a vector field */
+ * @param directions  [N, 3] directions of displacement, mm; NULL: a vector field */
 supine_status supine_projection_compression_volume_forms(
     const supine_compression *compression, const supine_lungs *lungs, const double *share,
     const double *directions, supine_volume_forms *forms, supine_error *error);

@@ -12,9 +12,9 @@
 /* Largest number of vertices, and number of directions, that the cross approximation examines. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest residual force relative to the largest force: with softening, where the RMS residual is
- * then 6e-5 of the RMS force, a hundredth of the error of 16 modes; and without, where only
- * rounding errors remain. */
+/* Largest residual force relative to the largest force. With softening, it is `tolerance`: the RMS
+ * residual is then 6e-5 of the RMS force, a hundredth of the error of 16 modes. Without, it is
+ * `rounding`, so that only rounding errors remain. */
 static const double tolerance = 3e-4;
 static const double rounding = 1e-12;
 
