@@ -209,7 +209,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(1, "less than the tissue", "precompute low.ply --scanned full-90000 -o b.safetensors");
   EXPECT(0, "warning: at full inflation the lungs hold 3000 mL (an adult's 4566 to 8525 mL)",
          "precompute lungs.ply --units 0.7937005 --band 2 -o a.safetensors");
-  EXPECT(0, "(expected 7300); rest supine 3000 mL (by --resting)",
+  EXPECT(0, "(expected 7300)\n  rest supine 3000 mL (by --resting)",
          "precompute lungs.ply --resting supine=3000mL --height 178 --sex male --band 3 "
          "-o a.safetensors");
   EXPECT(0, "3000.00 mL (-3000.00 mL)", "deform a.safetensors --posture supine -o a.ply");
