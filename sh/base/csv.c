@@ -21,7 +21,8 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Read the next line that is not blank, trimmed; NULL at the end or on failure. */
+/* Return the next line that is neither blank nor a comment, trimmed; NULL at the end or on failure.
+ */
 static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
   *status = SUPINE_OK;
   for (;;) {
@@ -44,7 +45,7 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
       return NULL;
     }
     static const char mark[] =
-        "\xEF\xBB\xBF"; /* some programs begin UTF-8 with a byte-order mark */
+        "\xEF\xBB\xBF"; /* byte-order mark, with which some programs begin UTF-8 */
     const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
     char *text = trim(csv->text + skip);
     if (*text != '\0' && *text != '#') {
@@ -53,9 +54,9 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
-/* Return the field at *rest, terminated; *rest then points to the next field, or is NULL after the
- * last. A quoted field may contain the separator, and "" for a quote. Return NULL if a quote is not
- * closed. */
+/* Return the field at *rest, ended by a NUL; move *rest to the next field, or to NULL after the
+ * last. A quoted field may contain the separator, and "" for a quote. Return NULL if its quote
+ * stays open. */
 static char *csv_field(char **rest, char separator) {
   char *field = *rest + strspn(*rest, " ");
   char *end = field;
@@ -104,7 +105,7 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
   return SUPINE_OK;
 }
 
-/* Find the field of each expected column. */
+/* Find the index of the field for each expected column. */
 static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
                                 size_t required, supine_error *error) {
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
@@ -120,7 +121,7 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
                               "%s:%zu: repeated column \"%s\" in the header: delete or rename one",
                               csv->path, csv->line, csv->field[f]);
     }
-    if (c < count) { /* else the column is not expected: ignore it */
+    if (c < count) { /* ignore columns that are not expected */
       csv->column[c] = f;
     }
   }
@@ -192,13 +193,13 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
   char *text = csv->field[csv->column[column]];
   char *end = NULL;
   char *comma = csv->separator == ';' ? strchr(text, ',') : NULL;
-  if (comma != NULL) { /* decimal comma, as in spreadsheets with ';' */
+  if (comma != NULL) { /* a decimal comma, as in spreadsheets with ';' */
     *comma = '.';
   }
   *number = strtod(text, &end);
   if (end == text || *end != '\0' || !isfinite(*number)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: %s \"%s\" is not a finite number: give one", csv->path,
+                            "%s:%zu: %s \"%s\" is not a finite number: give a number", csv->path,
                             csv->line, name, text);
   }
   return SUPINE_OK;
