@@ -8,7 +8,8 @@
 
 #include "runtime/internal.h"
 
-static const double default_above_scan = 500; /* mL, if the basis knows no rest */
+static const double default_above_scan =
+    500; /* default volume of a basis without rest, mL above the scan */
 
 supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                    double *weights) {
@@ -38,8 +39,8 @@ static void contract(const supine_basis *basis, size_t lung, const double *weigh
                          basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
-/* Compute the volume at rest, mL above the reference surface, from harmonics y: of lung `row`, or
- * of all lungs together (row 0) in files of versions 1 and 2. */
+/* Compute the volume at rest less the reference volume, mL, from harmonics y: of lung `row` or, in
+ * files of versions 1 and 2, of all lungs together (row 0). */
 static double resting(const supine_basis *basis, size_t row, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
@@ -56,11 +57,11 @@ static double sum_of(const double *values, size_t count) {
   return sum;
 }
 
-/* Volumes in one posture, mL above the reference surface. */
+/* Volumes in one posture less the reference volume, mL. */
 typedef struct volumes {
   size_t lungs; /* number of lungs */
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* 0 if the file has no volumes at rest by lung */
+  double rest[SUPINE_LUNGS_MAX]; /* each lung at rest; 0 if the file has no volume for each lung */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;
@@ -97,7 +98,7 @@ static supine_status refuse(const char *what, supine_error *error) {
                           what);
 }
 
-/* Find the volume of all lungs together, mL above the reference surface. */
+/* Find the volume of all lungs together less the reference volume, mL. */
 static supine_status total_of(const supine_basis *basis, const volumes *v,
                               const supine_volume *volume, double *total, supine_error *error) {
   switch (volume->kind) {
@@ -119,9 +120,9 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
   }
 }
 
-/* Divide a total among the lungs, all in mL above the reference surface. Above rest, every lung is
- * the same fraction of the way from its volume at rest to its volume at full inflation; below rest,
- * all lungs hold the same fraction of their volumes at rest. */
+/* Divide a total volume among the lungs; all volumes are mL above the reference volume. Above rest,
+ * every lung is the same fraction of the way from its volume at rest to its volume at full
+ * inflation; below rest, all lungs hold the same fraction of their volumes at rest. */
 static void share_out(const supine_basis *basis, const volumes *v, double total, double *lung_ml) {
   const double *reference = basis->info.reference_volume;
   const double whole = sum_of(reference, v->lungs);
@@ -141,8 +142,7 @@ static supine_status lung_gains(const supine_basis *basis, const volumes *v, siz
                                   pose->gains[lung], error);
 }
 
-/* Find the one gain for all lungs and axes at which they hold `total` mL more than the reference.
- */
+/* Find the one gain at which all lungs together hold `total` mL more than the reference volume. */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
                                   supine_error *error) {
   static const double straight[3] = {0, 0, 0};
@@ -182,7 +182,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  supine_error *error) {
   if (state->lung_count != v->lungs) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the state names %zu lung%s, and the basis has %zu: name them all",
+                            "the state names %zu lung%s, but the basis has %zu: name all of them",
                             state->lung_count, state->lung_count == 1 ? "" : "s", v->lungs);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
@@ -219,7 +219,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set the gains of a basis without volumes: 0 for the reference surface, the only state it has. */
+/* Set the gains for the reference surface, the only state of a basis without volumes. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;
