@@ -28,10 +28,10 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
                           "%s: %s: make it again with 'supine precompute'", c->name, detail);
 }
 
-/* Check that all numbers are finite and below 2^30 in magnitude. The numbers of every real lung
- * are, and sums over 256 modes of products of three such numbers stay finite. Comparing only the
- * exponent bits also refuses infinity and NaN and needs no branch for each element, so that the
- * check runs at the speed of memory. */
+/* Check that all numbers are finite and below 2^30 in magnitude. No lung needs larger numbers, and
+ * sums over 256 modes of products of three such numbers stay finite. Comparing only the exponent
+ * bits also refuses infinity and NaN and needs no branch for each element, so that the check runs
+ * at the speed of memory. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -408,8 +408,9 @@ static supine_status prepare(const check *c, supine_basis *basis,
   }
   basis->kernels = supine_kernels_choose(&simd);
   if (basis->kernels == NULL) {
-    return supine_error_set(c->error, SUPINE_ERROR_UNSUPPORTED,
-                            "this processor or build lacks the instruction set: choose AUTO");
+    return supine_error_set(
+        c->error, SUPINE_ERROR_UNSUPPORTED,
+        "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
   }
   basis->info.simd = simd;
   const bool choose = storage == SUPINE_STORAGE_AUTO;

@@ -15,7 +15,7 @@ enum {
 typedef struct block {
   _Alignas(64) unsigned char bytes[BLOCK_BYTES];
   float folded[WEIGHT_NUMBERS];
-  float held[GROUP][16]; /* `held` of supine_target, for each pose */
+  float held[GROUP][16]; /* supine_target.held for each pose */
 } block;
 
 /* Evaluate whole tiles of one lung for `count` poses. `positions` points to the first position of

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute volume, compliance and pressure along a limb of the P-V loop and over time in a breath.
- */
+/* Compute volume, compliance and pressure along a limb of the P-V loop, and over a breath. */
 #include <math.h>
 #include <stdbool.h>
 
@@ -111,7 +110,7 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which the limb holds a volume within its range, to 1e-11 of it.
+/* Find the pressure, cmH2O, for a volume within the limb's range, to 1e-11 of that range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };
@@ -174,7 +173,7 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
-      /* Inhale limb: a + b / (1 + exp(-(P - 10) / 6)) with a and b for 0 to 6000 mL, fitted. */
+      /* Inhale limb: fitted to a + b / (1 + exp(-(P - 10) / 6)) with a and b for 0 to 6000 mL. */
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
@@ -214,7 +213,7 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
 }
 
 /* Return the breath's position on its limb at a time in s: 0 at rest, 1 at the peak, linear in time
- * between them. Write the limb. */
+ * between them. Write which limb it is on. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);

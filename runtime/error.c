@@ -43,7 +43,7 @@ static double largest_displacement(const supine_basis *basis, const supine_pose 
 }
 
 double supine_basis_storage_error(const supine_basis *basis) {
-  static const double volume = 500;  /* above the reference surface, mL */
+  static const double volume = 500;  /* volume above the reference surface, mL */
   static const double distance = 20; /* largest displacement of an open surface, mm */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {

@@ -13,8 +13,7 @@ enum { RESTING_TERMS = 9 };
 
 /** Bytes above which positions are written with stores that bypass the caches: STREAM_BYTES for the
  * tiles and positions of a frame, STREAM_BATCH_BYTES for the positions of a batch. A range of at
- * most STREAM_RANGE vertices is always stored in the caches, as its caller probably reads it next.
- */
+ * most STREAM_RANGE vertices is always stored in the caches, as its caller is likely to read it. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
 /** Largest size of a lung's name in bytes, with its NUL. */
@@ -37,7 +36,7 @@ struct supine_basis {
   double mode_scale[SUPINE_MODES_MAX];
   /** Bounds on the packing error and the displacement of mode k at weight 1 and gain 1, mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
-  double reference_volume[SUPINE_LUNGS_MAX]; /**< mL, for info.reference_volume */
+  double reference_volume[SUPINE_LUNGS_MAX]; /**< info.reference_volume points here, mL */
   const double *resting; /**< harmonics of the volume at rest less the reference volume, mL: [G, 9],
                             or [9] for all lungs together; NULL without rest */
   bool rest_by_lung;     /**< `resting` is [G, 9], and each lung has its own gains */
@@ -90,7 +89,7 @@ double supine_basis_storage_error(const supine_basis *basis);
  * @param folded  [K + 3], written */
 void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded);
 
-/** Set all gains of a pose to the number at which its volume exceeds the reference by `volume` mL.
+/** Set all gains of a pose to the one number that adds `volume` mL to the reference volume.
  * @param pose  its weights are read, its gains written
  * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot hold this volume */
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);

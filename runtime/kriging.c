@@ -108,8 +108,7 @@ static bool absent(const supine_kriging_options *options, size_t term) {
 
 /* Compute the normal equations of the terms: matrix A = X' K^-1 X + P, right side X' K^-1 y + P m.
  * X are the columns of the terms, K is the covariance of the points, y are the residuals, P and m
- * the inverse covariance and mean of the prior. The row of an absent term is that of the identity.
- */
+ * the inverse covariance and mean of the prior. An absent term has a row of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;

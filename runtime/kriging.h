@@ -26,14 +26,14 @@
 enum {
   SUPINE_KRIGING_POINTS_MAX = 300,
   SUPINE_KRIGING_TERMS = 7,   /**< number of terms: translation 0 to 2, volume 3, rotation 4 to 6 */
-  SUPINE_KRIGING_COLUMNS = 10 /**< 1, v, p - c and y, with a row for each point */
+  SUPINE_KRIGING_COLUMNS = 10 /**< number of columns 1, v, p - c and y, with a row for each point */
 };
 
 typedef struct supine_kriging_model {
   double sill;   /**< s: 3-D variance of g per mm of displacement, mm */
   double length; /**< correlation length of g, mm */
   double across; /**< correlation between points of two lungs, 0 to 1 */
-  double least;  /**< |u|: length of the displacement, mm */
+  double least;  /**< smallest |u|, mm: replaces every smaller |u| */
 } supine_kriging_model;
 
 /** Fitted to full breaths of 15 patients: sill 6 mm, length 90 mm, across 1/3, least 2 mm. */
@@ -43,7 +43,7 @@ typedef struct supine_kriging_point {
   double position[3]; /**< p: position in the scan, mm */
   double volume[3];   /**< v: displacement for one prior standard deviation of the volume, mm */
   double residual[3]; /**< y: observed position less the law's position, mm */
-  double size;        /**< |u|, mm */
+  double size;        /**< |u|: length of the displacement, mm */
   double noise;       /**< standard deviation of the observation on each axis, mm, above 0 */
   size_t lung;
 } supine_kriging_point;
@@ -52,7 +52,7 @@ typedef struct supine_kriging_point {
 typedef struct supine_kriging_options {
   supine_kriging_model model;
   bool volume, rotation;
-  double volume_mean; /**< prior mean of b, in standard deviations */
+  double volume_mean; /**< prior mean of b */
 } supine_kriging_options;
 
 typedef struct supine_kriging {
@@ -62,7 +62,7 @@ typedef struct supine_kriging {
   double centre[3];                   /**< c, mean position of the points, mm */
   double *factor;   /**< [n, n] lower triangle L; the covariance of the points is L L' */
   double *whitened; /**< [SUPINE_KRIGING_COLUMNS, n] L^-1 times each column */
-  double *weights;  /**< [3, n] L^-1 times the residuals, less the fitted terms */
+  double *weights;  /**< [3, n] L^-1 times (the residuals less the fitted terms) */
   double terms[SUPINE_KRIGING_TERMS]; /**< fitted t, b and r; 0 for absent terms */
   /** Covariance of the terms; 0 for absent terms. */
   double covariance[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];

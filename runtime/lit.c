@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute normals from a few modes, with weights that are quadratic in the displacement's weights.
- */
+/* Compute normals from a few modes, with weights quadratic in the weights of the displacement. */
 #include <string.h>
 
 #include "runtime/internal.h"

@@ -6,7 +6,8 @@
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
-_Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX, "limits differ");
+_Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
+               "the limits differ");
 
 /* Prior standard deviation of the volume as a fraction of the reference volume: 0.3 of the
  * difference between rest (0.43 of the reference volume) and full inflation. */
@@ -184,8 +185,7 @@ static void find_residuals(workspace *s) {
 static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
-  const double *c =
-      s->fit->origin; /* difference of the means, as the rotation is still the identity */
+  const double *c = s->fit->origin; /* difference of the means: the rotation is the identity */
   double mean[3] = {0};
   const size_t n = s->task->count;
   for (size_t j = 0; j < 3 * n; ++j) {

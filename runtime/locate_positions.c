@@ -8,8 +8,9 @@
 /* Poses of the located state (at, fuller with more volume) and of the scan, and constants. */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* constant of the expected error, or the RMS displacement if smaller, mm */
-  double per_step; /* prior standard deviation of the volume over the volume added in `fuller` */
+  double constant; /* constant of the expected error or, if smaller, RMS displacement of at least 2
+                      mm, mm */
+  double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,

@@ -9,8 +9,7 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 *
-              4096, /* packed value of 1, within the range of all three numbers of fixed_narrow */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of 1, which fixed_narrow can hold */
   FLOAT_FRACTION_BITS = 23
 };
 

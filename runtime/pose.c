@@ -8,8 +8,7 @@
 
 #include "runtime/internal.h"
 
-static const double default_above_scan =
-    500; /* default volume of a basis without rest, mL above the scan */
+static const double default_above_scan = 500; /* default volume above the scan, mL */
 
 supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                    double *weights) {
@@ -61,7 +60,7 @@ static double sum_of(const double *values, size_t count) {
 typedef struct volumes {
   size_t lungs; /* number of lungs */
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* each lung at rest; 0 if the file has no volume for each lung */
+  double rest[SUPINE_LUNGS_MAX]; /* volume at rest; 0 if the file has none for each lung */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;
@@ -92,8 +91,8 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
 
 static supine_status refuse(const char *what, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                          "this basis has no volume at %s: its scan was used as it is "
-                          "(--scanned none, --law paper or --fields). Give scan+ML or an absolute "
+                          "this basis has no volume at %s, as its scan was used unchanged "
+                          "(--scanned none, --law paper or --fields): give scan+ML or an absolute "
                           "volume such as 2600mL",
                           what);
 }
@@ -219,7 +218,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set the gains for the reference surface, the only state of a basis without volumes. */
+/* Set the gains for the reference surface, the only state that a basis without volumes has. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;

@@ -55,9 +55,8 @@ static supine_status read_volume(const char *text, supine_volume *volume, supine
     if (!has_unit) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "'%s' needs a reference: rest%+g (from the end of a quiet expiration), full%+g (from "
-          "full "
-          "inflation), scan%+g (from the volume scanned), or %gmL (as measured in a CT)",
+          "'%s' needs a reference: rest%+g (from the end of a quiet expiration), full%+g "
+          "(from full inflation), scan%+g (from the volume scanned), or %gmL (as measured in a CT)",
           text, value, -fabs(value), value, fabs(value));
     }
   }
@@ -174,8 +173,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL &&
-      colon > equals) { /* this colon does not follow a posture */
+  if (equals != NULL && colon != NULL && colon > equals) { /* not the colon after a posture */
     colon = NULL;
   }
   if (colon == NULL) {

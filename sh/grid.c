@@ -62,7 +62,7 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
   status = SUPINE_OK;
 
 cleanup:
-  if (table != NULL) { /* the function of GSL 2.7 does not accept NULL */
+  if (table != NULL) { /* GSL 2.7 does not accept NULL here */
     gsl_integration_glfixed_table_free(table);
   }
   free(work);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Transform fields on a grid to coefficients: FFTW along longitude, Legendre functions along
- * latitude. */
+/* Transform fields on a grid to coefficients: FFTs along longitude, Legendre functions in latitude.
+ */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -41,8 +41,7 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
   if (band > SUPINE_SH_BAND_MAX || grid->latitudes <= band || grid->longitudes <= 2 * band) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "a grid of %zu x %zu directions cannot represent band %zu: give more "
-                            "than %zu latitudes and "
-                            "%zu longitudes, and a band of at most %d",
+                            "than %zu latitudes and %zu longitudes, and a band of at most %d",
                             grid->latitudes, grid->longitudes, band, band, 2 * band,
                             SUPINE_SH_BAND_MAX);
   }
@@ -84,8 +83,7 @@ void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double 
   fftw_execute_dft_r2c(plan->fft, (double *)(uintptr_t)ring, plan->spectrum);
   for (size_t m = 0; m <= plan->band; ++m) {
     for (size_t f = 0; f < plan->fields; ++f) {
-      const double *s =
-          plan->spectrum[m * plan->fields + f]; /* sum over longitudes of value exp(-i m phi) */
+      const double *s = plan->spectrum[m * plan->fields + f]; /* sum of value exp(-i m phi) */
       double *c = coefficients + f * count;
       for (size_t l = m; l <= plan->band; ++l) {
         const double y = weight * plan->legendre[gsl_sf_legendre_array_index(l, m)];

@@ -209,7 +209,7 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* Compute the length of vertex i's displacement, mm, from the q [3, K] of its lung (products_of).
+/* Compute the length of vertex i's displacement, mm, from the q [3, K] of products_of for its lung.
  */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
@@ -258,7 +258,7 @@ static double percentile(const supine_compare *compare, const float *distance, d
       }
     }
     uint32_t at = 0;
-    uint32_t last = 0; /* last bin with area, for a target above the sum by rounding */
+    uint32_t last = 0; /* last bin with area, used if rounding leaves `target` above the sum */
     for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
       below += bin[at];
       last = bin[at] > 0 ? at : last;

@@ -30,7 +30,7 @@ static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
   const double above = nearest_integer((value - (double)low) / step);
-  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1; /* also NaN */
+  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1; /* NaN: -top - 1 */
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
@@ -39,8 +39,7 @@ static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** Pack three numbers between -2^31 and 2^31 into the upper 11, the next 11 and the last 10 bits.
- */
+/** Pack three numbers between -2^31 and 2^31 into the upper 11, middle 11 and lower 10 bits. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 22) >> 22;
   const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;

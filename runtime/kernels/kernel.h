@@ -73,7 +73,7 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Constants for which the compiler specialises a loop. A loop for known modes writes positions. */
+/* Constants for which the compiler specialises a loop. If `modes` is known, it writes positions. */
 typedef struct form {
   supine_storage storage;
   size_t modes; /* number of modes; 0: any number */
@@ -263,7 +263,7 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *folded, size_t f
 }
 
 /* Choose the loop for the storage. The loop of INT16 for any number of modes also evaluates MIXED,
- * as it reads the numbers in which these storages differ from `tiles`. */
+ * as it reads from `tiles` all numbers in which the two storages differ. */
 INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_t first,
                            size_t count, const supine_target *target, size_t modes) {
   if (tiles->storage == SUPINE_STORAGE_EXACT) {

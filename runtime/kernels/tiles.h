@@ -35,16 +35,16 @@ typedef struct supine_tiles {
   size_t count;           /**< number of tiles */
   /** Exponent of the unit of compact reference positions, as the exponent bits of a float. */
   uint32_t reference_unit;
-  unsigned char *bytes; /**< [count, stride] */
+  unsigned char *bytes; /**< [count, stride] the tiles */
 } supine_tiles;
 
-/** Report whether a storage is compact: two or three coefficients share a word, and directions and
+/** Return whether a storage is compact: two or three coefficients share a word, and directions and
  * positions are fixed-point numbers. */
 static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return the number of words of a vertex that hold three coefficients each, for the last modes. */
+/** Return how many words of a vertex hold three coefficients each, for the last modes. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
@@ -61,7 +61,7 @@ static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
 }
 
 /** Fill in all members but `bytes` and `reference_unit` for a storage other than AUTO. The function
- * is inline, so that the layout is a constant if the number of modes is. */
+ * is inline, so that the layout is a constant where the number of modes is a constant. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
@@ -85,7 +85,7 @@ static inline size_t supine_tiles_normal_words(size_t modes) {
   return (modes + 2) / 3;
 }
 
-/** Fill in the layout of tiles of normals: 16 words for each axis and each word of a coordinate. */
+/** Fill in the layout of tiles of normals: for each axis and word, the words of 16 vertices. */
 static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
   *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
   tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);
@@ -116,7 +116,7 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
 
 /** Where and how a kernel writes. */
 typedef struct supine_target {
-  float *xyz;         /**< [16 tiles, 3] positions, displacements or normals */
+  float *xyz;         /**< [vertices of the tiles, 3] positions, displacements or normals */
   bool add_reference; /**< write positions; false: displacements */
   bool stream;        /**< use stores that bypass the caches */
   supine_prefetch prefetch;
@@ -157,9 +157,8 @@ typedef struct supine_kernels {
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;
-extern const supine_kernels supine_kernels_avx2; /**< members are NULL in builds without AVX2 */
-extern const supine_kernels
-    supine_kernels_avx512; /**< members are NULL in builds without AVX-512 */
+extern const supine_kernels supine_kernels_avx2;   /**< members are NULL without AVX2 */
+extern const supine_kernels supine_kernels_avx512; /**< members are NULL without AVX-512 */
 
 /** Return the kernels of an instruction set, or NULL if the processor or the build lacks it.
  * Replace AUTO in *simd by the widest set of this processor. */

@@ -20,7 +20,7 @@ struct supine_safetensors {
   size_t size;
   supine_platform_file mapping; /**< mapping that holds `bytes`; zero if the caller owns them */
   char *header;                 /**< a copy of the header, in which strings are decoded */
-  supine_tensor *tensors;       /**< in the order of their data */
+  supine_tensor *tensors;       /**< sorted by the position of their data */
   void **copies;                /**< aligned copies of misaligned tensors; NULL for the others */
   size_t tensor_count;
   supine_metadata *metadata;

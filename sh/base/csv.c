@@ -21,8 +21,7 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Return the next line that is neither blank nor a comment, trimmed; NULL at the end or on failure.
- */
+/* Return the next line that is not blank or a comment, trimmed; NULL at the end or on failure. */
 static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
   *status = SUPINE_OK;
   for (;;) {
@@ -44,8 +43,7 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
                            "%s:%zu: a NUL byte: save the file as CSV text", csv->path, csv->line);
       return NULL;
     }
-    static const char mark[] =
-        "\xEF\xBB\xBF"; /* byte-order mark, with which some programs begin UTF-8 */
+    static const char mark[] = "\xEF\xBB\xBF"; /* byte-order mark of UTF-8 */
     const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
     char *text = trim(csv->text + skip);
     if (*text != '\0' && *text != '#') {
@@ -55,8 +53,8 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
 }
 
 /* Return the field at *rest, ended by a NUL; move *rest to the next field, or to NULL after the
- * last. A quoted field may contain the separator, and "" for a quote. Return NULL if its quote
- * stays open. */
+ * last. A quoted field may contain the separator, and "" for a quote. Return NULL if a quote is
+ * open. */
 static char *csv_field(char **rest, char separator) {
   char *field = *rest + strspn(*rest, " ");
   char *end = field;

@@ -7,8 +7,7 @@
 
 #include <supine/status.h>
 
-/** Lines that begin with "warning: " or "note: ", some after the name of a file. Zero-initialise.
- */
+/** Lines that begin with "warning: ", "note: " or the name of a file and these. Zero-initialise. */
 typedef struct supine_findings {
   char text[4096]; /**< each line ends with a line feed */
 } supine_findings;

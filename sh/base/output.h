@@ -38,8 +38,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error);
 /** Discard the file. Legal after a failed open, after commit, and on a zeroed struct. */
 void supine_output_abandon(supine_output *output);
 
-/** Return whether the path is "-", standard output, or "-" with the ending of a format ("-.ply").
- */
+/** Return whether the path means standard output: "-", alone or with an ending ("-.ply"). */
 bool supine_output_is_standard(const char *path);
 
 /** Reserve standard output for supine_output_open: from then on, all other output goes to standard

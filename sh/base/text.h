@@ -8,8 +8,7 @@
 
 #include <supine/status.h>
 
-/** Append to `text`, which has `size` bytes with its NUL, by a printf format; cut off longer text.
- */
+/** Append to `text`, of `size` bytes with its NUL, by a printf format; cut off longer text. */
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 

@@ -81,9 +81,9 @@ SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
  * The exhale limb is the exponential of [Salazar1964] with k = ln 2 / 7.58 cmH2O, the mean
  * half-inflation pressure of 20 normal subjects, and 6000 mL, an adult's total lung capacity, at 30
  * cmH2O. The inhale limb is a sigmoid [Venegas1998] between the same ends with c = 10 and d = 6
- * cmH2O; it stays below the exhale limb. Its b d = 44,600 mL cmH2O lies in the 10^4 to 10^5 that
- * Narusawa (J. Appl. Physiol. 91, 2001, 201-210) found over published curves, but c and d are round
- * numbers, not means of measured lungs. */
+ * cmH2O; it stays below the exhale limb. The product b d, 44,600 mL cmH2O, lies between the 10^4
+ * and 10^5 that Narusawa (J. Appl. Physiol. 91, 2001, 201-210) found in published curves, but c and
+ * d are round numbers, not means of measured lungs. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
 /** Check a limb: finite numbers, rising ranges, and parameters within SUPINE_PV_CONTROL_MAX.

@@ -17,7 +17,7 @@
 extern "C" {
 #endif
 
-/** Areas and Gram matrices of a basis. They never change, so that threads may share them. */
+/** Areas and Gram matrices of a basis. They never change: any number of threads may share them. */
 typedef struct supine_compare supine_compare;
 
 /** Compute the Gram matrix of each lung and axis j, in one pass over the vertices i of the lung,

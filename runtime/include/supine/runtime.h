@@ -100,9 +100,8 @@ typedef struct supine_basis_info {
   const double *modes;           /**< [K, (L + 1)^2] coefficients of the weights in harmonics */
   const double *volume_linear; /**< [G, A, K] linear volume forms, mL (supine_volume_contract), with
                                   volume_axes A; NULL without volumes */
-  const double
-      *volume_quadratic;      /**< [G, A, K, K] quadratic volume forms, mL; NULL without volumes */
-  const double *volume_cubic; /**< [G, K, K, K] cubic volume forms, mL; NULL without volumes */
+  const double *volume_quadratic; /**< [G, A, K, K] quadratic volume forms, mL; or NULL */
+  const double *volume_cubic;     /**< [G, K, K, K] cubic volume forms, mL; or NULL */
   /** The memory that an evaluation reads: tiles of 16 vertices, each of 16 times bytes_per_vertex.
    * Use it only to measure memory traffic, as the layout changes between versions. */
   const void *packed;
@@ -133,7 +132,7 @@ typedef struct supine_pose {
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT       the file is truncated, corrupted or not a basis file
- * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or their size is not set
+ * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or the size is not set
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instruction set
  * @retval SUPINE_ERROR_MEMORY       an allocation failed
  * Cost: a few passes over the file. Memory: bytes_per_vertex for each vertex, 12 bytes for each
@@ -336,9 +335,8 @@ SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supi
                                            float *weights, float *gains);
 
 /** Pack the normals' modes of vertices begin <= i < end for supine.glsl: three modes to a word, in
- * W = (Q + 2) / 3 attributes of type uvec3. Its constant SUPINE_WORDS must be W.
- * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes a vertex if Q is
- *               6
+ * W = (Q + 2) / 3 attributes of type uvec3. W is SUPINE_WORDS of supine.glsl.
+ * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes each if Q is 6
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis has no normals, or was opened without_normals */
 SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
                                                 uint32_t *words);

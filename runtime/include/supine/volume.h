@@ -42,7 +42,8 @@ SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *
 /** Return V - F at the gains x, y and z, mL. */
 SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
 
-/** Compute V - F = cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL, for gains of s times `ratio`. */
+/** Compute the coefficients of V - F = cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL, where the
+ * gains are s ratio[0], s ratio[1] and s ratio[2]. */
 SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
                                          double cubic[3]);
 
