@@ -353,8 +353,7 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
                       "metadata 'bend' requires tensor 'resting_volume' with a row for each lung");
 }
 
-/* Check the optional volumes at rest: a row for each lung; in versions 1 and 2, one for all lungs.
- */
+/* Check the optional volumes at rest: a row for each lung, or one row for all lungs together. */
 static supine_status check_rest(const check *c, supine_basis *basis) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
   if (tensor == NULL) {

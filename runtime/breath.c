@@ -110,7 +110,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, for a volume within the limb's range, to 1e-11 of that range.
+/* Find the pressure, cmH2O, at which the limb holds a volume, with an error of the volume of at
+ * most 1e-11 of the limb's range. The volume must lie within that range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };
@@ -213,7 +214,7 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
 }
 
 /* Return the breath's position on its limb at a time in s: 0 at rest, 1 at the peak, linear in time
- * between them. Write which limb it is on. */
+ * between them. Write the limb on which the breath is. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -229,8 +230,8 @@ static double breath_share(const supine_pv_breath *breath, double time, supine_p
 typedef struct loop {
   double rest, peak; /* pressures at rest and at the peak, cmH2O */
   integrated limbs[SUPINE_PV_LIMB_COUNT];
-  double volume[SUPINE_PV_LIMB_COUNT]; /* volume at the pressure at rest, mL */
-  double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained from rest to peak, mL */
+  double volume[SUPINE_PV_LIMB_COUNT]; /* volume at the rest pressure, mL */
+  double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained up to the peak pressure, mL */
 } loop;
 
 /* Check both limbs, and that their ranges hold a pressure, which messages call `what`. */

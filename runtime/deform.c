@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute deformed positions, as many whole tiles of one lung at a time as possible. */
+/* Compute deformed positions, in runs of whole tiles of one lung where possible. */
 #include <string.h>
 
 #include "runtime/rigid.h"

@@ -63,7 +63,7 @@ double supine_basis_storage_error(const supine_basis *basis) {
       supine_pose_fill(&pose, largest > 0 ? distance / largest : 0);
     }
     const double error = supine_basis_error(basis, &pose);
-    worst = isnan(error) ? INFINITY : fmax(worst, error); /* NaN: out of the range of floats */
+    worst = isnan(error) ? INFINITY : fmax(worst, error); /* NaN means that floats overflowed */
   }
   return worst;
 }

@@ -236,7 +236,7 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
  * @param row  [n] column j of L^-1 */
 static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
   const size_t n = fit->count;
-  double column[VALUE]; /* row j of K^-1 X, by column */
+  double column[VALUE]; /* row j of K^-1 X */
   for (size_t c = 0; c < VALUE; ++c) {
     column[c] = dot(n, row, fit->whitened + c * n);
   }

@@ -13,8 +13,7 @@
  * covariance matrix. No function allocates; any number of threads may predict from one fit.
  *
  * The covariance is the Matern covariance of order 3/2 (Rasmussen & Williams, Gaussian Processes
- * for Machine Learning, 2006, equation 4.17), and universal kriging fits the terms (section 2.7).
- */
+ * for Machine Learning, 2006, equation 4.17), and the fit is universal kriging (section 2.7). */
 #ifndef SUPINE_KRIGING_H
 #define SUPINE_KRIGING_H
 
@@ -33,7 +32,7 @@ typedef struct supine_kriging_model {
   double sill;   /**< s: 3-D variance of g per mm of displacement, mm */
   double length; /**< correlation length of g, mm */
   double across; /**< correlation between points of two lungs, 0 to 1 */
-  double least;  /**< smallest |u|, mm: replaces every smaller |u| */
+  double least;  /**< lower bound on |u|, mm; replaces every smaller |u| */
 } supine_kriging_model;
 
 /** Fitted to full breaths of 15 patients: sill 6 mm, length 90 mm, across 1/3, least 2 mm. */
@@ -52,18 +51,18 @@ typedef struct supine_kriging_point {
 typedef struct supine_kriging_options {
   supine_kriging_model model;
   bool volume, rotation;
-  double volume_mean; /**< prior mean of b */
+  double volume_mean; /**< prior mean of b, the change of volume */
 } supine_kriging_options;
 
 typedef struct supine_kriging {
   supine_kriging_model model;
-  const supine_kriging_point *points; /**< [n], owned by the caller */
+  const supine_kriging_point *points; /**< [n] observed points, owned by the caller */
   size_t count;                       /**< number n of points */
   double centre[3];                   /**< c, mean position of the points, mm */
   double *factor;   /**< [n, n] lower triangle L; the covariance of the points is L L' */
   double *whitened; /**< [SUPINE_KRIGING_COLUMNS, n] L^-1 times each column */
   double *weights;  /**< [3, n] L^-1 times (the residuals less the fitted terms) */
-  double terms[SUPINE_KRIGING_TERMS]; /**< fitted t, b and r; 0 for absent terms */
+  double terms[SUPINE_KRIGING_TERMS]; /**< fitted terms t, b and r; 0 for absent terms */
   /** Covariance of the terms; 0 for absent terms. */
   double covariance[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
   /** The same covariance for the columns 1, v and p - c, summed over the axes: where the columns
@@ -105,9 +104,9 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double 
 /** The points of one lung at which to predict, with the p, |u| and v of supine_kriging_point. */
 typedef struct supine_kriging_target {
   size_t count, lung;
-  const float *position; /**< p [count, 3], mm */
-  const float *size;     /**< |u| [count], mm */
-  const float *volume;   /**< v [count, 3], mm; NULL if the volume is known */
+  const float *position; /**< positions p [count, 3], mm */
+  const float *size;     /**< lengths |u| of displacements [count], mm */
+  const float *volume;   /**< displacements v [count, 3], mm; NULL if the volume is known */
 } supine_kriging_target;
 
 /** Predict t + b v + r x (p - c) + g and its 3-D variance at every point of a target.

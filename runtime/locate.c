@@ -12,10 +12,10 @@ _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
 /* Prior standard deviation of the volume as a fraction of the reference volume: 0.3 of the
  * difference between rest (0.43 of the reference volume) and full inflation. */
 static const double prior_spread = 0.17;
-static const double outlier_limit = 3.0; /* an outlier's residual exceeds this multiple of sigma */
+static const double outlier_limit = 3.0; /* residual above which a point is an outlier, in sigma */
 static const double outlier_noise = 300; /* noise that replaces the noise of an outlier, mm */
-static const double volume_step = 1;     /* the search ends at smaller changes of volume, mL */
-static const double angle_step = 1e-4;   /* the search ends at smaller rotations, rad */
+static const double volume_step = 1;     /* the search ends when the volume changes by less, mL */
+static const double angle_step = 1e-4; /* the search ends when the rotation changes by less, rad */
 /* Ratio of the sill to the constant of the expected error: 6 mm to 4.5 mm. The constant is smaller,
  * as it was measured after the best translation. */
 static const double sill_of_error = 4.0 / 3;
@@ -69,7 +69,7 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
     if (o->vertex >= n || !isfinite(sum) || !(o->noise > 0) || !isfinite(o->noise)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "observation %zu: give a vertex below %zu (not %zu), a finite position "
+          "observation %zu: give a vertex below %zu instead of %zu, a finite position "
           "and a noise above 0",
           j + 1, n, o->vertex);
     }

@@ -8,8 +8,8 @@
 /* Poses of the located state (at, fuller with more volume) and of the scan, and constants. */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* constant of the expected error or, if smaller, RMS displacement of at least 2
-                      mm, mm */
+  double constant; /* smaller of the expected error's constant and the RMS displacement (at least 2
+                      mm), mm */
   double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
 } poses;
 

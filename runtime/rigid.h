@@ -17,7 +17,7 @@ void supine_rigid_rotation(const double h[3][3], double rotation[9]);
 typedef struct supine_rigid_motion {
   double count;          /**< number of vertices added */
   double from[3], to[3]; /**< sums of p and x, mm; their means after supine_rigid_finish */
-  double cross[3][3];    /**< sums of p_a x_b; about the means after supine_rigid_finish */
+  double cross[3][3];    /**< sum of p_a x_b; supine_rigid_finish subtracts the means of p and x */
   double rotation[9];    /**< R by rows, set by supine_rigid_finish */
 } supine_rigid_motion;
 

@@ -187,7 +187,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   char posture[PIECE];
   if ((size_t)(colon - text) >= sizeof posture) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "no posture '%.64s...': give one such as supine", text);
+                            "no posture '%.64s...': give a posture such as supine", text);
   }
   (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
   status = supine_state_parse_posture(posture, &read, error);

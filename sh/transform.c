@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Transform fields on a grid to coefficients: FFTs along longitude, Legendre functions in latitude.
- */
+/* Transform fields on a grid to coefficients: FFTs in longitude, Legendre functions in latitude. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>

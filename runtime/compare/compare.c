@@ -209,8 +209,7 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* Compute the length of vertex i's displacement, mm, from the q [3, K] of products_of for its lung.
- */
+/* Compute the length of vertex i's displacement, mm, from its lung's q [3, K] of products_of. */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];

@@ -20,7 +20,7 @@ static inline int32_t word_integer(uint32_t word) {
   return value;
 }
 
-/** Round a number of magnitude below 2^51 to the nearest integer, on every processor. */
+/** Round a number of magnitude below 2^51 to the nearest integer, by two additions. */
 static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
@@ -30,7 +30,9 @@ static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
   const double above = nearest_integer((value - (double)low) / step);
-  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1; /* NaN: -top - 1 */
+  const double held = above > top         ? top
+                      : above >= -top - 1 ? above
+                                          : -top - 1; /* -top - 1 for NaN */
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
@@ -66,8 +68,8 @@ static inline float normal_number(uint32_t word, size_t number) {
 }
 
 /** Pack three numbers between -2^31 and 2^31 into two words: the first two into the upper 21 bits
- * of a word each, the third into the remaining 22 bits. Replace 0 by the smallest positive number:
- * the kernels multiply by a power of two by adding it to the exponent bits (reference_unit). */
+ * of a word each, the third into the remaining 22 bits. Replace 0 by the smallest positive number,
+ * as the kernels multiply by a power of two by adding it to the exponent bits (reference_unit). */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;

@@ -73,7 +73,8 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Constants for which the compiler specialises a loop. If `modes` is known, it writes positions. */
+/* Constants for which the compiler specialises a loop, which writes positions if `modes` is known.
+ */
 typedef struct form {
   supine_storage storage;
   size_t modes; /* number of modes; 0: any number */

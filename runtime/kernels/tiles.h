@@ -27,7 +27,7 @@ enum {
 typedef struct supine_tiles {
   supine_storage storage;
   size_t modes;
-  size_t axes;            /**< 3 for vector fields, 1 for scalar fields */
+  size_t axes;            /**< axes with their own coefficients: 3 for vector fields, else 1 */
   size_t axis_bytes;      /**< bytes of the coefficients of one axis in one tile */
   size_t direction_begin; /**< byte offset of the directions in a tile */
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
@@ -85,7 +85,7 @@ static inline size_t supine_tiles_normal_words(size_t modes) {
   return (modes + 2) / 3;
 }
 
-/** Fill in the layout of tiles of normals: for each axis and word, the words of 16 vertices. */
+/** Fill in the layout of tiles of normals: rows of 16 words, supine_tiles_normal_words per axis. */
 static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
   *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
   tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);

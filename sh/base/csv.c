@@ -52,9 +52,9 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
-/* Return the field at *rest, ended by a NUL; move *rest to the next field, or to NULL after the
- * last. A quoted field may contain the separator, and "" for a quote. Return NULL if a quote is
- * open. */
+/* Return the field at *rest, ended by a NUL, and move *rest to the next field, or to NULL after the
+ * last. A quoted field may contain the separator, and "" for a quote. Return NULL if a quote is not
+ * closed. */
 static char *csv_field(char **rest, char separator) {
   char *field = *rest + strspn(*rest, " ");
   char *end = field;

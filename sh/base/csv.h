@@ -17,7 +17,7 @@ typedef struct supine_csv {
   const char *path;
   FILE *file;
   char *text;      /* current line */
-  size_t capacity; /* size of the memory of `text`, bytes */
+  size_t capacity; /* allocated size of `text`, bytes */
   size_t line;     /* number of the current line, from 1 */
   char separator;
   size_t field_count;

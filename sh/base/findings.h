@@ -7,7 +7,8 @@
 
 #include <supine/status.h>
 
-/** Lines that begin with "warning: ", "note: " or the name of a file and these. Zero-initialise. */
+/** Lines that begin with "warning: " or "note: ", or with the name of a file and one of these
+ * words. Zero-initialise. */
 typedef struct supine_findings {
   char text[4096]; /**< each line ends with a line feed */
 } supine_findings;

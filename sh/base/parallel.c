@@ -21,7 +21,7 @@ static void *piece_run(void *argument) {
   return NULL;
 }
 
-/* Read SUPINE_THREADS; return 0 if it is not set, -1 unless it is a number from 1 to 256. */
+/* Read SUPINE_THREADS; return 0 if it is not set, -1 if it is not a number from 1 to 256. */
 static long requested_threads(void) {
   const char *text = getenv("SUPINE_THREADS"); /* NOLINT(concurrency-mt-unsafe) */
   if (text == NULL) {

@@ -3,8 +3,7 @@
  * Comparisons of states: distances between deformed lungs, and ventilation by height.
  *
  * Averages are over the area of the reference surface: the weight a_i of vertex i is a third of the
- * area of its triangles, divided by the area of all triangles. A state is given by its supine_pose.
- */
+ * area of its triangles, divided by the area of all triangles. States are given as supine_pose. */
 #ifndef SUPINE_COMPARE_H
 #define SUPINE_COMPARE_H
 

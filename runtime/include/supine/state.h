@@ -6,7 +6,7 @@
  *              position, any of them tilted (supine+15), or gravity X:Y:Z
  *     VOLUME   rest   the end of a quiet expiration in that posture (FRC, with the tissue)
  *              full   full inflation (TLC, with the tissue)
- *              scan   the volume scanned
+ *              scan   the volume in the scan
  *              each with +ML or -ML added, as rest+500 or full-3000;
  *              2600mL, an absolute volume of gas and tissue;
  *              left=VOLUME,right=VOLUME for each lung
@@ -31,7 +31,7 @@ typedef enum supine_volume_kind {
   SUPINE_VOLUME_DEFAULT = 0, /**< the default volume of a basis (supine_basis_pose) */
   SUPINE_VOLUME_REST,        /**< the end of a quiet expiration in the posture */
   SUPINE_VOLUME_FULL,        /**< full inflation */
-  SUPINE_VOLUME_SCAN,        /**< the volume scanned */
+  SUPINE_VOLUME_SCAN,        /**< the volume in the scan */
   SUPINE_VOLUME_ABSOLUTE,    /**< 0 mL: `ml` is the volume of gas and tissue, as in a CT */
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;

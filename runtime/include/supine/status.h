@@ -51,7 +51,8 @@ typedef struct supine_error {
   char message[512]; /**< one line, NUL-terminated, no trailing newline */
 } supine_error;
 
-/** Unless `error` is NULL, set its status, and its message by a printf format, cut off if too long.
+/** Set the status and the message of `error` unless it is NULL. A long message is cut off.
+ * @param format  printf format of the message
  * @return `status` */
 SUPINE_API supine_status supine_error_set(supine_error *error, supine_status status,
                                           const char *format, ...) SUPINE_PRINTF(3, 4);

@@ -213,5 +213,5 @@ normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 
 
 def string(text: Optional[bytes]) -> str:
-    """Decode UTF-8, and None to ""."""
+    """Decode UTF-8; return "" for None."""
     return (text or b"").decode(errors="replace")
