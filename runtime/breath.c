@@ -110,8 +110,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which the limb holds a volume, with an error of the volume of at
- * most 1e-11 of the limb's range. The volume must lie within that range.
+/* Find the pressure, cmH2O, at which the limb holds a volume, mL, within its range of volumes. The
+ * volume at the result errs by at most 1e-11 of that range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };

@@ -25,14 +25,13 @@ static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
 
-/** Return the word nearest to `value` whose lowest `bits` bits are those of `low`. */
+/** Return the word nearest to `value`, or the smallest word for NaN, whose lowest `bits` bits are
+ * those of `low`. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
   const double above = nearest_integer((value - (double)low) / step);
-  const double held = above > top         ? top
-                      : above >= -top - 1 ? above
-                                          : -top - 1; /* -top - 1 for NaN */
+  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1;
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
