@@ -29,8 +29,9 @@ static void fill(const supine_kriging *fit, const supine_kriging_target *target,
   }
 }
 
-/* Compute the covariances of g between a run and observed point j, mm^2. exp(-a) is the 64th power
- * of exp(-a / 64), by a polynomial of degree 5, with a relative error of 1e-6. */
+/* Compute the covariances of the field between a run and observed point j, mm^2. The factor exp(-a)
+ * of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 5 approximates; its
+ * relative error is 1e-6. */
 static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *in, float *out) {
   const supine_kriging_point *p = &fit->points[j];
   const double size = p->size > fit->model.least ? p->size : fit->model.least;

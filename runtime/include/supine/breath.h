@@ -54,6 +54,7 @@ enum {
                                 range, far more than in any lung */
 };
 
+/** The limbs of a P-V loop. */
 typedef enum supine_pv_limb {
   SUPINE_PV_INHALE = 0,
   SUPINE_PV_EXHALE,

@@ -41,6 +41,7 @@ enum { SUPINE_LUNGS_MAX = 16 };
 /** Largest number of modes of the normals. */
 enum { SUPINE_NORMAL_MODES_MAX = 64 };
 
+/** An open basis. */
 typedef struct supine_basis supine_basis;
 
 /** How an open basis keeps coefficients, directions and reference positions in memory. */

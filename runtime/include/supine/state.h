@@ -36,6 +36,7 @@ typedef enum supine_volume_kind {
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;
 
+/** A volume, counted from a reference. */
 typedef struct supine_volume {
   supine_volume_kind kind;
   double ml; /**< volume above the reference, mL; negative: below */
@@ -44,6 +45,7 @@ typedef struct supine_volume {
 /** Largest number of named lungs, and size of a name in bytes with its NUL. */
 enum { SUPINE_STATE_LUNGS_MAX = 2, SUPINE_STATE_NAME_SIZE = 16 };
 
+/** A posture, and a volume of all lungs or of each lung. */
 typedef struct supine_state {
   double gravity[3];    /**< unit vector in body axes (LPS) that points where things fall */
   supine_volume volume; /**< volume of all lungs together; unused if lungs are named */
