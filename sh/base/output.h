@@ -16,7 +16,7 @@
  * supine_output_commit reports errors. */
 typedef struct supine_output {
   FILE *file;
-  char *path;      /**< as given by the user */
+  char *path;      /**< path as given by the user */
   char *target;    /**< path with symbolic links followed */
   char *temporary; /**< temporary name; NULL or "" if there is none */
   bool standard;   /**< the file is standard output */
