@@ -141,7 +141,7 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* Compute the terms, their covariance A^-1, and `spread`, the same for the columns. */
+/* Compute the terms, their covariance A^-1, and the `spread` of the columns' factors. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
   double inverse[TERMS][TERMS]; /* row k: column k of the inverse of `factor` */

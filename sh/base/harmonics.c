@@ -51,7 +51,8 @@ supine_status supine_sh_evaluate(size_t band, const double direction[3], double 
   double re = 1;
   double im = 0;
   evaluate_order(band, 0, unit[2], top, re, im, y);
-  top *= 1.41421356237309504880; /* sqrt(2), as cos and sin replace exp(+-i m phi) */
+  top *=
+      1.41421356237309504880; /* sqrt(2), as the terms have cos or sin instead of exp(+-i m phi) */
   for (size_t m = 1; m <= band; ++m) {
     const double turned = re * unit[0] - im * unit[1];
     im = re * unit[1] + im * unit[0];

@@ -74,7 +74,7 @@ typedef struct supine_location {
   double volume_prior_error; /**< standard deviation of `volume` without observations, mL; 0 if the
                                   volume was given */
   double rotation[9]; /**< [3, 3] by rows: observed = rotation (body + correction) + translation */
-  double translation[3]; /**< the translation in this equation, mm */
+  double translation[3]; /**< translation in the equation of `rotation`, mm */
   double residual_rms;   /**< RMS distance of the points from their predictions by all other points,
                             mm, without outliers; 0 for one point */
   double log_evidence;   /**< log likelihood, to compare tasks that differ only in the posture */
