@@ -11,7 +11,7 @@
 #include "runtime/internal.h"
 #include "runtime/safetensors/platform.h"
 
-/* The file that is being checked, its name, and the error that a failure fills in. */
+/* The file being checked, its name in messages, and the error struct that a failure fills in. */
 typedef struct check {
   const supine_safetensors *file;
   const char *name;
@@ -28,10 +28,10 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
                           "%s: %s: make it again with 'supine precompute'", c->name, detail);
 }
 
-/* Check that all numbers are finite and below 2^30 in size. No number of a lung is larger in any
- * unit used here, and below this limit sums over 256 modes of products of three numbers stay
- * finite. Only the exponent bits are compared, which also refuses infinity and NaN, without a
- * branch for each element: this runs at the speed of memory. */
+/* Check that all numbers are finite and below 2^30 in magnitude. No lung needs larger numbers, and
+ * sums over 256 modes of products of three such numbers stay finite. Comparing only the exponent
+ * bits also refuses infinity and NaN and needs no branch for each element, so that the check runs
+ * at the speed of memory. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -45,17 +45,16 @@ static bool finite_floats(const float *values, size_t count) {
 static bool finite_doubles(const double *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
-    bad += fabs(values[i]) < 0x1p30 ? 0 : 1; /* or NaN */
+    bad += fabs(values[i]) < 0x1p30 ? 0 : 1; /* also counts NaN, which compares false */
   }
   return bad == 0;
 }
 
-/* Length of an axis that may have any length. */
+/* Expected length that matches an axis of any length. */
 #define ANY SIZE_MAX
 
-/* Return the numbers of a tensor, after a check of its type, its shape and that they are finite;
- * replace ANY in `shape` by the length of the tensor's axis. Return NULL and set the error if the
- * file has no such tensor. */
+/* Find a tensor and check its type, shape and numbers. Replace each ANY in `shape` by the length of
+ * that axis. Return the numbers, or NULL with the error set if the tensor is missing or unfit. */
 static const void *want(const check *c, const char *name, supine_dtype dtype, size_t rank,
                         size_t *shape) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, name);
@@ -81,8 +80,8 @@ static const void *want(const check *c, const char *name, supine_dtype dtype, si
   return tensor->data;
 }
 
-/* Check format, version, kind and checksum. Files of version 1 state 16 digits of another checksum,
- * which is not checked. */
+/* Check the metadata and the checksum. Files of version 1 may have a checksum of 16 digits by an
+ * older algorithm, which is not checked. */
 static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *format = supine_safetensors_metadata(c->file, "format");
   const char *version = supine_safetensors_metadata(c->file, "version");
@@ -94,12 +93,12 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
                             c->name);
   }
   if (version == NULL || strlen(version) != 1 || strchr("123", version[0]) == NULL) {
-    return refuse(c, "version %.16s of the basis format, where this program reads versions 1 to 3",
+    return refuse(c, "its basis format has version %.16s, but this program reads 1 to 3",
                   version == NULL ? "unknown" : version);
   }
   info->volume_axes = version[0] == '3' ? 3 : 1;
   if (kind == NULL || (strcmp(kind, "scalar") != 0 && strcmp(kind, "vector") != 0)) {
-    return refuse(c, "metadata kind is neither scalar nor vector");
+    return refuse(c, "metadata 'kind' is neither scalar nor vector");
   }
   info->vector = strcmp(kind, "vector") == 0;
   const char *stated = supine_safetensors_metadata(c->file, "checksum");
@@ -123,9 +122,10 @@ static supine_status check_surface(const check *c, supine_basis *basis) {
     highest = info->triangles[i] > highest ? info->triangles[i] : highest;
   }
   return info->vertex_count < 1 || info->vertex_count > UINT32_MAX
-             ? refuse(c, "%zu vertices: a surface has 1 to 4294967295", info->vertex_count)
+             ? refuse(c, "the number of vertices is %zu, not 1 to 4294967295", info->vertex_count)
          : highest >= info->vertex_count
-             ? refuse(c, "a triangle names vertex %u of %zu", highest, info->vertex_count)
+             ? refuse(c, "a triangle refers to vertex %u, but the number of vertices is %zu",
+                      highest, info->vertex_count)
              : SUPINE_OK;
 }
 
@@ -142,7 +142,7 @@ static supine_status check_field(const check *c, supine_basis *basis) {
   }
   info->mode_count = info->vector ? vector[2] : scalar[1];
   if (info->mode_count < 1 || info->mode_count > SUPINE_MODES_MAX) {
-    return refuse(c, "%zu modes: a basis has 1 to %d", info->mode_count, SUPINE_MODES_MAX);
+    return refuse(c, "the number of modes is %zu, not 1 to %d", info->mode_count, SUPINE_MODES_MAX);
   }
   if (!info->vector) {
     info->direction = want(c, "direction", SUPINE_F32, 2, direction);
@@ -162,7 +162,7 @@ static supine_status check_modes(const check *c, supine_basis *basis) {
   }
   return shape[1] == supine_sh_count(info->band)
              ? SUPINE_OK
-             : refuse(c, "modes have %zu harmonics, which is not (L + 1)^2 for an L from 0 to %d",
+             : refuse(c, "tensor 'modes' has %zu columns, not (L + 1)^2 for an L from 0 to %d",
                       shape[1], SUPINE_SH_BAND_MAX);
 }
 
@@ -186,8 +186,8 @@ static void bound_lungs(supine_basis *basis) {
   basis->info.bounds = basis->bounds[0][0];
 }
 
-/* Name the lungs as metadata "lungs" lists them, "left,right", and the others by their index;
- * return the number of names. */
+/* Read the names of the lungs from the metadata "lungs", such as "left,right"; name further lungs
+ * by their index. Return the number of names in the metadata. */
 static size_t name_lungs(const check *c, supine_basis *basis) {
   const char *at = supine_safetensors_metadata(c->file, "lungs");
   size_t named = 0;
@@ -206,8 +206,8 @@ static size_t name_lungs(const check *c, supine_basis *basis) {
   return named;
 }
 
-/* Find where each lung's vertices begin: they are grouped by lung, 0 ... 0 1 ... 1 2 ... A lung
- * that the metadata names may be empty, as embedded content may lie in one lung only. */
+/* Check that tensor 'lung' groups the vertices by lung (0 ... 0 1 ... 1 2 ...), and find where each
+ * lung begins. A lung that the metadata names may be empty: content may lie in one lung only. */
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t n = info->vertex_count;
@@ -242,8 +242,8 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Check the volume forms, which are optional: all three or none. Since version 3, the first two
- * have one more axis. */
+/* Check the three volume tensors: all or none must exist. In version 3, `volume_linear` and
+ * `volume_quadratic` have an additional axis for x, y and z. */
 static supine_status check_volume(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t g = info->lung_count;
@@ -267,8 +267,8 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
              : SUPINE_ERROR_FORMAT;
 }
 
-/* Read the numbers, separated by commas, of a metadata string. If the file lacks it, leave `values`
- * as they are. */
+/* Parse the metadata `key`, which must hold `count` numbers separated by commas. Leave `values`
+ * unchanged if the file has no such metadata. */
 static supine_status read_numbers(const check *c, const char *key, size_t count, double *values) {
   const char *const text = supine_safetensors_metadata(c->file, key);
   const char *at = text;
@@ -276,7 +276,7 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
     char *end = NULL;
     values[i] = strtod(at, &end);
     if (end == at || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
-      return refuse(c, "metadata %s is not a list of %zu finite number%s: %.48s", key, count,
+      return refuse(c, "metadata '%s' is not a list of %zu finite number%s: %.48s", key, count,
                     count == 1 ? "" : "s", text);
     }
     at = end + 1;
@@ -284,7 +284,7 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
   return SUPINE_OK;
 }
 
-/* Compute the volume in mL that each lung of the reference surface encloses. */
+/* Add the volume that each lung of the reference surface encloses to reference_volume, mL. */
 static void measure_lungs(supine_basis *basis) {
   const supine_basis_info *info = &basis->info;
   for (size_t t = 0; t < info->triangle_count;) {
@@ -312,8 +312,8 @@ static void measure_lungs(supine_basis *basis) {
   }
 }
 
-/* Find the volume of each lung of the reference surface: measure it or, in a file of embedded
- * content, whose vertices are not that surface, read it from the metadata. */
+/* Find the volume of each lung of the reference surface, mL. Measure the surface, unless the file
+ * holds embedded content, whose metadata state the volumes. */
 static supine_status check_reference(const check *c, supine_basis *basis) {
   basis->info.reference_volume = basis->reference_volume;
   if (!basis->info.has_volume) {
@@ -327,7 +327,8 @@ static supine_status check_reference(const check *c, supine_basis *basis) {
   return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* Read the state of the scan. Without metadata, the scan is the reference surface, supine. */
+/* Read the metadata of the scan's state and of full inflation. Without them, the scan is the
+ * reference surface, supine. */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
@@ -348,11 +349,11 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
   }
   return supine_safetensors_metadata(c->file, "bend") == NULL || basis->rest_by_lung
              ? SUPINE_OK
-             : refuse(c, "metadata bend requires tensor 'resting_volume' by lung");
+             : refuse(c,
+                      "metadata 'bend' requires tensor 'resting_volume' with a row for each lung");
 }
 
-/* Check the volumes at rest, which are optional: by lung, or of all lungs together in files of
- * versions 1 and 2. */
+/* Check the optional volumes at rest: a row for each lung, or one row for all lungs together. */
 static supine_status check_rest(const check *c, supine_basis *basis) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
   if (tensor == NULL) {
@@ -366,7 +367,7 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
   return basis->resting != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Check the normals, which are optional: the modes and their weights, or neither. */
+/* Check the optional normals: the tensors of their modes and of their weights, both or neither. */
 static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t terms = supine_basis_normal_terms(basis);
@@ -381,7 +382,7 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   }
   info->normal_count = shape[2];
   if (info->normal_count < 1 || info->normal_count > SUPINE_NORMAL_MODES_MAX) {
-    return refuse(c, "%zu modes of the normals: a basis has 1 to %d", info->normal_count,
+    return refuse(c, "the number of modes of the normals is %zu, not 1 to %d", info->normal_count,
                   SUPINE_NORMAL_MODES_MAX);
   }
   size_t one[] = {info->lung_count, info->normal_count, terms};
@@ -391,11 +392,11 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Choose the kernels and pack the tensors. For AUTO, choose the smallest storage that is accurate
- * enough. */
+/* Choose the kernels and pack the tensors. For SUPINE_STORAGE_AUTO, choose the smallest storage
+ * whose error is at most error_limit_mm. */
 static supine_status prepare(const check *c, supine_basis *basis,
                              const supine_basis_options *options) {
-  static const double error_limit = 0.005; /* mm */
+  static const double error_limit_mm = 0.005;
   supine_storage storage = options->storage;
   supine_simd simd = options->simd;
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
@@ -406,12 +407,13 @@ static supine_status prepare(const check *c, supine_basis *basis,
   }
   basis->kernels = supine_kernels_choose(&simd);
   if (basis->kernels == NULL) {
-    return supine_error_set(c->error, SUPINE_ERROR_UNSUPPORTED,
-                            "this processor or build lacks the instruction set: choose AUTO");
+    return supine_error_set(
+        c->error, SUPINE_ERROR_UNSUPPORTED,
+        "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
   }
   basis->info.simd = simd;
   const bool choose = storage == SUPINE_STORAGE_AUTO;
-  if (choose || storage == SUPINE_STORAGE_MIXED) { /* the smallest first */
+  if (choose || storage == SUPINE_STORAGE_MIXED) {
     const bool thirds = supine_tiles_thirds(SUPINE_STORAGE_MIXED, basis->info.mode_count) > 0;
     storage = thirds ? SUPINE_STORAGE_MIXED : SUPINE_STORAGE_INT16;
   }
@@ -422,7 +424,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
       break;
     }
     basis->info.storage_error = supine_basis_storage_error(basis);
-    if (!choose || storage == SUPINE_STORAGE_EXACT || basis->info.storage_error <= error_limit) {
+    if (!choose || storage == SUPINE_STORAGE_EXACT || basis->info.storage_error <= error_limit_mm) {
       break;
     }
     storage = storage == SUPINE_STORAGE_MIXED ? SUPINE_STORAGE_INT16 : SUPINE_STORAGE_EXACT;
@@ -444,7 +446,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   return SUPINE_OK;
 }
 
-/* Copy the options; set those to 0 that the struct of an older program lacks. */
+/* Copy the caller's options. Members that the struct of an older program lacks become 0. */
 static supine_status take_options(const check *c, const supine_basis_options *options,
                                   supine_basis_options *taken) {
   const size_t oldest = offsetof(supine_basis_options, simd) + sizeof options->simd;
@@ -453,15 +455,15 @@ static supine_status take_options(const check *c, const supine_basis_options *op
     return SUPINE_OK;
   }
   if (options->size < oldest) {
-    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT,
-                            "options of %zu bytes: set their size to sizeof(supine_basis_options)",
-                            options->size);
+    return supine_error_set(
+        c->error, SUPINE_ERROR_ARGUMENT,
+        "the size of the options is %zu: set it to sizeof(supine_basis_options)", options->size);
   }
   memcpy(taken, options, options->size < sizeof *taken ? options->size : sizeof *taken);
   return SUPINE_OK;
 }
 
-/* Check the rigid parts, which are optional: ranges of vertices, each in one lung. */
+/* Check the optional rigid parts: each row of the tensor is a range of vertices in one lung. */
 static supine_status check_rigid(const check *c, supine_basis *basis) {
   const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
   if (rigid == NULL) {
@@ -484,7 +486,7 @@ static supine_status check_rigid(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Open a basis, which takes over `file`; on failure, close the file. */
+/* Open a basis from an open file. The basis takes ownership of the file; on failure, close it. */
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {

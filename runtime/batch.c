@@ -1,26 +1,25 @@
 /* SPDX-License-Identifier: MIT */
-/* Evaluate many poses at once: convert a block of tiles to floats once, so that it stays in the
- * cache while it is evaluated for every pose. */
+/* Evaluate many poses at once: convert each block of tiles to floats once, so that the block stays
+ * in the cache while it is evaluated for every pose. */
 #include <string.h>
 
 #include "runtime/internal.h"
 
 enum {
-  BLOCK_TILES = 23,      /* largest number of tiles of a block */
-  BLOCK_BYTES = 32768,   /* bytes of a block of tiles as floats, less than a first-level cache */
-  WEIGHT_NUMBERS = 4096, /* number of folded weights of a group of poses */
-  GROUP = 256            /* largest number of poses of a group */
+  BLOCK_TILES = 23,      /* largest number of tiles in a block */
+  BLOCK_BYTES = 32768,   /* size of a block in bytes, smaller than a first-level cache */
+  WEIGHT_NUMBERS = 4096, /* largest number of folded weights and gains of a group of poses */
+  GROUP = 256            /* largest number of poses in a group */
 };
 
 typedef struct block {
   _Alignas(64) unsigned char bytes[BLOCK_BYTES];
   float folded[WEIGHT_NUMBERS];
-  float held[GROUP][16]; /* see supine_target */
+  float held[GROUP][16]; /* supine_target.held for each pose */
 } block;
 
-/* Evaluate whole tiles of one lung for a group of poses. `positions` are those of pose 0; those of
- * pose j begin j * apart floats later. Its nine parameters describe the poses, a range
- * of tiles and where its positions are written. */
+/* Evaluate whole tiles of one lung for `count` poses. `positions` points to the first position of
+ * pose 0; the positions of pose j begin j * apart floats later. */
 static void batch_tiles(const supine_basis *basis, size_t count, block *scratch, supine_tiles *wide,
                         size_t first, size_t tiles, float *positions, size_t apart, bool stream) {
   const size_t fit = BLOCK_BYTES / wide->stride;
@@ -59,8 +58,8 @@ void supine_deform_batch(const supine_basis *basis, size_t count, const supine_p
     if (first >= last) {
       continue;
     }
-    /* Whole tiles are evaluated in blocks. Vertices before and after them are evaluated pose by
-     * pose; so are all vertices if one tile is larger than a block. */
+    /* Evaluate whole tiles in blocks. Evaluate the vertices before and after them pose by pose, and
+     * all vertices if one tile is larger than a block. */
     size_t from = (first + TILE - 1) / TILE * TILE;
     size_t to = last / TILE * TILE;
     if (from >= to || wide.stride > BLOCK_BYTES) {

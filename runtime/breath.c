@@ -1,20 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute volume, compliance and pressure along a limb of the P-V loop, and the pressure and volume
- * of a breath over time. */
+/* Compute volume, compliance and pressure along a limb of the P-V loop, and over a breath. */
 #include <math.h>
 #include <stdbool.h>
 
 #include <supine/breath.h>
 
-/* Number of equal parts into which a limb's range is divided for integration. Within their bounds,
- * the control parameters change the compliance by at most e^500 over the range, and so by at most
- * e^16 over a part, which a rule of 16 points integrates to 1e-15. */
+/* Number of equal parts of a limb's range for integration. Control parameters within their bounds
+ * change the compliance by a factor of at most e^500 over the range and e^16 over one part, over
+ * which a rule of 16 points is accurate to 1e-15. */
 enum { LIMB_PARTS = 32 };
 
-/* One limb, integrated once and then evaluated at pressures and volumes. */
+/* A limb and its integral, which is computed once for many pressures and volumes. */
 typedef struct integrated {
   supine_pv_curve curve;
-  double sum[LIMB_PARTS + 1]; /* I(x) at the ends of the parts (supine_breath_curve_evaluate) */
+  double sum[LIMB_PARTS + 1]; /* I(x) of supine_breath_curve_evaluate at the ends of the parts */
 } integrated;
 
 const char *supine_breath_limb_name(supine_pv_limb limb) {
@@ -44,14 +43,14 @@ supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_err
   return SUPINE_OK;
 }
 
-/* Compute exp(U(x)), the slope of I. U's terms are integrals of Legendre polynomials,
- * (P_n+1 - P_n-1) / (2 n + 1) from -1 to x. */
+/* Compute exp(U(x)), the derivative of I(x) (supine_breath_curve_evaluate). Term n of U is c_n+1
+ * times the integral of P_n from -1 to x, (P_n+1 - P_n-1) / (2 n + 1). */
 static double slope(const supine_pv_curve *curve, double x) {
   double before = 1.0;
   double here = x;
   double sum = curve->control[0] * (x + 1.0);
   for (int n = 1; n < SUPINE_PV_CONTROLS; ++n) {
-    const double next = ((2 * n + 1) * x * here - n * before) / (n + 1); /* P_n+1 */
+    const double next = ((2 * n + 1) * x * here - n * before) / (n + 1); /* P_n+1(x) */
     sum += curve->control[n] * (next - before) / (2 * n + 1);
     before = here;
     here = next;
@@ -59,8 +58,8 @@ static double slope(const supine_pv_curve *curve, double x) {
   return exp(sum);
 }
 
-/* Integrate the slope between two x by the Gauss-Legendre rule of 16 points [Abramowitz and Stegun,
- * table 25.4]. */
+/* Integrate slope() between two x by the 16-point Gauss-Legendre rule [Abramowitz and Stegun,
+ * 25.4]. */
 static double integrate(const supine_pv_curve *curve, double from, double to) {
   static const double point[8] = {
       0.0950125098376374402, 0.2816035507792589132, 0.4580167776572273863, 0.6178762444026437484,
@@ -82,7 +81,7 @@ static double part_begin(int part) {
   return -1.0 + 2.0 * part / LIMB_PARTS;
 }
 
-/* Integrate a curve that supine_breath_curve_check accepts. */
+/* Compute the integral of a curve that has passed supine_breath_curve_check. */
 static void limb_begin(const supine_pv_curve *curve, integrated *of) {
   of->curve = *curve;
   of->sum[0] = 0.0;
@@ -91,7 +90,8 @@ static void limb_begin(const supine_pv_curve *curve, integrated *of) {
   }
 }
 
-/* Compute V(P) and dV/dP (NULL: not wanted); a pressure outside the range counts as its end. */
+/* Return the volume at a pressure, mL, and write the compliance, mL/cmH2O, unless it is NULL.
+ * Replace a pressure outside the range by the nearest end of the range. */
 static double limb_volume(const integrated *of, double pressure, double *compliance) {
   const supine_pv_curve *curve = &of->curve;
   const double low = curve->pressure[0];
@@ -110,7 +110,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Compute P(V) for a volume within the range, to within 1e-11 of the range of volumes.
+/* Find the pressure, cmH2O, at which the limb holds a volume, mL, within its range of volumes. The
+ * volume at the result errs by at most 1e-11 of that range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };
@@ -120,7 +121,7 @@ static supine_status limb_pressure(const integrated *of, double volume, double *
   const double share = (volume - curve->volume[0]) / span;
   double low = curve->pressure[0];
   double high = curve->pressure[1];
-  double before = HUGE_VAL; /* |V - volume| at the pressure before, mL */
+  double last_miss = HUGE_VAL;
   double at = (1.0 - share) * low + share * high;
   for (int step = 0; step < STEPS_MAX; ++step) {
     double compliance = 0.0;
@@ -134,15 +135,14 @@ static supine_status limb_pressure(const integrated *of, double volume, double *
     double next = at + (volume - held) / compliance;
     const bool inside = next >= low && next <= high;
     if (miss <= within || high - low <= 1e-15 * fabs(at)) {
-      *pressure = inside ? next : at; /* Newton's last step costs nothing */
+      *pressure = inside ? next : at; /* `next` is known already and more accurate than `at` */
       return SUPINE_OK;
     }
-    /* Take the Newton step, or the middle of the bracket if the step leaves it or if the last step
-     * did not halve the error. */
-    if (!inside || miss > 0.5 * before) {
+    /* Bisect the bracket if the Newton step leaves it or the last step did not halve the error. */
+    if (!inside || miss > 0.5 * last_miss) {
       next = low + 0.5 * (high - low);
     }
-    before = miss;
+    last_miss = miss;
     at = next;
   }
   return SUPINE_ERROR_NUMERICAL;
@@ -174,11 +174,11 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
-      /* Fitted to a + b / (1 + exp(-(P - 10) / 6)), a and b such that it spans 0 to 6000 mL. */
+      /* Inhale limb: fitted to a + b / (1 + exp(-(P - 10) / 6)) with a and b for 0 to 6000 mL. */
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
-       /* c_1 = -k (P_high - P_low) / 2, k = ln 2 / 7.58 [Salazar1964] */
+       /* Exhale limb: c_1 = -k (P_high - P_low) / 2, k = ln 2 / 7.58 [Salazar1964]. */
        {{0.0, 30.0}, {0.0, 6000.0}, {-1.3716632861, 0.0, 0.0, 0.0, 0.0}}}};
   return &normal;
 }
@@ -194,15 +194,15 @@ supine_pv_breath supine_breath_default(void) {
 static supine_status breath_check(const supine_pv_breath *breath, supine_error *error) {
   if (!(breath->tidal > 0.0) || !isfinite(breath->tidal)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the tidal volume is %g mL: give one above 0", breath->tidal);
+                            "the tidal volume is %g mL: give a volume above 0", breath->tidal);
   }
   if (!(breath->rate > 0.0) || !isfinite(breath->rate)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the rate is %g breaths a minute: give one above 0", breath->rate);
+                            "the rate is %g breaths a minute: give a rate above 0", breath->rate);
   }
   if (!(breath->inhale_fraction > 0.0 && breath->inhale_fraction < 1.0)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the inhale fraction is %g: give one between 0 and 1",
+                            "the inhale fraction is %g: give a fraction between 0 and 1",
                             breath->inhale_fraction);
   }
   if ((int)breath->course < 0 || breath->course >= SUPINE_PV_COURSE_COUNT) {
@@ -213,8 +213,8 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   return SUPINE_OK;
 }
 
-/* Compute how far along its limb the breath is at a time, linear in time: 0 at rest, 1 at the peak.
- */
+/* Return the breath's position on its limb at a time in s: 0 at rest, 1 at the peak, linear in time
+ * between them. Write the limb on which the breath is. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -228,13 +228,13 @@ static double breath_share(const supine_pv_breath *breath, double time, supine_p
 
 /* The P-V loop of one breath. */
 typedef struct loop {
-  double rest, peak; /* pressures, cmH2O */
+  double rest, peak; /* pressures at rest and at the peak, cmH2O */
   integrated limbs[SUPINE_PV_LIMB_COUNT];
-  double volume[SUPINE_PV_LIMB_COUNT]; /* volume at rest, mL */
-  double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained from rest to peak, mL */
+  double volume[SUPINE_PV_LIMB_COUNT]; /* volume at the rest pressure, mL */
+  double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained up to the peak pressure, mL */
 } loop;
 
-/* Check both limbs, and that their ranges hold a pressure, named `what` in messages. */
+/* Check both limbs, and that their ranges hold a pressure, which messages call `what`. */
 static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
@@ -281,10 +281,10 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
     cycle->gain[limb] = limb_volume(&cycle->limbs[limb], cycle->peak, NULL) - cycle->volume[limb];
     if (!(cycle->gain[limb] > 0.0)) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                           "the %s limb is too flat between %g and %g cmH2O: check the relation",
-                           supine_breath_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
+      status = supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "the %s limb is too flat between %g and %g cmH2O: check the pressure-volume relation",
+          supine_breath_limb_name((supine_pv_limb)limb), cycle->rest, cycle->peak);
     }
   }
   return status;
@@ -294,8 +294,8 @@ static double between(double value, double low, double high) {
   return value < low ? low : value > high ? high : value;
 }
 
-/* Compute volume and pressure at a time: volume from pressure or, at constant flow, pressure from
- * volume. */
+/* Compute the volume, mL, and the pressure, cmH2O, at a time. At constant flow, find the pressure
+ * from the volume; otherwise find the volume from the pressure. */
 static supine_status follow(const supine_pv_breath *breath, const loop *cycle, double time,
                             double *volume, double *pressure, supine_error *error) {
   static const double pi = 3.14159265358979323846;

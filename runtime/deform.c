@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute positions x_ij = p_ij + A_j (w . c_i) d_ij, as many whole tiles of one lung at a time as
- * possible. */
+/* Compute deformed positions, in runs of whole tiles of one lung where possible. */
 #include <string.h>
 
 #include "runtime/rigid.h"
@@ -21,8 +20,7 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
   return moved;
 }
 
-/* Evaluate vertices begin <= i < end of one tile: evaluate the whole tile into a buffer, and copy
- * these vertices. */
+/* Evaluate vertices begin <= i < end of one tile, by way of a buffer for the whole tile. */
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];

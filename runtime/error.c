@@ -5,7 +5,7 @@
 #include "runtime/internal.h"
 
 double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
-  const double unit = 0x1p-24; /* half a unit in the last place of a float */
+  const double unit = 0x1p-24; /* largest relative rounding error of a float */
   const size_t modes = basis->info.mode_count;
   double stored = 0;
   double moved = 0;
@@ -17,14 +17,14 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
     scale = fmax(scale, fabs(pose->gains[i / 3][i % 3]));
   }
-  /* Packing, folding and the sum over modes round the displacement K + 8 times; the last addition
-   * rounds each coordinate of the position once. */
+  /* Packing, folding and the sum over K modes round the displacement K + 8 times; adding the
+   * reference position rounds each coordinate once more. */
   const double rounding =
       ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
   return 1.001 * (scale * stored + basis->reference_error + rounding);
 }
 
-/* Find the largest displacement of a pose, mm. */
+/* Find the length of the largest displacement in a pose, mm. */
 static double largest_displacement(const supine_basis *basis, const supine_pose *pose) {
   enum { BLOCK = 1024 };
   float xyz[3 * BLOCK];
@@ -43,19 +43,19 @@ static double largest_displacement(const supine_basis *basis, const supine_pose 
 }
 
 double supine_basis_storage_error(const supine_basis *basis) {
-  static const double volume = 500;  /* mL */
-  static const double distance = 20; /* mm, on an open surface */
+  static const double volume = 500;  /* volume above the reference surface, mL */
+  static const double distance = 20; /* largest displacement of an open surface, mm */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
     supine_pose pose;
     const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
     const supine_state state = {.gravity = {cell[0], cell[1], cell[2]}};
     if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
-      continue; /* the centre of the cube */
+      continue; /* the centre of the cube has no direction */
     }
     if (basis->info.has_volume) {
       if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {
-        continue; /* no such volume in this direction */
+        continue; /* the lungs cannot hold this volume in this posture */
       }
     } else {
       supine_pose_fill(&pose, 1);
@@ -63,7 +63,7 @@ double supine_basis_storage_error(const supine_basis *basis) {
       supine_pose_fill(&pose, largest > 0 ? distance / largest : 0);
     }
     const double error = supine_basis_error(basis, &pose);
-    worst = isnan(error) ? INFINITY : fmax(worst, error); /* numbers beyond floats */
+    worst = isnan(error) ? INFINITY : fmax(worst, error); /* NaN means that floats overflowed */
   }
   return worst;
 }

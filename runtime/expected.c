@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the expected error of the law's positions. */
+/* Compute the expected errors of the law's positions. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,7 +53,7 @@ static bool rest_is_assumed(const supine_basis *basis) {
          (state == NULL || strstr(state, "rest") == NULL);
 }
 
-/* Return whether the state's volume counts from rest. */
+/* Return whether the volume of a state, or of one of its lungs, counts from rest. */
 static bool counts_from_rest(const supine_state *state) {
   bool rest = state->lung_count == 0 && (state->volume.kind == SUPINE_VOLUME_REST ||
                                          state->volume.kind == SUPINE_VOLUME_DEFAULT);
@@ -77,11 +77,11 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* The two poses and, for states that count from an assumed rest, the same with 1 % of the reference
- * volume more. */
+/* Poses of a state (at) and of the state from which displacements count (from), and the same poses
+ * with 1 % of the reference volume added if their state counts from an assumed rest. */
 typedef struct poses {
   supine_pose at, from, fuller_at, fuller_from;
-  bool assumed; /* at least one of the states counts from an assumed rest */
+  bool assumed; /* at least one of the two states counts from an assumed rest */
 } poses;
 
 static supine_status find_poses(const supine_basis *basis, const supine_state *state,
@@ -103,7 +103,7 @@ static supine_status find_poses(const supine_basis *basis, const supine_state *s
   return status;
 }
 
-/* Compute sigma of a block of vertices. */
+/* Compute the expected errors of vertices begin <= i < end, at most LOCATE_BLOCK of them, mm. */
 static void fill_block(const supine_basis *basis, const poses *p, double constant, size_t begin,
                        size_t end, float *sigma) {
   const supine_pose *const of[4] = {&p->at, &p->from, &p->fuller_at, &p->fuller_from};

@@ -11,15 +11,16 @@
 /** Number of vertices evaluated at once. */
 enum { LOCATE_BLOCK = 256 };
 
-/** A fit, at the start of the caller's workspace. */
+/** The fit of supine_locate, at the start of the work space that the caller provides. */
 typedef struct supine_locate_fit {
   supine_kriging kriging;
   supine_kriging_options options;
-  double origin[3]; /**< translation of the rotated body, without the fitted translation, mm */
-  double deviation; /**< prior standard deviation of the volume, mL; 0 if it is known */
+  double origin[3]; /**< mean observed position less the rotated mean of the law's positions, mm */
+  double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
 } supine_locate_fit;
 
-/** Return the constant c of the expected error of a file, mm. */
+/** Return the constant c of the expected error (supine/locate.h), mm: metadata "expected_error_mm"
+ * of the file or, without it, the default. */
 double supine_expected_constant(const supine_basis *basis);
 
 /** Compute the volume of all lungs of the reference surface, mL. */
@@ -33,8 +34,7 @@ double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
                            const supine_pose *from);
 
 /** Compute the pose of a state with 1 % of the reference volume added; if the state names lungs,
- * each gets an equal part.
- * @retval those of supine_basis_pose */
+ * each lung gets an equal part. Statuses: as supine_basis_pose. */
 supine_status supine_expected_shifted(const supine_basis *basis, const supine_state *state,
                                       supine_pose *pose, supine_error *error);
 

@@ -8,92 +8,90 @@
 
 #include "runtime/kernels/tiles.h"
 
-/** Number of harmonics of the volume at rest, bands 0 to 2. */
+/** Number of harmonics that describe the volume at rest: bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
-/** Sizes above which positions are written with stores that bypass the caches: bytes of the tiles
- * and positions of one frame, and bytes of the positions of a batch. A range of at most
- * STREAM_RANGE vertices is always stored in the caches, as its caller is likely to read it next. */
+/** Bytes above which positions are written with stores that bypass the caches: STREAM_BYTES for the
+ * tiles and positions of a frame, STREAM_BATCH_BYTES for the positions of a batch. A range of at
+ * most STREAM_RANGE vertices is always stored in the caches, as its caller is likely to read it. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
-/** Bytes of a lung's name, with its NUL. */
+/** Largest size of a lung's name in bytes, with its NUL. */
 enum { LUNG_NAME_SIZE = 32 };
 
 struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
   supine_safetensors *file;
-  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< info.lung_names points here */
-  const char *name_of[SUPINE_LUNGS_MAX];
+  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< `name_of` points to these names */
+  const char *name_of[SUPINE_LUNGS_MAX];        /**< info.lung_names points here */
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
-  supine_tiles lit;   /**< modes of the normals; lit.bytes is NULL if there are none */
-  supine_tiles tiles; /**< coefficients, directions and reference positions, see tiles.h */
+  supine_tiles lit;   /**< modes of the normals; lit.bytes is NULL without normals */
+  supine_tiles tiles; /**< coefficients, directions and reference positions (tiles.h) */
   const supine_kernels *kernels;
-  bool stream; /**< write positions with stores that bypass the caches, see STREAM_BYTES */
+  bool stream; /**< write positions with stores that bypass the caches (STREAM_BYTES) */
   supine_prefetch prefetch;
-  /** Value of one unit of mode k's packed coefficients times one unit of the packed directions. */
+  /** Unit of mode k's packed coefficients times the unit of packed directions, mm. */
   double mode_scale[SUPINE_MODES_MAX];
-  /** Bounds on the packing error and on the displacement of mode k, mm, at weight 1 and gain 1. */
+  /** Bounds on the packing error and the displacement of mode k at weight 1 and gain 1, mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
-  double reference_volume[SUPINE_LUNGS_MAX]; /**< mL; info.reference_volume points here */
-  const double *resting; /**< harmonics of the volume at rest, mL beyond the reference: [G, 9], or
-                            [9] for all lungs together; or NULL */
-  bool rest_by_lung;     /**< `resting` is [G, 9] and each lung has gains of its own; else one gain
-                            is common to all lungs */
+  double reference_volume[SUPINE_LUNGS_MAX]; /**< info.reference_volume points here, mL */
+  const double *resting; /**< harmonics of the volume at rest less the reference volume, mL: [G, 9],
+                            or [9] for all lungs together; NULL without rest */
+  bool rest_by_lung;     /**< `resting` is [G, 9], and each lung has its own gains */
   double upright_gain;   /**< increase of the volume at full inflation from supine to upright, as a
                             fraction of the reference volume */
   double scan_volume;    /**< volume of all lungs in the scan less the reference volume, mL */
   double scan_gravity[3];
-  const uint32_t *rigid; /**< [rigid_count, 2], see rigid.h */
+  const uint32_t *rigid; /**< [rigid_count, 2] ranges of vertices (rigid.h) */
   size_t rigid_count;
   double reference_error; /**< largest packing error of a reference position, mm */
   double reference_size;  /**< bound on the distance of a reference position from the origin, mm */
 };
 
-/** Pack the tensors into tiles of a storage, not AUTO; free tiles packed before.
- * @retval SUPINE_ERROR_MEMORY */
+/** Pack the tensors into tiles of a storage other than AUTO; free the previous tiles.
+ * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
 
 /** Pack the modes of the normals into tiles.
- * @retval SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
-/** Count the monomials of the K weights and the gains in one coordinate of a normal,
+/** Return the number of monomials of the K weights and of the gains in one coordinate of a normal,
  *
  *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)
  *
- * where a and b are the gains of the next two axes, cyclically. With one gain for all axes (files
- * of versions 1 and 2) a w_k and b w_k are the same. */
+ * where a and b are the gains of the next two axes, cyclically. If all axes have one gain (files of
+ * versions 1 and 2), a w_k and b w_k are one monomial. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
 }
 
-/** Evaluate vertices begin <= i < end, all of one lung, into a target for vertex `begin` on. */
+/** Evaluate vertices begin <= i < end, all of one lung, with the weights and gains of supine_fold.
+ * The target begins at vertex `begin`. */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
 
-/** Replace the positions of rigid parts among vertices begin <= i < end of a target, see rigid.h.
- */
+/** Move the rigid parts (rigid.h) among vertices begin <= i < end of a target that begins at
+ * `begin`. */
 void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target);
 
-/** Return the target that begins `count` vertices after this one. */
+/** Return a target that begins `count` vertices after another. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
-/** Compute supine_basis_info.storage_error of the present tiles. */
+/** Compute supine_basis_info.storage_error for the current tiles, mm. */
 double supine_basis_storage_error(const supine_basis *basis);
 
-/** Compute the factors that the kernels multiply by: K weights times the units of the packed
- * coefficients, then the three gains of a lung.
+/** Compute the factors of the kernels: K weights times mode_scale, then the three gains of a lung.
  * @param folded  [K + 3], written */
 void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded);
 
-/** Set the gains of a pose to the one gain for all lungs and axes at which the lungs hold `volume`
- * mL more than the reference surface.
+/** Set all gains of a pose to the one number that adds `volume` mL to the reference volume.
  * @param pose  its weights are read, its gains written
- * @retval SUPINE_ERROR_NUMERICAL  there is none */
+ * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot hold this volume */
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);
 
 #endif

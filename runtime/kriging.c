@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fit the terms and the field to observed residuals. */
+/* Fit the terms and the field of kriging.h to residuals of observed points. */
 #include <math.h>
 #include <string.h>
 
@@ -40,7 +40,7 @@ bool supine_kriging_factor(size_t count, double *matrix) {
   return true;
 }
 
-/* Solve L x = b in place. */
+/* Solve L x = b for a lower triangle `factor` L [count, count]. `x` holds b before, x after. */
 static void forward(size_t count, const double *factor, double *x) {
   for (size_t i = 0; i < count; ++i) {
     double sum = x[i];
@@ -55,8 +55,8 @@ size_t supine_kriging_space(size_t count) {
   return count * (count + SUPINE_KRIGING_COLUMNS + 3);
 }
 
-/* Return the column that term `term` multiplies along axis `axis`, and its sign: 1, -1 or 0. For a
- * rotation, r x p = (r_y p_z - r_z p_y, ...). */
+/* Return the column that a term multiplies on an axis, and write the sign: 1, -1, or 0 if the term
+ * does not change this axis. For a rotation, r x p = (r_y p_z - r_z p_y, ...). */
 static int column_of(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
@@ -71,7 +71,7 @@ static int column_of(size_t term, size_t axis, double *sign) {
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
-/* Compute the centre, and multiply the columns by L^-1. */
+/* Compute the centre of the points, fill in the columns, and multiply each by L^-1. */
 static void whiten(supine_kriging *fit) {
   const size_t n = fit->count;
   memset(fit->centre, 0, sizeof fit->centre);
@@ -106,9 +106,9 @@ static bool absent(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
-/* Compute the normal equations of the terms, with matrix A = X' K^-1 X + P and right side
- * X' K^-1 y + P m, where P and m are the prior's inverse covariance and mean. The row of an absent
- * term is that of the identity. */
+/* Compute the normal equations of the terms: matrix A = X' K^-1 X + P, right side X' K^-1 y + P m.
+ * X are the columns of the terms, K is the covariance of the points, y are the residuals, P and m
+ * the inverse covariance and mean of the prior. An absent term has a row of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -130,7 +130,7 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
   }
 }
 
-/* Return whether every pivot is well above the rounding error of its diagonal. */
+/* Return whether every pivot of `factor` is well above the rounding error of its element of `a`. */
 static bool determined(const double a[TERMS * TERMS], const double factor[TERMS * TERMS]) {
   for (size_t k = 0; k < TERMS; ++k) {
     const double pivot = factor[k * TERMS + k];
@@ -141,10 +141,10 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* Compute the terms, their covariance A^-1, and the covariance of the columns' factors. */
+/* Compute the terms, their covariance A^-1, and the `spread` of the columns' factors. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
-  double inverse[TERMS][TERMS]; /* row k: L^-1 e_k */
+  double inverse[TERMS][TERMS]; /* row k: column k of the inverse of `factor` */
   for (size_t k = 0; k < TERMS; ++k) {
     memset(inverse[k], 0, sizeof inverse[k]);
     inverse[k][k] = 1;
@@ -200,8 +200,8 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   }
   if (!supine_kriging_factor(count, fit->factor)) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the points' covariance is not positive definite: give each a noise "
-                            "above 0");
+                            "the points' covariance is not positive definite: give each point "
+                            "a noise above 0");
   }
   whiten(fit);
   double a[TERMS * TERMS];
@@ -231,12 +231,12 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   return SUPINE_OK;
 }
 
-/* Compute the 3 x 3 block of point j in Q = K^-1 - K^-1 X A^-1 X' K^-1: the inverse covariance of
- * its residual less the prediction by all other points.
- * @param row  [n] L^-1 e_j */
+/* Compute the 3 x 3 block of point j in K^-1 - K^-1 X A^-1 X' K^-1 (normal_equations): the inverse
+ * covariance of the point's residual less its prediction by all other points.
+ * @param row  [n] column j of L^-1 */
 static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
   const size_t n = fit->count;
-  double column[VALUE]; /* row j of K^-1 X, by column */
+  double column[VALUE]; /* row j of K^-1 X */
   for (size_t c = 0; c < VALUE; ++c) {
     column[c] = dot(n, row, fit->whitened + c * n);
   }
@@ -278,7 +278,7 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double 
   double trace = 0;
   double solved[3];
   forward(3, block, residual);
-  for (size_t k = 0; k < 3; ++k) { /* column k of L^-1 */
+  for (size_t k = 0; k < 3; ++k) { /* column k of the inverse of `block` */
     double unit[3] = {k == 0, k == 1, k == 2};
     forward(3, block, unit);
     trace += dot(3, unit, unit);

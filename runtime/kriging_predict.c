@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Predict residuals and their variance at many points, RUN of them at a time. */
+/* Predict residuals and their variance at many points, in runs of RUN points. */
 #include <math.h>
 #include <string.h>
 
@@ -7,11 +7,11 @@
 
 enum { RUN = 32, COLUMNS = SUPINE_KRIGING_TERMS };
 
-/* RUN points of a target, stored by axis; the last point is repeated to fill the run. */
+/* RUN points of a target, stored by axis. The last point of the target fills up its last run. */
 typedef struct run {
-  float place[3][RUN];  /* p - c, mm */
-  float volume[3][RUN]; /* v, mm */
-  float root[RUN];      /* standard deviation of g on one axis, mm */
+  float place[3][RUN];  /* position less the centre of the fit, mm */
+  float volume[3][RUN]; /* displacement for one prior standard deviation of the volume, mm */
+  float root[RUN];      /* standard deviation of the field g on one axis, mm */
 } run;
 
 static void fill(const supine_kriging *fit, const supine_kriging_target *target, size_t begin,
@@ -29,8 +29,9 @@ static void fill(const supine_kriging *fit, const supine_kriging_target *target,
   }
 }
 
-/* Compute the covariances of a run with observed point j. exp(-a) is computed as (exp(-a / 64))^64
- * by a polynomial of degree 5, with a relative error of 1e-6. */
+/* Compute the covariances of the field between a run and observed point j, mm^2. The factor exp(-a)
+ * of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 5 approximates; its
+ * relative error is 1e-6. */
 static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *in, float *out) {
   const supine_kriging_point *p = &fit->points[j];
   const double size = p->size > fit->model.least ? p->size : fit->model.least;
@@ -55,7 +56,7 @@ static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *
   }
 }
 
-/* Compute the sum over points j of w_j numbers_j. */
+/* Compute the sum of numbers[j] w[j] over `count` observed points j, for each point of a run. */
 static void project(size_t count, float (*w)[RUN], const double *numbers, float *sum) {
   memset(sum, 0, RUN * sizeof *sum);
   for (size_t j = 0; j < count; ++j) {
@@ -66,7 +67,7 @@ static void project(size_t count, float (*w)[RUN], const double *numbers, float 
   }
 }
 
-/* Solve L w = k, where k are the covariances of a run with all observed points. */
+/* Solve L w = k, where k are the covariances of g between the observed points and a run. */
 static void solve(const supine_kriging *fit, size_t lung, const run *in, float (*w)[RUN]) {
   const size_t n = fit->count;
   for (size_t j = 0; j < n; ++j) {
@@ -86,8 +87,9 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
   }
 }
 
-/* Compute the variance 3 (k(q, q) - w'w) + m' spread m at points q, where m is the columns at q
- * less w' times L^-1 times the columns of the observed points. */
+/* Compute the 3-D variance 3 (k - w'w) + m' spread m at each point of a run, mm^2. k is the
+ * variance of g on one axis; m are the columns 1, v and p - c at the point, less w' L^-1 times the
+ * columns of the observed points. */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

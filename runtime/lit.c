@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute normals from a few modes of the normal field, whose weights are quadratic in those of the
- * displacement. */
+/* Compute normals from a few modes, with weights quadratic in the weights of the displacement. */
 #include <string.h>
 
 #include "runtime/internal.h"
@@ -8,7 +7,7 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-/* Pack the normals of 16 vertices, the modes of each of which begin at its `row`. */
+/* Pack the normals of 16 vertices into a tile; row[v] points to the modes of vertex v, [3, Q]. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
                                     unsigned char *to) {
   const size_t words = supine_tiles_normal_words(tiles->modes);
@@ -48,7 +47,7 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Sum form_kl w_k w_l over k <= l; row k of the form begins at l = k. */
+/* Compute the sum of form_kl w_k w_l over k <= l; `form` holds the rows of an upper triangle. */
 static double triangle(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
@@ -94,7 +93,7 @@ void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *p
   }
 }
 
-/* Compute the factors that the kernel multiplies by for one lung. */
+/* Compute the weights of one lung's normals, in the unit of the packed modes. */
 static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, pose, v);
@@ -103,13 +102,13 @@ static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose
   }
 }
 
-/* Compute the normals of vertices begin <= i < end, of any lungs. */
+/* Compute the normals of vertices begin <= i < end, of one or more lungs. */
 static void light(const supine_basis *basis, const supine_pose *pose, size_t begin, size_t end,
                   bool stream, float *normals) {
   const supine_target target = {.xyz = normals,
                                 .stream = stream,
                                 .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* weights 0 for missing modes of the words */
+  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* 0 for missing modes of the last word */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;

@@ -6,20 +6,21 @@
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
-_Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX, "one limit");
+_Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
+               "the limits differ");
 
-/* Prior standard deviation of the volume as a fraction of the reference volume: 0.3 of the way from
- * rest (0.43 of that volume) to full inflation. */
+/* Prior standard deviation of the volume as a fraction of the reference volume: 0.3 of the
+ * difference between rest (0.43 of the reference volume) and full inflation. */
 static const double prior_spread = 0.17;
-static const double outlier_limit = 3.0; /* smallest residual of an outlier, in sigma */
-static const double outlier_noise = 300; /* noise that an outlier is given, mm */
-static const double volume_step = 1;     /* step below which the search ends, mL */
-static const double angle_step = 1e-4;   /* step below which the search ends, rad */
-/* Ratio of the sill s to the constant c of the expected error: 6 mm to 4.5 mm. They differ as c was
- * measured after the best translation. */
+static const double outlier_limit = 3.0; /* residual above which a point is an outlier, in sigma */
+static const double outlier_noise = 300; /* noise that replaces the noise of an outlier, mm */
+static const double volume_step = 1;     /* the search ends when the volume changes by less, mL */
+static const double angle_step = 1e-4; /* the search ends when the rotation changes by less, rad */
+/* Ratio of the sill to the constant of the expected error: 6 mm to 4.5 mm. The constant is smaller,
+ * as it was measured after the best translation. */
 static const double sill_of_error = 4.0 / 3;
 
-/* Largest number of Gauss-Newton steps, and of halvings of one change of the volume. */
+/* Limits on the Gauss-Newton steps of a search and on the halvings of one change of the volume. */
 enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
 /* Inputs, outputs and work space of one call. */
@@ -27,10 +28,10 @@ typedef struct workspace {
   const supine_locate_task *task;
   supine_location *found;
   supine_locate_fit *fit;
-  supine_kriging_point *points; /* [n] */
-  double *law;                  /* [n, 3] the law's positions in the state, mm */
-  double *kriging;              /* [supine_kriging_space(n)] */
-  double *scratch;              /* [n] */
+  supine_kriging_point *points; /* [n] observed points */
+  double *law;                  /* [n, 3] the law's positions in the current state, mm */
+  double *kriging;              /* [supine_kriging_space(n)] work space of the fit */
+  double *scratch;              /* [n] work space */
 } workspace;
 
 static size_t doubles_of(size_t bytes) {
@@ -68,7 +69,7 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
     if (o->vertex >= n || !isfinite(sum) || !(o->noise > 0) || !isfinite(o->noise)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "observation %zu: give a vertex below %zu (not %zu), a finite position "
+          "observation %zu: give a vertex below %zu instead of %zu, a finite position "
           "and a noise above 0",
           j + 1, n, o->vertex);
     }
@@ -85,8 +86,7 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
   }
 }
 
-/* Set the members that do not depend on the state: scan positions, lungs, noise and the fit's
- * options. */
+/* Set all that does not depend on the state: scan positions, lungs, noise, options of the fit. */
 static supine_status initialise(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
@@ -122,8 +122,8 @@ static void rotate(const double rotation[9], const double x[3], double rotated[3
   }
 }
 
-/* Compute the law's positions in the state, and their change by one prior standard deviation of the
- * volume. */
+/* Compute the law's positions in the current state, their distances from the scan, and their change
+ * for one prior standard deviation of the volume. */
 static supine_status evaluate(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
@@ -152,8 +152,8 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   return status;
 }
 
-/* Compute the translation that takes the mean of the law's points to the mean of the observed, and
- * the residuals in the body's axes. */
+/* Compute the translation from the mean of the law's rotated positions to the mean observed
+ * position, and the residuals in the axes of the body. */
 static void find_residuals(workspace *s) {
   const size_t n = s->task->count;
   supine_location *found = s->found;
@@ -174,18 +174,18 @@ static void find_residuals(workspace *s) {
     for (size_t i = 0; i < 3; ++i) {
       d[i] = s->task->observed[j].position[i] - s->fit->origin[i];
     }
-    for (size_t i = 0; i < 3; ++i) { /* R' d */
+    for (size_t i = 0; i < 3; ++i) { /* transposed rotation times d */
       s->points[j].residual[i] = found->rotation[i] * d[0] + found->rotation[3 + i] * d[1] +
                                  found->rotation[6 + i] * d[2] - s->law[3 * j + i];
     }
   }
 }
 
-/* Set the rotation to the one that fits the law's points best, as a start of the search. */
+/* Start the search from the rotation that best fits the law's positions to the observed ones. */
 static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
-  const double *c = s->fit->origin; /* difference of the means, as the rotation is the identity */
+  const double *c = s->fit->origin; /* difference of the means: the rotation is the identity */
   double mean[3] = {0};
   const size_t n = s->task->count;
   for (size_t j = 0; j < 3 * n; ++j) {
@@ -202,7 +202,7 @@ static void rotate_roughly(workspace *s) {
   supine_rigid_rotation((const double(*)[3])h, s->found->rotation);
 }
 
-/* Multiply the rotation R from the right by exp(r), by Rodrigues' formula. */
+/* Replace the rotation R by R exp(r) for a rotation vector r in rad, by Rodrigues' formula. */
 static void rotate_further(double rotation[9], const double r[3]) {
   const double angle = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
   if (angle == 0) {
@@ -228,8 +228,8 @@ static void rotate_further(double rotation[9], const double r[3]) {
   memcpy(rotation, product, sizeof product);
 }
 
-/* Change the volume by `ml`, at most by half its prior standard deviation; halve the change while
- * no pose has the new volume. */
+/* Change the volume by `ml` mL, at most by half its prior standard deviation; halve the change
+ * until the lungs can hold the new volume. */
 static supine_status change_volume(workspace *s, double ml, supine_error *error) {
   const double most = 0.5 * s->fit->deviation;
   const double before = s->found->state.volume.ml;
@@ -246,7 +246,7 @@ static supine_status change_volume(workspace *s, double ml, supine_error *error)
   return status;
 }
 
-/* Find volume and rotation by Gauss-Newton steps. */
+/* Find the unknown volume and rotation by Gauss-Newton steps. */
 static supine_status iterate(workspace *s, supine_error *error) {
   supine_locate_fit *fit = s->fit;
   const double deviation = fit->deviation;
@@ -274,9 +274,9 @@ static supine_status iterate(workspace *s, supine_error *error) {
   }
 }
 
-/* Compare each point with its prediction from the others.
- * @return the point with the largest ratio of residual to sigma above the limit; if none is above
- *         it, the number of points */
+/* Compare each observed point with its prediction by all others.
+ * @return the point with the largest ratio of residual to sigma, or the number of points if no
+ *         ratio exceeds outlier_limit */
 static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   const size_t n = s->task->count;
   size_t worst = n;

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the positions and expected errors of every vertex from a fit. */
+/* Compute the position and expected error of every vertex from the fit of supine_locate. */
 #include <math.h>
 
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
-/* Poses from which positions are computed, and constants of their expected errors. */
+/* Poses of the located state (at, fuller with more volume) and of the scan, and constants. */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* min(c, RMS of u), mm */
-  double per_step; /* prior standard deviation of the volume, divided by the volume that `fuller`
-                      adds to `at` */
+  double constant; /* smaller of the expected error's constant and the RMS displacement (at least 2
+                      mm), mm */
+  double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,
@@ -66,10 +66,10 @@ static void predict(const supine_location *found, const supine_basis *basis, con
   supine_kriging_predict(&fit->kriging, &target, b->shift, b->variance);
 }
 
-/* Convert to the frame of the observations, and bound the expected error by the one without
- * observations. That one holds after the best translation, which three points determine well
- * enough; with two, the bound would understate the error by a factor of 0.85. It does not include
- * the error of a fitted rotation. */
+/* Convert positions to the frame of the observations, and bound expected errors by those without
+ * observations. Such a bound requires that three points or more determine the translation: with two
+ * points, it would be too small by a factor of 0.85. It does not include the error of a fitted
+ * rotation and does not apply then. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

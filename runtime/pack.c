@@ -9,37 +9,35 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 * 4096, /* a value within the range of all numbers of fixed_narrow */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of 1, which fixed_narrow can hold */
   FLOAT_FRACTION_BITS = 23
 };
 
-/* One tile before it is packed: coefficients [axes, K, 16], directions and reference positions
- * [48].
- */
+/* One tile before packing: coefficients [axes, K, 16], directions and reference positions [48]. */
 typedef struct source {
   float coefficients[3 * SUPINE_MODES_MAX * TILE];
   float direction[TILE_NUMBERS];
   float reference[TILE_NUMBERS];
 } source;
 
-/* Values of one packed unit, and the largest squared packing errors so far. */
+/* Units of packed numbers, and the largest squared packing errors so far. */
 typedef struct work {
-  double mode[SUPINE_MODES_MAX]; /* unit of a coefficient of each mode, mm */
-  double direction;              /* unit of a direction */
-  double reference;              /* unit of a reference position, mm, a power of two */
-  float direction_square;        /* largest squared error of a direction */
-  float reference_square;        /* largest squared error of a reference position, mm^2 */
+  double mode[SUPINE_MODES_MAX]; /* unit of the coefficients of each mode, mm */
+  double direction;              /* unit of a coordinate of a direction */
+  double reference;       /* unit of a coordinate of a reference position, mm, a power of two */
+  float direction_square; /* largest squared error of a direction */
+  float reference_square; /* largest squared error of a reference position, mm^2 */
   source source;
 } work;
 
-/* Replace numbers by 0 that are so small that products with them would be subnormal, and slow. */
+/* Replace a number by 0 if it is so small that products with it could be subnormal, and slow. */
 static float flush(float value) {
   return fabsf(value) < 1e-30F ? 0 : value;
 }
 
-/* Compute the length of a vertex's direction; 1 for a direction of 0 or a vector field. Compact
- * storages divide the direction by this length and multiply the coefficients by it, so that one
- * unit suits all vertices. */
+/* Compute the length of a vertex's direction, mm; 1 if the direction is 0 or the field is a vector
+ * field. Compact storages divide the direction by this length and multiply the coefficients by it,
+ * so that one unit suits all vertices. */
 static double direction_length(const supine_basis *basis, size_t i) {
   double square = 0;
   for (size_t axis = 0; axis < 3 && basis->info.direction != NULL; ++axis) {
@@ -75,7 +73,7 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   }
 }
 
-/* Find the largest coefficient of each mode, times the length of its direction. */
+/* Find the largest magnitude of each mode's coefficients times their direction's length, mm. */
 static void largest_coefficients(const supine_basis *basis, float *top) {
   const size_t modes = basis->info.mode_count;
   const size_t rows = basis->tiles.axes;
@@ -105,11 +103,11 @@ static int word_bits(const supine_tiles *tiles, size_t k) {
   return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
 }
 
-/* Choose the units, and bound the displacement and the packing error of each mode. The error of a
- * coefficient is half its lowest bit, and the rounding of its word to a float. */
+/* Choose the units, and bound the displacement and the packing error of each mode. A packed
+ * coefficient errs by half its lowest bit and by the rounding of its word to a float. */
 static void choose_units(supine_basis *basis, work *w) {
   const bool compact = supine_tiles_compact(basis->tiles.storage);
-  /* Largest length of a vector whose components are at most 1. */
+  /* The largest length of a vector whose coordinates are at most 1. */
   const double axes = sqrt((double)basis->tiles.axes);
   float top[SUPINE_MODES_MAX];
   float farthest = 0;
@@ -119,13 +117,13 @@ static void choose_units(supine_basis *basis, work *w) {
   largest_coefficients(basis, top);
   basis->reference_size = sqrt(3) * (double)farthest;
   w->reference = compact ? reference_unit(farthest) : 1;
-  /* Components of directions, which are divided by their lengths, are at most 1. */
+  /* Coordinates of directions are at most 1 here, as directions are divided by their lengths. */
   w->direction = compact && basis->info.direction != NULL ? 1.0 / FIXED_TOP : 1;
   basis->tiles.reference_unit = (uint32_t)ilogb(w->reference) << FLOAT_FRACTION_BITS;
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     const int bits = word_bits(&basis->tiles, k);
     w->mode[k] = 1;
-    if (flush(top[k]) > 0 && compact) { /* the largest fills the upper bits of a word */
+    if (flush(top[k]) > 0 && compact) { /* the largest coefficient fills its bits of a word */
       w->mode[k] = (double)top[k] / (0x1p31 - ldexp(1, 32 - bits));
     }
     basis->mode_scale[k] = w->mode[k] * w->direction;
@@ -134,8 +132,8 @@ static void choose_units(supine_basis *basis, work *w) {
   }
 }
 
-/* Pack the rows of 16 coefficients of one axis, one row for each mode. The first mode of three gets
- * the uppermost bits, as its numbers tend to be the largest. */
+/* Pack the coefficients of one axis, a row of 16 for each mode. Of three modes in a word, the first
+ * gets the uppermost bits, as its numbers tend to be the largest. */
 static void pack_coefficients(const supine_tiles *tiles, const double *unit, const float *rows,
                               unsigned char *at) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
@@ -162,7 +160,7 @@ static void pack_coefficients(const supine_tiles *tiles, const double *unit, con
   }
 }
 
-/* Pack 48 coordinates, and raise *square to the largest squared error of any vertex. */
+/* Pack 48 coordinates, and raise *square to the largest squared packing error of a vertex. */
 static void pack_numbers(const supine_tiles *tiles, double unit, const float *numbers,
                          unsigned char *at, float *square) {
   float error[TILE_NUMBERS];

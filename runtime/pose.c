@@ -8,7 +8,7 @@
 
 #include "runtime/internal.h"
 
-static const double default_above_scan = 500; /* mL, if the basis knows no rest */
+static const double default_above_scan = 500; /* default volume above the scan, mL */
 
 supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                    double *weights) {
@@ -38,8 +38,8 @@ static void contract(const supine_basis *basis, size_t lung, const double *weigh
                          basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
-/* Compute the volume at rest, mL above the reference surface, from harmonics y: of lung `row`, or
- * of all lungs together (row 0) in files of versions 1 and 2. */
+/* Compute the volume at rest less the reference volume, mL, from harmonics y: of lung `row` or, in
+ * files of versions 1 and 2, of all lungs together (row 0). */
 static double resting(const supine_basis *basis, size_t row, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
@@ -56,11 +56,11 @@ static double sum_of(const double *values, size_t count) {
   return sum;
 }
 
-/* Volumes in one posture, mL above the reference surface. */
+/* Volumes in one posture less the reference volume, mL. */
 typedef struct volumes {
-  size_t lungs; /* number of lungs */
+  size_t lung_count;
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* 0 if the file has no volumes at rest by lung */
+  double rest[SUPINE_LUNGS_MAX]; /* volume at rest; 0 if the file has none for each lung */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;
@@ -68,7 +68,7 @@ typedef struct volumes {
 static supine_status find_volumes(const supine_basis *basis, const double gravity[3],
                                   const double *weights, volumes *v, supine_error *error) {
   double y[RESTING_TERMS];
-  *v = (volumes){.lungs = basis->info.lung_count};
+  *v = (volumes){.lung_count = basis->info.lung_count};
   if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "gravity is zero or not finite: give a vector with a direction");
@@ -76,7 +76,7 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
   const double length =
       sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1] + gravity[2] * gravity[2]);
   const double up = fmax(0, -gravity[2] / length);
-  for (size_t lung = 0; lung < v->lungs; ++lung) {
+  for (size_t lung = 0; lung < v->lung_count; ++lung) {
     contract(basis, lung, weights, &v->form[lung]);
     v->full[lung] = basis->upright_gain * up * up * basis->info.reference_volume[lung];
     if (basis->rest_by_lung) {
@@ -84,20 +84,20 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
     }
   }
   if (basis->info.has_rest) {
-    v->rest_total = basis->rest_by_lung ? sum_of(v->rest, v->lungs) : resting(basis, 0, y);
+    v->rest_total = basis->rest_by_lung ? sum_of(v->rest, v->lung_count) : resting(basis, 0, y);
   }
   return SUPINE_OK;
 }
 
 static supine_status refuse(const char *what, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                          "this basis has no volume at %s: its scan was used as it is "
-                          "(--scanned none, --law paper or --fields). Give scan+ML or an absolute "
+                          "this basis has no volume at %s, as its scan was used unchanged "
+                          "(--scanned none, --law paper or --fields): give scan+ML or an absolute "
                           "volume such as 2600mL",
                           what);
 }
 
-/* Find the volume of all lungs together, mL above the reference surface. */
+/* Find the volume of all lungs together less the reference volume, mL. */
 static supine_status total_of(const supine_basis *basis, const volumes *v,
                               const supine_volume *volume, double *total, supine_error *error) {
   switch (volume->kind) {
@@ -105,10 +105,10 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
     *total = v->rest_total + volume->ml;
     return basis->info.has_rest ? SUPINE_OK : refuse("rest", error);
   case SUPINE_VOLUME_FULL:
-    *total = sum_of(v->full, v->lungs) + volume->ml;
+    *total = sum_of(v->full, v->lung_count) + volume->ml;
     return basis->info.has_full ? SUPINE_OK : refuse("full inflation", error);
   case SUPINE_VOLUME_ABSOLUTE:
-    *total = volume->ml - sum_of(basis->info.reference_volume, v->lungs);
+    *total = volume->ml - sum_of(basis->info.reference_volume, v->lung_count);
     return SUPINE_OK;
   case SUPINE_VOLUME_SCAN:
     *total = basis->scan_volume + volume->ml;
@@ -119,15 +119,15 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
   }
 }
 
-/* Divide a total among the lungs, all in mL above the reference surface. Above rest, every lung is
- * the same fraction of the way from its volume at rest to its volume at full inflation; below rest,
- * all lungs hold the same fraction of their volumes at rest. */
+/* Divide a total volume among the lungs; all volumes are mL above the reference volume. Above rest,
+ * every lung is the same fraction of the way from its volume at rest to its volume at full
+ * inflation; below rest, all lungs hold the same fraction of their volumes at rest. */
 static void share_out(const supine_basis *basis, const volumes *v, double total, double *lung_ml) {
   const double *reference = basis->info.reference_volume;
-  const double whole = sum_of(reference, v->lungs);
-  const double part = (total - v->rest_total) / (sum_of(v->full, v->lungs) - v->rest_total);
+  const double whole = sum_of(reference, v->lung_count);
+  const double part = (total - v->rest_total) / (sum_of(v->full, v->lung_count) - v->rest_total);
   const double shrunk = (whole + total) / (whole + v->rest_total);
-  for (size_t lung = 0; lung < v->lungs; ++lung) {
+  for (size_t lung = 0; lung < v->lung_count; ++lung) {
     lung_ml[lung] = total >= v->rest_total
                         ? v->rest[lung] + part * (v->full[lung] - v->rest[lung])
                         : (reference[lung] + v->rest[lung]) * shrunk - reference[lung];
@@ -141,20 +141,19 @@ static supine_status lung_gains(const supine_basis *basis, const volumes *v, siz
                                   pose->gains[lung], error);
 }
 
-/* Find the one gain for all lungs and axes at which they hold `total` mL more than the reference.
- */
+/* Find the one gain at which all lungs together hold `total` mL more than the reference volume. */
 static supine_status common_gains(const volumes *v, double total, supine_pose *pose,
                                   supine_error *error) {
   static const double straight[3] = {0, 0, 0};
   supine_volume_form sum = {{0}};
-  for (size_t lung = 0; lung < v->lungs; ++lung) {
+  for (size_t lung = 0; lung < v->lung_count; ++lung) {
     for (size_t i = 0; i < 7; ++i) {
       sum.of[i] += v->form[lung].of[i];
     }
   }
   double gains[3] = {0, 0, 0};
   const supine_status status = supine_volume_form_gains(&sum, straight, 0, total, gains, error);
-  for (size_t lung = 0; lung < v->lungs; ++lung) {
+  for (size_t lung = 0; lung < v->lung_count; ++lung) {
     memcpy(pose->gains[lung], gains, sizeof gains);
   }
   return status;
@@ -169,7 +168,7 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   double lung_ml[SUPINE_LUNGS_MAX];
   supine_status status = SUPINE_OK;
   share_out(basis, v, total, lung_ml);
-  for (size_t lung = 0; lung < v->lungs && status == SUPINE_OK; ++lung) {
+  for (size_t lung = 0; lung < v->lung_count && status == SUPINE_OK; ++lung) {
     status = lung_gains(basis, v, lung, lung_ml[lung], pose, error);
   }
   return status;
@@ -180,23 +179,25 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
-  if (state->lung_count != v->lungs) {
+  if (state->lung_count != v->lung_count) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the state names %zu lung%s, and the basis has %zu: name them all",
-                            state->lung_count, state->lung_count == 1 ? "" : "s", v->lungs);
+                            "the state names %zu lung%s, but the basis has %zu: name all of them",
+                            state->lung_count, state->lung_count == 1 ? "" : "s", v->lung_count);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
     const supine_volume *volume = &state->lungs[i].volume;
     size_t lung = 0;
-    while (lung < v->lungs && strcmp(state->lungs[i].name, basis->info.lung_names[lung]) != 0) {
+    while (lung < v->lung_count &&
+           strcmp(state->lungs[i].name, basis->info.lung_names[lung]) != 0) {
       ++lung;
     }
-    if (lung == v->lungs || (i > 0 && strcmp(state->lungs[0].name, state->lungs[i].name) == 0)) {
+    if (lung == v->lung_count ||
+        (i > 0 && strcmp(state->lungs[0].name, state->lungs[i].name) == 0)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
           "lung '%s' is unknown or named twice; name each lung of this basis once: %s%s%s",
-          state->lungs[i].name, basis->info.lung_names[0], v->lungs > 1 ? " and " : "",
-          v->lungs > 1 ? basis->info.lung_names[1] : "");
+          state->lungs[i].name, basis->info.lung_names[0], v->lung_count > 1 ? " and " : "",
+          v->lung_count > 1 ? basis->info.lung_names[1] : "");
     }
     double ml = volume->ml - basis->info.reference_volume[lung];
     if (volume->kind != SUPINE_VOLUME_ABSOLUTE) {
@@ -219,7 +220,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set the gains of a basis without volumes: 0 for the reference surface, the only state it has. */
+/* Set the gains for the reference surface, the only state that a basis without volumes has. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;
@@ -299,8 +300,8 @@ void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose, do
 }
 
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose) {
-  volumes v = {.lungs = basis->info.lung_count};
-  for (size_t lung = 0; lung < v.lungs; ++lung) {
+  volumes v = {.lung_count = basis->info.lung_count};
+  for (size_t lung = 0; lung < v.lung_count; ++lung) {
     contract(basis, lung, pose->weights, &v.form[lung]);
   }
   return common_gains(&v, volume, pose, NULL);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Find the rigid motion that fits the positions of a part best, by least squares. */
+/* Find the rigid motion that fits the positions of a rigid part best, by least squares. */
 #include <math.h>
 #include <string.h>
 
@@ -11,13 +11,13 @@ void supine_rigid_rotation(const double h[3][3], double rotation[9]) {
       {h[1][2] - h[2][1], h[0][0] - h[1][1] - h[2][2], h[0][1] + h[1][0], h[2][0] + h[0][2]},
       {h[2][0] - h[0][2], h[0][1] + h[1][0], h[1][1] - h[0][0] - h[2][2], h[1][2] + h[2][1]},
       {h[0][1] - h[1][0], h[2][0] + h[0][2], h[1][2] + h[2][1], h[2][2] - h[0][0] - h[1][1]}};
-  double shift = 0; /* added to every eigenvalue to make all of them positive */
+  double shift = 0; /* added to every eigenvalue so that all of them are positive */
   for (size_t k = 0; k < 16; ++k) {
     shift += m[k / 4][k % 4] * m[k / 4][k % 4];
   }
   shift = sqrt(shift);
-  double q[4] = {1, 0.03, 0.02, 0.01};     /* near the identity: points on a line do not
-                                            * determine the rotation about it */
+  /* Begin near the identity: points on a line do not determine the rotation about it. */
+  double q[4] = {1, 0.03, 0.02, 0.01};
   for (int step = 0; step < 200; ++step) { /* power iteration */
     double next[4];
     double square = 0;

@@ -17,9 +17,10 @@ static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                     [SUPINE_VOLUME_FULL] = "full",
                                     [SUPINE_VOLUME_SCAN] = "scan",
                                     [SUPINE_VOLUME_ABSOLUTE] = ""};
-_Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT, "a name for each kind");
+_Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT,
+               "one name for each kind of volume");
 
-enum { PIECE = 64 }; /* bytes of a posture or volume, with its NUL */
+enum { PIECE = 64 }; /* size in bytes of the text of a posture or volume, with its NUL */
 
 /* Read a number, with or without the unit "mL". */
 static bool read_number(const char *text, double *value, bool *has_unit) {
@@ -54,8 +55,8 @@ static supine_status read_volume(const char *text, supine_volume *volume, supine
     if (!has_unit) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "'%s': mL from what? rest%+g (from the end of a quiet expiration), full%+g (from full "
-          "inflation), scan%+g (from the volume scanned), or %gmL (as measured in a CT)",
+          "'%s' needs a reference: rest%+g (from the end of a quiet expiration), full%+g "
+          "(from full inflation), scan%+g (from the volume scanned), or %gmL (as measured in a CT)",
           text, value, -fabs(value), value, fabs(value));
     }
   }
@@ -65,7 +66,7 @@ static supine_status read_volume(const char *text, supine_volume *volume, supine
                           text);
 }
 
-/* Read "left=rest,right=rest+300". */
+/* Read the volumes of named lungs, such as "left=rest,right=rest+300". */
 static supine_status read_lungs(const char *text, supine_state *state, supine_error *error) {
   supine_state read = *state;
   read.lung_count = 0;
@@ -76,7 +77,8 @@ static supine_status read_lungs(const char *text, supine_state *state, supine_er
     const size_t size = strcspn(value, ",");
     if (at[length] != '=' || length == 0 || length >= SUPINE_STATE_NAME_SIZE || size >= PIECE) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "'%s': give volumes by lung as left=VOLUME,right=VOLUME", text);
+                              "'%s': give the volume of each lung as left=VOLUME,right=VOLUME",
+                              text);
     }
     if (read.lung_count == SUPINE_STATE_LUNGS_MAX) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -114,7 +116,7 @@ supine_status supine_state_parse_volume(const char *text, supine_state *state,
   return status;
 }
 
-/* Read gravity "X:Y:Z" of any length but 0, and normalise it. */
+/* Read gravity as "X:Y:Z", a vector of any length but 0, and normalise it. */
 static bool read_gravity(const char *text, double gravity[3]) {
   double g[3];
   for (int i = 0; i < 3; ++i) {
@@ -128,7 +130,7 @@ static bool read_gravity(const char *text, double gravity[3]) {
   return supine_normalise(g, gravity);
 }
 
-/* Read a tilted posture, "supine+15". */
+/* Read a tilted posture, such as "supine+15". */
 static bool read_tilted(const char *text, double gravity[3]) {
   const size_t length = strcspn(text, "+-");
   char front[PIECE];
@@ -171,7 +173,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* no posture comes before this colon */
+  if (equals != NULL && colon != NULL && colon > equals) { /* not the colon after a posture */
     colon = NULL;
   }
   if (colon == NULL) {
@@ -185,7 +187,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   char posture[PIECE];
   if ((size_t)(colon - text) >= sizeof posture) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "no posture '%.64s...': give one such as supine", text);
+                            "no posture '%.64s...': give a posture such as supine", text);
   }
   (void)snprintf(posture, sizeof posture, "%.*s", (int)(colon - text), text);
   status = supine_state_parse_posture(posture, &read, error);
@@ -198,7 +200,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   return status;
 }
 
-/* A text being printed, cut off to its size, and the length of the whole text. */
+/* A text being written, which is cut off at `size` bytes, and the length of the whole text. */
 typedef struct writer {
   char *text;
   size_t size;

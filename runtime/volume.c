@@ -13,7 +13,7 @@ static double dot(size_t count, const double *a, const double *b) {
   return sum;
 }
 
-/* Compute w^T form w, form [K, K]. */
+/* Compute w^T F w for the matrix `form` F [count, count]. */
 static double square(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -34,7 +34,7 @@ void supine_volume_contract(size_t count, size_t axes, const double *linear,
   }
 }
 
-/* Compute c[0] s + c[1] s^2 + c[2] s^3. */
+/* Return c[0] s + c[1] s^2 + c[2] s^3 for the coefficients c = `cubic` at s = `scale`. */
 static double cubic_at(const double cubic[3], double scale) {
   return scale * (cubic[0] + scale * (cubic[1] + scale * cubic[2]));
 }
@@ -43,13 +43,13 @@ static double cubic_slope(const double c[3], double s) {
   return c[0] + s * (2 * c[1] + s * 3 * c[2]);
 }
 
-/* Find the s nearest to 0, on the side (1 or -1) of 0, at which the slope is 0; infinite if there
- * is none. */
+/* Find the s nearest to 0, with the sign of `side` (1 or -1), at which the slope of the cubic is 0;
+ * return an infinite s if there is none. */
 static double cubic_turn(const double c[3], double side) {
   double roots[2] = {INFINITY, INFINITY};
   const double discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant >= 0) {
-    /* 3 c s^2 + 2 b s + a = 0 without cancellation; a root may be infinite or NaN. */
+    /* Solve 3 c[2] s^2 + 2 c[1] s + c[0] = 0 without cancellation; a root may be inf or NaN. */
     const double q = -(c[1] + copysign(sqrt(discriminant), c[1]));
     roots[0] = q / (3 * c[2]);
     roots[1] = c[0] / q;
@@ -64,8 +64,8 @@ static double cubic_turn(const double c[3], double side) {
   return nearest * side;
 }
 
-/* Solve cubic(s) = volume between low and high, where it is monotone, by Newton's method, with a
- * bisection whenever a step leaves the bracket. */
+/* Find the s between `low` and `high` at which the cubic is `volume`, by Newton's method; bisect if
+ * a step leaves the bracket. The cubic must be monotone between them. */
 static double cubic_solve(const double c[3], double volume, double low, double high) {
   const bool rising = cubic_at(c, high) > cubic_at(c, low);
   double s = volume / c[0];
@@ -100,8 +100,8 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
   }
   if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2]) || c[0] == 0) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "a change of the reference surface's volume by %g mL cannot be "
-                            "reached: here no gain changes it",
+                            "a change of the reference surface's volume by %g mL is out of "
+                            "reach: in this posture no gain changes the volume",
                             volume);
   }
   const double side = volume / c[0] > 0 ? 1 : -1;
@@ -111,7 +111,7 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     if (fabs(reach) < fabs(volume)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "a change of the reference surface's volume by %g mL is out of "
-                              "reach: the surface folds beyond %g mL",
+                              "reach: the surface folds at a change of %g mL",
                               volume, reach);
     }
   } else {
@@ -122,8 +122,8 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     far *= 2;
     if (!isfinite(far)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a change of the reference surface's volume by %g mL cannot be "
-                              "reached: here no gain changes it",
+                              "a change of the reference surface's volume by %g mL is out of "
+                              "reach: in this posture no gain changes the volume",
                               volume);
     }
   }
@@ -166,8 +166,8 @@ static double volume_on_path(const supine_volume_form *form, const double bend[3
   return supine_volume_form_at(form, gains);
 }
 
-/* Find the gains on the path at which the lung holds `volume`: step along the path until that
- * volume is passed, then bisect the last step. */
+/* Find the gains on the path of supine_volume_bend at which the lung holds `volume`: step along the
+ * path until that volume is passed, then bisect the last step. */
 static supine_status follow_path(const supine_volume_form *form, const double bend[3], double scale,
                                  double rest, double volume, double gains[3], supine_error *error) {
   const double step = volume / rest > 0 ? 1.0 / 16 : -1.0 / 16;
@@ -183,7 +183,7 @@ static supine_status follow_path(const supine_volume_form *form, const double be
     if (!(side * held > side * before)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "a change of the reference surface's volume by %g mL is out of "
-                              "reach: the surface folds beyond %g mL",
+                              "reach: the surface folds at a change of %g mL",
                               volume, before);
     }
   }

@@ -23,7 +23,7 @@ size_t supine_words_distance(const char *text, const char *word) {
   for (size_t j = 0; j <= length; ++j) {
     row[j] = j;
   }
-  for (const char *c = text; *c != '\0'; ++c) { /* row by row over the text */
+  for (const char *c = text; *c != '\0'; ++c) {
     size_t diagonal = row[0]++;
     for (size_t j = 1; j <= length; ++j) {
       const int differ = lower(*c) != lower(word[j - 1]);

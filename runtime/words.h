@@ -6,13 +6,13 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Report whether two words are the same, ignoring case (of ASCII letters only, in every locale). */
+/* Return whether two words are the same, ignoring the case of ASCII letters in every locale. */
 bool supine_words_same(const char *a, const char *b);
 
-/* Largest number of characters of `word` that supine_words_distance compares. */
+/* Number of characters of `word` after which supine_words_distance ignores the rest. */
 enum { SUPINE_WORD_MAX = 63 };
 
-/* Count the fewest insertions, deletions and replacements of a character that turn `text`, of any
+/* Return the smallest number of characters to insert, delete or replace to turn `text`, of any
  * length, into `word`, ignoring case (Levenshtein 1966). */
 size_t supine_words_distance(const char *text, const char *word);
 

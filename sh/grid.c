@@ -8,8 +8,9 @@
 
 #include "sh/grid.h"
 
-/* Refine nodes z and weights w to rounding error, by one Newton step on P_n. GSL tabulates some
- * rules and computes the others to about 1e-11, an error that one step reduces to 1e-22.
+/* Refine the n nodes z and weights w to rounding error, by one Newton step on the Legendre
+ * polynomial P_n. GSL tabulates some rules and computes the others to about 1e-11, an error that
+ * one step reduces to 1e-22.
  *
  *     w = 2 / ((1 - z^2) P_n'(z)^2)
  *
@@ -49,7 +50,7 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
   if (made->z == NULL || made->weight == NULL || table == NULL) {
     goto cleanup;
   }
-  for (size_t j = 0; j < latitudes; ++j) { /* GSL's nodes ascend */
+  for (size_t j = 0; j < latitudes; ++j) { /* the nodes of GSL ascend, those of the grid descend */
     const size_t south = latitudes - 1 - j;
     (void)gsl_integration_glfixed_point(-1, 1, j, &made->z[south], &made->weight[south], table);
   }
@@ -61,7 +62,7 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
   status = SUPINE_OK;
 
 cleanup:
-  if (table != NULL) { /* GSL 2.7 does not accept NULL */
+  if (table != NULL) { /* GSL 2.7 does not accept NULL here */
     gsl_integration_glfixed_table_free(table);
   }
   free(work);

@@ -8,11 +8,11 @@
 
 #include <supine/status.h>
 
-/** Largest number of latitudes or longitudes of a rule. */
+/** Largest number of latitudes, and of longitudes, of a rule. */
 #define SUPINE_SH_GRID_MAX 16384
 
-/** A rule of latitudes x longitudes directions. Direction (j, k) has cos(colatitude) = z[j] and
- * longitude 2 pi k / longitudes; its weight is weight[j] * 2 pi / longitudes. */
+/** A quadrature rule of latitudes x longitudes directions. Direction (j, k) has cos(colatitude) =
+ * z[j] and longitude 2 pi k / longitudes; its weight is weight[j] * 2 pi / longitudes. */
 typedef struct supine_sh_grid {
   size_t latitudes;
   size_t longitudes;
@@ -20,20 +20,17 @@ typedef struct supine_sh_grid {
   double *weight; /**< [latitudes] Gauss-Legendre weights, summing to 2 */
 } supine_sh_grid;
 
-/** Create the rule with the given numbers of latitudes and longitudes (1 to SUPINE_SH_GRID_MAX
- * each). It integrates products of two functions of band L exactly if latitudes > L and
- * longitudes > 2 L.
- * @param grid  written; free it with supine_sh_grid_destroy. NULL on failure
+/** Create the rule with given numbers of latitudes and longitudes, 1 to SUPINE_SH_GRID_MAX each. It
+ * integrates products of two functions of band L exactly if latitudes > L and longitudes > 2 L.
+ * @param grid  written, NULL on failure; free it with supine_sh_grid_destroy
  * @retval SUPINE_ERROR_ARGUMENT  a number is out of range
- * @retval SUPINE_ERROR_MEMORY    an allocation failed; if it was one of GSL, after its error
- * handler
- */
+ * @retval SUPINE_ERROR_MEMORY    an allocation failed (in GSL: after its error handler ran) */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
 /** Free a rule; NULL is legal. */
 void supine_sh_grid_destroy(supine_sh_grid *grid);
 
-/** Compute unit direction (j, k). */
+/** Compute direction (j, k) of the rule as a unit vector. */
 void supine_sh_grid_direction(const supine_sh_grid *grid, size_t j, size_t k, double direction[3]);
 
 #endif

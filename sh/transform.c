@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Transform fields on a grid of directions to coefficients: FFTW along longitude, Legendre
- * functions along latitude. */
+/* Transform fields on a grid to coefficients: FFTs in longitude, Legendre functions in latitude. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -15,8 +14,8 @@
 struct supine_sh_transform {
   size_t band, fields;
   const supine_sh_grid *grid;
-  double *legendre;       /* Legendre functions at one latitude, in GSL's order */
-  fftw_complex *spectrum; /* [longitudes / 2 + 1, fields] */
+  double *legendre;       /* Legendre functions at one latitude, in the order of GSL */
+  fftw_complex *spectrum; /* [longitudes / 2 + 1, fields] FFT of one latitude */
   fftw_plan fft;
 };
 
@@ -39,11 +38,11 @@ supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid
                                          supine_sh_transform **plan, supine_error *error) {
   *plan = NULL;
   if (band > SUPINE_SH_BAND_MAX || grid->latitudes <= band || grid->longitudes <= 2 * band) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "a grid of %zu x %zu directions cannot represent band %zu: more than %zu latitudes and %zu "
-        "longitudes are needed, and the highest band is %d",
-        grid->latitudes, grid->longitudes, band, band, 2 * band, SUPINE_SH_BAND_MAX);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a grid of %zu x %zu directions cannot represent band %zu: give more "
+                            "than %zu latitudes and %zu longitudes, and a band of at most %d",
+                            grid->latitudes, grid->longitudes, band, band, 2 * band,
+                            SUPINE_SH_BAND_MAX);
   }
   supine_sh_transform *made = calloc(1, sizeof *made);
   if (made != NULL) {
@@ -72,8 +71,8 @@ void supine_sh_transform_destroy(supine_sh_transform *plan) {
   }
 }
 
-/* GSL's SPHARM functions are normalised for exp(i m phi); the real harmonics of m > 0, with cos or
- * sin (m phi), have an additional factor sqrt(2). */
+/* GSL's SPHARM functions are normalised for exp(i m phi). Real harmonics with m != 0, which have
+ * cos or sin (m phi), have an additional factor sqrt(2). */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
                               double *coefficients) {
   const size_t count = supine_sh_count(plan->band);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Compute the spherical-harmonic transform of several real fields at once.
+/** @file Compute the spherical-harmonic transform of several real fields at once,
  *
  *     coefficient(l, m) = integral over the sphere of value(g) Y(l, m)(g)
  *
- * by the quadrature of the grid: exact to rounding for fields without bands above the plan's band;
- * higher bands of a field alias into its coefficients. */
+ * by the quadrature rule of a grid. It is exact to rounding for fields without bands above the
+ * plan's band; higher bands of a field alias into its coefficients. */
 #ifndef SUPINE_TRANSFORM_H
 #define SUPINE_TRANSFORM_H
 
@@ -13,26 +13,27 @@
 #include "sh/grid.h"
 #include <supine/status.h>
 
-/** Plan for transforms of a fixed number of fields on one grid, up to one band. A plan is for one
- * thread at a time, and only one thread of the process may create or destroy plans, as FFTW's
- * planner has global state. */
+/** Plan for transforms of a fixed number of fields on one grid, up to a highest band. Only one
+ * thread at a time may use a plan, and only one thread of the process may create or destroy plans,
+ * as FFTW's planner has global state. */
 typedef struct supine_sh_transform supine_sh_transform;
 
 /** Create a plan.
  * @param band    0 to SUPINE_SH_BAND_MAX; the grid needs latitudes > band, longitudes > 2 band
  * @param grid    must outlive the plan
  * @param fields  number of fields, at least 1
- * @retval SUPINE_ERROR_ARGUMENT  band too high, or a grid too small for it
- * @retval SUPINE_ERROR_MEMORY */
+ * @param plan    written, NULL on failure
+ * @retval SUPINE_ERROR_ARGUMENT  the band is too high, or the grid is too small for the band
+ * @retval SUPINE_ERROR_MEMORY    an allocation failed */
 supine_status supine_sh_transform_create(size_t band, const supine_sh_grid *grid, size_t fields,
                                          supine_sh_transform **plan, supine_error *error);
 
 /** Free a plan; NULL is legal. */
 void supine_sh_transform_destroy(supine_sh_transform *plan);
 
-/** Add the part of latitude j to the coefficients. Zero the coefficients first, then add each
- * latitude once, in any order.
- * @param ring          values at latitude j, [longitudes, fields]
+/** Add the contribution of latitude j to the coefficients. Zero the coefficients first, then add
+ * each latitude once, in any order.
+ * @param ring          [longitudes, fields] values at latitude j
  * @param coefficients  [fields, (band + 1)^2] */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
                               double *coefficients);

@@ -93,7 +93,7 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume scan-5700 -o b.ply");
   EXPECT(5, "outside the 10 to 120 %",
          "deform lungs.safetensors --posture left --volume full+1300 -o b.ply");
-  EXPECT(1, "name them all", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
+  EXPECT(1, "name all of them", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
   EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
   EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL), outside the 10 to 120 %",

@@ -217,7 +217,7 @@ static void spoil_lung_first(fixture *f) {
 }
 
 TEST(test_open_wrong_content_refused_with_reason) {
-  expect_refused(spoil_triangle, "a triangle names vertex 12 of 12");
+  expect_refused(spoil_triangle, "a triangle refers to vertex 12, but the number of vertices is 12");
   expect_refused(spoil_vertex, "'vertices' has a number that is not finite, or 2^30 or more");
   expect_refused(spoil_direction, "'direction' has a number that is not finite, or 2^30 or more");
   expect_refused(spoil_coefficient,

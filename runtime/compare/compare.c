@@ -14,9 +14,9 @@
 
 struct supine_compare {
   const supine_basis *basis;
-  double area;  /* mm^2 */
-  float *share; /* [N] a_i, the fraction of the area that belongs to vertex i */
-  double *gram; /* [G, 3, K, K] Gram matrices of lungs and axes, mm^2 */
+  double area;  /* area of the reference surface, mm^2 */
+  float *share; /* [N] fraction a_i of the area that belongs to vertex i */
+  double *gram; /* [G, 3, K, K] Gram matrix of each lung and axis, mm^2 */
   double *sum;  /* [K, K] the sum of all Gram matrices, mm^2 */
 };
 
@@ -37,7 +37,8 @@ static double twice_area(const supine_basis *basis, const uint32_t *corner) {
   return supine_length(product);
 }
 
-/* Compute a_i: a third of the area of vertex i's triangles, over the area of all. */
+/* Compute the fraction a_i of the area of each vertex i: a third of the area of its triangles,
+ * divided by the area of all triangles. */
 static supine_status share_area(supine_compare *compare, supine_error *error) {
   const supine_basis *basis = compare->basis;
   const size_t n = basis->info.vertex_count;
@@ -61,12 +62,12 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
   free(area);
   return total > 0 && isfinite(total)
              ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the surface has no area, or one that is not finite: no average "
-                                "over it exists");
+             : supine_error_set(
+                   error, SUPINE_ERROR_MESH,
+                   "the area of the surface is 0 or not finite: no average over it exists");
 }
 
-/* Add weight c c^T to the upper triangle of `gram`. */
+/* Add `weight` times c c^T to the upper triangle of `gram` [count, count]. */
 static void add_row(const float *c, double weight, size_t count, double *gram) {
   double row[SUPINE_MODES_MAX];
   for (size_t k = 0; k < count; ++k) {
@@ -148,7 +149,7 @@ double supine_compare_area(const supine_compare *compare) {
   return compare->area;
 }
 
-/* Compute q^T G p, where q and p have `count` numbers. */
+/* Compute q^T G p for the matrix `gram` G [count, count]. */
 static double product(const double *gram, const double *q, const double *p, size_t count) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
@@ -161,8 +162,7 @@ static double product(const double *gram, const double *q, const double *p, size
   return sum;
 }
 
-/* Compute the products q [G, 3, K] of the gains and weights of a pose, less those of `from` unless
- * it is NULL. */
+/* Compute q [G, 3, K]: gain times weight of a pose, less the same for `from` unless it is NULL. */
 static void products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
@@ -209,7 +209,7 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* Compute |u_i| of the field with products of gains and weights q [3, K], mm. */
+/* Compute the length of vertex i's displacement, mm, from its lung's q [3, K] of products_of. */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];
@@ -238,9 +238,9 @@ void supine_compare_distances(const supine_compare *compare, const supine_pose *
   }
 }
 
-/* Find the smallest distance that at least `target` of the area does not exceed. The bits of floats
- * that are not negative sort as the floats do: three histograms of the area, over 2^11 values each,
- * determine the upper, middle and lower bits. */
+/* Find the smallest distance that at least `target` of the area does not exceed. Floats that are
+ * not negative sort as their bits do: three histograms of the area, each with 2^11 bins, determine
+ * the upper, middle and lower bits of the result. */
 static double percentile(const supine_compare *compare, const float *distance, double target) {
   enum { ROUNDS = 3, BITS = 11, BINS = 1 << BITS };
   const size_t n = compare->basis->info.vertex_count;
@@ -257,7 +257,7 @@ static double percentile(const supine_compare *compare, const float *distance, d
       }
     }
     uint32_t at = 0;
-    uint32_t last = 0; /* last bin that is not empty, if rounding leaves the target above the sum */
+    uint32_t last = 0; /* last bin with area, used if rounding leaves `target` above the sum */
     for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
       below += bin[at];
       last = bin[at] > 0 ? at : last;
@@ -282,7 +282,7 @@ void supine_compare_statistics(const supine_compare *compare, const float *dista
   for (size_t i = 0; i < compare->basis->info.vertex_count; ++i) {
     const double share = (double)compare->share[i];
     const double d = (double)distance[i];
-    area += share; /* 1 up to rounding */
+    area += share; /* the sum is 1 up to rounding */
     sum += share * d;
     square += share * d * d;
     largest = distance[i] > largest ? distance[i] : largest;

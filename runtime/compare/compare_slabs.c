@@ -11,25 +11,23 @@
 
 enum { BEFORE, AFTER, TIMES };
 
-/* A point of the surface. Levels t increase along gravity, so that "above" a cut is at smaller t.
- */
+/* A point of the surface. Levels increase along gravity: points above a cut have smaller levels. */
 typedef struct corner {
   double at[TIMES][3]; /* positions before and after the breath, mm */
-  double level;        /* t before the breath, mm */
+  double level;        /* coordinate along gravity before the breath, mm */
 } corner;
 
-/* A triangle, or the part of one between two levels, which has at most five corners. */
+/* A triangle, or its part between two levels, which has at most five corners. */
 typedef struct polygon {
   size_t count;
   corner corner[6];
 } polygon;
 
-/* Sums over the edges of a cut's outline, which run from p to q as in the polygons above the cut.
- */
+/* Sums over the edges (p, q) of a cut's outline, directed as in the polygons above the cut. */
 typedef struct outline {
-  double length;           /* length before the breath, mm */
-  double middle[TIMES][3]; /* sum of the edges' middles times their lengths, mm^2 */
-  double area[TIMES][3];   /* sum of p x q, mm^2 */
+  double length;           /* length of all edges before the breath, mm */
+  double middle[TIMES][3]; /* sum of edge midpoints times edge lengths, mm^2 */
+  double area[TIMES][3];   /* sum of the cross products p x q, mm^2 */
 } outline;
 
 /* The slabs, and the cuts of one lung at the levels between them. */
@@ -37,11 +35,11 @@ typedef struct cutter {
   const float *from;                  /* [N, 3] positions before the breath */
   double down[3];                     /* unit vector along gravity */
   size_t count;                       /* number of slabs */
-  double level[SUPINE_SLABS_MAX + 1]; /* t at which slab i begins, mm; the last: where all end */
+  double level[SUPINE_SLABS_MAX + 1]; /* top of each slab, and bottom of the last, mm */
   outline cut[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-/* Read a vertex. Positions count from the first vertex, for precision. */
+/* Read a vertex. Its positions are relative to the first vertex, for precision. */
 static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   corner out;
   for (size_t i = 0; i < 3; ++i) {
@@ -52,7 +50,7 @@ static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   return out;
 }
 
-/* Add the volume between the origin and a polygon, mL: before the breath and gained. */
+/* Add the volume, mL, of the cone from the origin to a polygon, and its gain in the breath. */
 static void add_polygon(const polygon *p, supine_slab *slab) {
   double volume[TIMES] = {0};
   for (size_t i = 1; i + 1 < p->count; ++i) {
@@ -66,7 +64,7 @@ static void add_polygon(const polygon *p, supine_slab *slab) {
   slab->gain += volume[AFTER] - volume[BEFORE];
 }
 
-/* Find the point at a level on the edge from a to b. */
+/* Interpolate the point at a level on the edge from a to b. */
 static corner cross_level(const corner *a, const corner *b, double level) {
   corner out = {.level = level};
   const double share = (level - a->level) / (b->level - a->level);
@@ -90,10 +88,11 @@ static void add_edge(const corner *p, const corner *q, outline *cut) {
   }
 }
 
-/* Split a polygon at a level between its corners, and add the cut edge to `cut`.
- * @param below  written; may not be `p` */
+/* Split a polygon at a level between its corners, and add the new edge to `cut`.
+ * @param above, below  written; must not be `p` */
 static void split(const polygon *p, double level, polygon *above, polygon *below, outline *cut) {
-  corner end[2] = {{.level = level}, {.level = level}}; /* where the polygon's edge goes down, up */
+  /* Points where the outline of the polygon passes the level downwards and upwards. */
+  corner end[2] = {{.level = level}, {.level = level}};
   above->count = below->count = 0;
   for (size_t i = 0; i < p->count; ++i) {
     const corner *a = &p->corner[i];
@@ -110,7 +109,7 @@ static void split(const polygon *p, double level, polygon *above, polygon *below
   add_edge(&end[0], &end[1], cut);
 }
 
-/* Find the slab that holds level t. */
+/* Find the slab that contains level t. */
 static size_t slab_of(const cutter *c, double t) {
   size_t slab = 0;
   while (slab + 1 < c->count && c->level[slab + 1] <= t) {
@@ -134,9 +133,9 @@ static void add_triangle(cutter *c, const polygon *triangle, supine_slab *slabs)
   add_polygon(&rest, &slabs[last]);
 }
 
-/* Close the slabs above and below a cut by the fan of triangles from the mean of its outline. */
+/* Close the slabs above and below a cut by triangles from the mean of its outline to each edge. */
 static void close_cut(const outline *cut, supine_slab *above, supine_slab *below) {
-  double volume[TIMES]; /* between the origin and the fan, mL */
+  double volume[TIMES]; /* volume of the cone from the origin to these triangles, mL */
   for (int time = 0; time < TIMES && cut->length > 0; ++time) {
     volume[time] = 1e-3 / 6 * supine_dot(cut->middle[time], cut->area[time]) / cut->length;
   }

@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Compact numbers: two or three in a word of 32 bits, or three in two words.
+ * Compact numbers: two or three numbers in a word of 32 bits, or three in two words.
  *
- * To read a number, shift its word so that the number has the uppermost bits, and convert the whole
- * word as a signed integer: one shift and one conversion. The bits below the number belong to other
- * numbers; they are known when it is packed, and the number is chosen so that the whole word is as
- * near as possible to its value.
- */
+ * To read a number, shift its word left until the number has the uppermost bits, and convert the
+ * whole word as a signed integer. The bits below belong to other numbers. They are known when the
+ * number is packed, and it is chosen so that the whole word is as near as possible to the value. */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
 
@@ -22,57 +20,55 @@ static inline int32_t word_integer(uint32_t word) {
   return value;
 }
 
-/** Round a number of a size below 2^51 to the nearest integer, in instructions that every processor
- * has. */
+/** Round a number of magnitude below 2^51 to the nearest integer, by two additions. */
 static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
 
-/** Return the word nearest to `value` whose lowest `bits` bits are those of `low`. */
+/** Return the word nearest to `value`, or the smallest word for NaN, whose lowest `bits` bits are
+ * those of `low`. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
   const double above = nearest_integer((value - (double)low) / step);
-  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1; /* or NaN */
+  const double held = above > top ? top : above >= -top - 1 ? above : -top - 1;
   return (uint32_t)(int32_t)(held * step) | low;
 }
 
-/** Pack two numbers between -2^31 and 2^31 into a word, the first into the lower half. */
+/** Pack two numbers between -2^31 and 2^31 into the lower and the upper half of a word. */
 static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** Pack three numbers between -2^31 and 2^31 into a word: into 11, 11 and 10 bits, from the
- * uppermost. */
+/** Pack three numbers between -2^31 and 2^31 into the upper 11, middle 11 and lower 10 bits. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 22) >> 22;
   const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;
   return word_nearest(first, lower, 21);
 }
 
-/** Pack three modes of a normal, between -2^31 and 2^31, into a word: into 13, 10 and 9 bits, as
- * the first modes are the largest. */
+/** Pack three modes of a normal, between -2^31 and 2^31, into the upper 13, the next 10 and the
+ * lowest 9 bits of a word, as the first modes are the largest. */
 static inline uint32_t normal_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 23) >> 23;
   const uint32_t lower = word_nearest(second, low << 13, 22) >> 13;
   return word_nearest(first, lower, 19);
 }
 
-/** Return the value of 1 in normal_narrow, in counts of the file's 16 bits: the largest count,
- * 32767, becomes the largest value of the 9 upper bits of a word, 255 x 2^23. */
+/** Return the unit of normal_narrow, as a multiple of the unit of the file's 16-bit numbers: the
+ * largest of those, 32767, becomes 255 x 2^23, the largest value of 9 bits. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }
 
-/** Return number 0, 1 or 2 of a word of normal_narrow. */
+/** Unpack number 0, 1 or 2 of a word of normal_narrow. */
 static inline float normal_number(uint32_t word, size_t number) {
   return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
 }
 
-/** Pack three numbers between -2^31 and 2^31 into two words: the first and second into the upper 21
- * bits of a word each, the third into the remaining 22 bits. Replace 0 by the smallest positive
- * number: the kernels multiply by a power of two by adding to the exponent bits (reference_unit).
- */
+/** Pack three numbers between -2^31 and 2^31 into two words: the first two into the upper 21 bits
+ * of a word each, the third into the remaining 22 bits. Replace 0 by the smallest positive number,
+ * as the kernels multiply by a power of two by adding it to the exponent bits (reference_unit). */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;

@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The loops that evaluate tiles, for vectors of LANES floats. Each kernel_*.c includes it once,
- * after its definitions of
+ * The loops that evaluate tiles, for vectors of LANES floats. Each kernel_*.c includes this file
+ * once, after definitions of
  *
  *     KERNELS          the name of its supine_kernels
  *     LANES            4, 8 or 16
  *     FMA(a, b, c)     a * b + c
- *     RSQRT(x)         an estimate of 1 / sqrt(x), of 12 bits at least
- *     STREAM(to, v)    store a vector with stores that bypass the caches; or OWN_WRITER, if the
- *                      file defines its own writer in place of the one here
- */
+ *     RSQRT(x)         an estimate of 1 / sqrt(x), accurate to 12 bits at least
+ *     STREAM(to, v)    store a vector and bypass the caches; or OWN_WRITER, if the file defines
+ *                      its own writer in place of the one below */
 #include "runtime/kernels/tiles.h"
 #include <string.h>
 
@@ -20,9 +19,9 @@ typedef int32_t vi __attribute__((vector_size(4 * LANES)));
 typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 
 enum {
-  GROUPS = TILE / LANES,         /* vectors of one number of each vertex of a tile */
-  PIECES = TILE_NUMBERS / LANES, /* vectors of the coordinates of a tile */
-  CHAINS = GROUPS == 1 ? 2 : 1,  /* partial sums over the modes: with one, additions would wait */
+  GROUPS = TILE / LANES,         /* vectors that hold one number of each vertex of a tile */
+  PIECES = TILE_NUMBERS / LANES, /* vectors that hold the coordinates of a tile */
+  CHAINS = GROUPS == 1 ? 2 : 1,  /* partial sums over the modes; a second sum hides latency */
   KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
 
@@ -31,12 +30,12 @@ typedef struct row {
   vf v[GROUPS];
 } row;
 
-/* The tile's 48 numbers x y z x y z ... */
+/* The 48 coordinates of a tile, x y z x y z ... */
 typedef struct triples {
   vf v[PIECES];
 } triples;
 
-/* F(j, 0), F(j, 1), ... F(j, LANES - 1) */
+/* EACH(F, j) is F(j, 0), F(j, 1), ... F(j, LANES - 1). */
 #define EACH4(F, j, i) F(j, i), F(j, (i) + 1), F(j, (i) + 2), F(j, (i) + 3)
 #if LANES == 4
 #define EACH(F, j) EACH4(F, j, 0)
@@ -46,7 +45,7 @@ typedef struct triples {
 #define EACH(F, j) EACH4(F, j, 0), EACH4(F, j, 4), EACH4(F, j, 8), EACH4(F, j, 12)
 #endif
 
-/* Lane i of piece j of x y z x y z ... holds coordinate AXIS(j, i) of vertex VERTEX(j, i). */
+/* Lane i of vector j of x y z x y z ... holds coordinate AXIS(j, i) of vertex VERTEX(j, i). */
 #define VERTEX(j, i) (((j)*LANES + (i)) / 3)
 #define AXIS(j, i) (((j)*LANES + (i)) % 3)
 
@@ -56,8 +55,7 @@ INLINE vf load(const unsigned char *at) {
   return v;
 }
 
-/* Convert to floats the signed integers that begin `shift` bits below the top of words (compact.h).
- */
+/* Convert signed integers that begin `shift` bits below the top of their words to floats. */
 INLINE vf integers(vu words, int shift) {
   return __builtin_convertvector((vi)(words << shift), vf);
 }
@@ -75,22 +73,23 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* The constants for which the compiler specialises a loop. If `modes` is not 0, the loop evaluates
- * that number of modes and writes positions. */
+/* Constants for which the compiler specialises a loop, which writes positions if `modes` is known.
+ */
 typedef struct form {
   supine_storage storage;
-  size_t modes; /* 0: any number */
+  size_t modes; /* number of modes; 0: any number */
   bool vector;
 } form;
 
-/* Add w times one mode of 16 vertices: floats, or if `compact` words read from bit `shift` on. */
+/* Add w times one mode of 16 vertices: floats or, if `compact`, numbers that begin `shift` bits
+ * below the top of their words. */
 INLINE void add_mode(row *sum, vf w, const unsigned char *at, int shift, bool compact) {
   for (size_t q = 0; q < GROUPS; ++q, at += sizeof(vf)) {
     sum->v[q] = FMA(w, compact ? integers((vu)load(at), shift) : load(at), sum->v[q]);
   }
 }
 
-/* Sum w_k c_k over the modes of 16 vertices. */
+/* Compute the sum of weight times coefficient over the modes of 16 vertices. */
 INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights *w, form f) {
   const bool compact = supine_tiles_compact(f.storage);
   const bool known = f.modes > 0;
@@ -99,7 +98,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   row *even = &sum[0];
   row *odd = &sum[CHAINS - 1];
   for (size_t q = 0; q < CHAINS * GROUPS; ++q) {
-    sum[q / GROUPS].v[q % GROUPS] = splat(-0.0F); /* adding -0 changes no number, not even a 0 */
+    sum[q / GROUPS].v[q % GROUPS] = splat(-0.0F); /* -0 + x is x for every x, even for x = -0 */
   }
   for (size_t k = 0; k < paired / 2; ++k, at += compact ? 64 : 128) {
     add_mode(even, weight(w, 2 * k, known), at, 16, compact);
@@ -120,8 +119,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   return *even;
 }
 
-/* Load 48 numbers of directions or reference positions; compact ones in the unit that they are
- * packed in. */
+/* Load the 48 numbers of directions or reference positions; compact ones in packed units. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
   for (size_t j = 0; j < PIECES && !compact; ++j) {
@@ -147,7 +145,7 @@ INLINE triples reference_positions(const supine_tiles *tiles, const unsigned cha
   return p;
 }
 
-/* Interleave coordinates to x y z x y z ... of 16 vertices: put x and y into place, then z. */
+/* Interleave the coordinates of 16 vertices to x y z x y z ...: first x with y, then z. */
 INLINE triples interleave(const row *x, const row *y, const row *z) {
 #define FROM_XY(j, i) (VERTEX(j, i) + (AXIS(j, i) == 1 ? LANES : 0))
 #define FROM_Z(j, i) (AXIS(j, i) == 2 ? VERTEX(j, i) + LANES : (i))
@@ -164,7 +162,7 @@ INLINE triples interleave(const row *x, const row *y, const row *z) {
 #undef PIECE
 }
 
-/* Repeat one number of each vertex three times. */
+/* Repeat the number of each vertex three times, once for each axis. */
 INLINE triples spread(const row *a) {
   triples t;
   for (size_t q = 0; q < GROUPS; ++q) {
@@ -176,7 +174,7 @@ INLINE triples spread(const row *a) {
 }
 
 #ifndef OWN_WRITER
-/* An array that is written in order, with stores that bypass the caches if `stream`. */
+/* An array that is written in order; if `stream`, with stores that bypass the caches. */
 typedef struct writer {
   float *to;
   bool stream;
@@ -265,8 +263,8 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *folded, size_t f
   }
 }
 
-/* Choose the storage. MIXED differs from INT16 in numbers that a loop for any number of modes reads
- * from `tiles`. */
+/* Choose the loop for the storage. The loop of INT16 for any number of modes also evaluates MIXED,
+ * as it reads from `tiles` all numbers in which the two storages differ. */
 INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_t first,
                            size_t count, const supine_target *target, size_t modes) {
   if (tiles->storage == SUPINE_STORAGE_EXACT) {
@@ -281,7 +279,7 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_
 static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
                    const supine_target *target) {
   const bool registers = LANES == 16 && target->add_reference;
-  if (registers && tiles->modes == 4) { /* as bases of the default law have */
+  if (registers && tiles->modes == 4) { /* the number of modes of the default law */
     deform_storage(tiles, folded, first, count, target, 4);
   } else if (registers && tiles->modes == KNOWN_MODES) {
     deform_storage(tiles, folded, first, count, target, KNOWN_MODES);
@@ -290,8 +288,7 @@ static void deform(const supine_tiles *tiles, const float *folded, size_t first,
   }
 }
 
-/* Compute one coordinate of normals before they are normalised, with a partial sum for each of the
- * three modes of a word. */
+/* Compute one coordinate of unnormalised normals, in a partial sum for each mode of a word. */
 INLINE vf dot_normal(const unsigned char *at, const float *w, size_t words) {
   vf sum[3] = {{0}, {0}, {0}};
   for (size_t j = 0; j < words; ++j, at += 64) {
@@ -316,8 +313,8 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
       for (size_t axis = 0; axis < 3; ++axis) {
         v[axis] = dot_normal(tile + axis * axis_bytes + q * sizeof(vf), w, words);
       }
-      /* Adding the smallest normal number keeps a normal of 0 from becoming NaN. One Newton step
-       * doubles the number of correct bits of the estimate. */
+      /* The smallest normal float is added so that a normal of 0 does not become NaN. One Newton
+       * step doubles the number of correct bits of the estimate. */
       const vf square = FMA(v[0], v[0], FMA(v[1], v[1], v[2] * v[2])) + 0x1p-126F;
       const vf guess = RSQRT(square);
       const vf error = FMA(-(square * guess), guess, splat(1));
@@ -346,7 +343,7 @@ static void light(const supine_tiles *tiles, const float *w, size_t first, size_
   }
 }
 
-/* Convert the compact coefficients of one axis to floats, in their packed units. */
+/* Convert the compact coefficients of one axis to floats in packed units. */
 static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, vf *to) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
   for (size_t k = 0; k < tiles->modes; ++k) {
@@ -362,7 +359,7 @@ static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_
     const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
     unsigned char *wide = to->bytes + t * to->stride;
     if (!supine_tiles_compact(tiles->storage)) {
-      memcpy(wide, tile, tiles->stride); /* the layout is the same */
+      memcpy(wide, tile, tiles->stride); /* the tile is in the EXACT layout already */
       continue;
     }
     for (size_t axis = 0; axis < tiles->axes; ++axis) {

@@ -5,8 +5,8 @@
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
 
-/* Store a vector and bypass the caches. If the array is aligned to 16 bytes only, as by malloc,
- * store halves, which the processor combines; with less alignment, do not bypass the caches. */
+/* Store a vector and bypass the caches. If the array is aligned to only 16 bytes, as by malloc,
+ * store two halves, which the processor combines. With less alignment, do not bypass the caches. */
 static inline __attribute__((always_inline)) void stream8(float *to, __m256 v) {
   if ((uintptr_t)to % 16 != 0) {
     _mm256_storeu_ps(to, v);

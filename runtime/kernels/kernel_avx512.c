@@ -5,16 +5,16 @@
 #if defined(__AVX512F__) && defined(__AVX512BW__)
 #include <immintrin.h>
 
-/* An array that is written in order, with stores that bypass the caches if `stream`. Such a store
- * must fill an aligned line; if the array is not aligned, each line joins the end of one vector to
- * the beginning of the next. */
+/* An array that is written in order; if `stream`, with stores that bypass the caches. Such a store
+ * must fill an aligned cache line. If the array is not aligned, a line is joined from the end of
+ * one vector and the beginning of the next. */
 typedef struct writer {
-  __m512 last;  /* the vector before this one */
-  __m512i join; /* permutation of (last, next) that makes the line */
+  __m512 last;  /* the vector that was put last */
+  __m512i join; /* permutation that selects a line from (last, next) */
   float *to;
-  size_t offset; /* number of floats from the beginning of an aligned line to `to` */
+  size_t offset; /* number of floats from the last line boundary to `to` */
   bool stream;
-  bool shared; /* the next line begins with numbers that are not part of the array */
+  bool shared; /* the next line begins before the array */
 } writer;
 
 static inline __attribute__((always_inline)) writer writer_open(const supine_target *target) {
@@ -43,8 +43,8 @@ static inline __attribute__((always_inline)) void writer_put(writer *w, __m512 n
   w->to += 16;
 }
 
-/* Store the end of the last vector, which fills no line; or leave the vector in `held` if another
- * call continues the array. */
+/* Store the end of the last vector, which does not fill a line, or keep the vector in `held` if
+ * another call continues the array. */
 static inline __attribute__((always_inline)) void writer_close(const writer *w,
                                                                const supine_target *target) {
   if (target->held != NULL && target->continued) {

@@ -14,10 +14,10 @@ static bool has_avx512(void) {
   return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw");
 }
 
-/* Choose by the processor's family, from measurements with 16 million vertices of 16 modes. On AMD
- * family 25 (Zen 4), NEAR reads 39 GB/s of int16 tiles and 36 GB/s of float32, NONE 37 and 30, FAR
- * 36 and 26. Prefetching every line is slower there at any distance, as the processor fetches lines
- * in pairs. On family 26 (Zen 5), FAR is the fastest. */
+/* Choose by the processor's family, as measured with 16 million vertices of 16 modes. AMD family 25
+ * (Zen 4) reads int16 tiles and float32 tiles at 39 and 36 GB/s with NEAR, 37 and 30 with NONE, 36
+ * and 26 with FAR. This family fetches lines in pairs, so that prefetching every line is slower at
+ * any distance. On family 26 (Zen 5), FAR is the fastest. */
 supine_prefetch supine_kernels_prefetch_choose(void) {
   unsigned a = 0;
   unsigned b = 0;
@@ -26,7 +26,7 @@ supine_prefetch supine_kernels_prefetch_choose(void) {
   const bool amd = __get_cpuid(0, &a, &b, &c, &d) != 0 && b == signature_AMD_ebx &&
                    d == signature_AMD_edx && c == signature_AMD_ecx;
   const bool known = __get_cpuid(1, &a, &b, &c, &d) != 0;
-  const unsigned family = (a >> 8 & 15U) + (a >> 20 & 255U); /* base and extended family */
+  const unsigned family = (a >> 8 & 15U) + (a >> 20 & 255U); /* base family plus extended family */
   return amd && known && family == 26 ? SUPINE_PREFETCH_FAR : SUPINE_PREFETCH_NEAR;
 }
 #else

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The basis in memory as the kernels read it: tiles of 16 vertices, each of whole cache lines.
+ * Layout of a basis in memory for the kernels: tiles of 16 vertices, each of whole cache lines.
  *
  *     coefficients   for each axis (1 for scalar fields, 3 for vector fields)
  *                      EXACT  16 floats for each mode
- *                      INT16  16 words of 32 bits for every two modes, see compact.h
- *                      MIXED  the same, but 16 words for every three of the last modes
+ *                      INT16  16 words of 32 bits for every two modes (compact.h)
+ *                      MIXED  as INT16, but 16 words for every three of the last modes
  *     direction      48 numbers x y z x y z ...; none for vector fields
  *     reference      48 numbers x y z x y z ..., reference positions
  *
  * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. Directions and
  * reference positions are floats (EXACT) or fixed-point numbers, three in two words (compact.h), in
- * a unit that suits the largest: within half a metre of the origin, the error of a position is at
+ * a unit that suits the largest number: within half a metre of the origin, a position errs by at
  * most 0.0005 mm in each coordinate. The units of coefficients and directions are multiplied into
  * the weights, once a frame. */
 #ifndef SUPINE_TILES_H
@@ -21,47 +21,47 @@
 
 enum {
   TILE = 16,         /**< number of vertices of a tile */
-  TILE_NUMBERS = 48, /**< number of coordinates of these vertices */
+  TILE_NUMBERS = 48, /**< number of coordinates of a tile */
 };
 
 typedef struct supine_tiles {
   supine_storage storage;
   size_t modes;
-  size_t axes;            /**< 1, or 3 for vector fields */
+  size_t axes;            /**< axes with their own coefficients: 3 for vector fields, else 1 */
   size_t axis_bytes;      /**< bytes of the coefficients of one axis in one tile */
   size_t direction_begin; /**< byte offset of the directions in a tile */
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
-  size_t stride;          /**< bytes from tile to tile */
+  size_t stride;          /**< size of a tile in bytes */
   size_t count;           /**< number of tiles */
-  /** Exponent of the unit of compact reference positions, in the exponent bits of a float. */
+  /** Exponent of the unit of compact reference positions, as the exponent bits of a float. */
   uint32_t reference_unit;
-  unsigned char *bytes; /**< [count, stride] */
+  unsigned char *bytes; /**< [count, stride] the tiles */
 } supine_tiles;
 
-/** Report whether a storage is compact: two or three coefficients share a word, and directions and
+/** Return whether a storage is compact: two or three coefficients share a word, and directions and
  * positions are fixed-point numbers. */
 static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return the number of words that hold three coefficients each, for the last modes of a vertex. */
+/** Return how many words of a vertex hold three coefficients each. They hold its last modes. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
 
-/** Return the number of modes before those of supine_tiles_thirds. In a compact storage, two of
- * their coefficients share a word. */
+/** Return the number of modes outside the words of supine_tiles_thirds. In a compact storage, two
+ * of these modes share a word. */
 static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
 
-/** Return the byte offset of mode k's words from those of the first mode, in a compact storage. */
+/** Return the offset in bytes of mode k's words from the words of mode 0, in a compact storage. */
 static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
   return 64 * (k < paired ? k / 2 : (paired + 1) / 2 + (k - paired) / 3);
 }
 
-/** Fill in everything but `bytes` and `reference_unit` for a storage, never AUTO. The function is
- * inline, so that the layout is a constant if the number of modes is. */
+/** Fill in all members but `bytes` and `reference_unit` for a storage other than AUTO. The function
+ * is inline, so that the layout is a constant where the number of modes is a constant. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
                                        bool vector, size_t count) {
   const bool compact = supine_tiles_compact(storage);
@@ -79,14 +79,13 @@ static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage stora
   tiles->count = count;
 }
 
-/** Return the number of words for one coordinate of a normal. Word j holds modes j, j + words and
- * j + 2 words (compact.h), or 0 for modes that do not exist. */
+/** Return the number W of words for one coordinate of a normal. Word j holds modes j, j + W and j +
+ * 2 W (compact.h), with 0 for modes that do not exist. */
 static inline size_t supine_tiles_normal_words(size_t modes) {
   return (modes + 2) / 3;
 }
 
-/** Fill in the layout of tiles of normals: for each axis and each word j, the words of 16 vertices.
- */
+/** Fill in the layout of tiles of normals: rows of 16 words, supine_tiles_normal_words per axis. */
 static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
   *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
   tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);
@@ -100,10 +99,10 @@ typedef enum supine_prefetch {
   SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
 
-/** Prefetch `stride` bytes at a distance ahead of a tile. */
+/** Prefetch `stride` bytes ahead of a tile. */
 static inline __attribute__((always_inline)) void
 supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch how) {
-  enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality argument of __builtin_prefetch */
+  enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality arguments of __builtin_prefetch */
   if (how == SUPINE_PREFETCH_NEAR) {
     for (size_t line = 0; line < stride; line += 128) {
       __builtin_prefetch(tile + 640 + line, 0, SECOND_LEVEL);
@@ -117,23 +116,23 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
 
 /** Where and how a kernel writes. */
 typedef struct supine_target {
-  float *xyz;         /**< [16 tiles, 3] */
+  float *xyz;         /**< [vertices of the tiles, 3] positions, displacements or normals */
   bool add_reference; /**< write positions; false: displacements */
   bool stream;        /**< use stores that bypass the caches */
   supine_prefetch prefetch;
-  /** [16] or NULL. If several calls write one array: the last numbers of one call, which the next
-   * call stores, as both share a cache line. */
+  /** [16] or NULL. If consecutive calls write one array: the last numbers of a call, which share a
+   * cache line with the first numbers of the next call and are stored by the next call. */
   float *held;
-  bool continues; /**< a call before this one left numbers in `held` */
-  bool continued; /**< leave numbers for a call after this one */
+  bool continues; /**< the previous call left numbers in `held` */
+  bool continued; /**< leave numbers in `held` for the next call */
 } supine_target;
 
-/** Evaluate tiles first <= t < first + count of one lung, with the weights and gains of
- * supine_fold, into the first 16 count vertices of the target. */
+/** Evaluate tiles first <= t < first + count of one lung, and write their vertices to the target.
+ * @param weights  weights and gains of supine_fold */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
 
-/** Make stores that bypass the caches visible to other threads, after the last kernel of a call. */
+/** Make stores that bypass the caches visible to other threads. Call this after the last kernel. */
 static inline void supine_stream_fence(bool stream) {
 #if defined(__x86_64__)
   if (stream) {
@@ -145,25 +144,24 @@ static inline void supine_stream_fence(bool stream) {
 }
 
 /** Convert tiles first <= t < first + count to floats in the EXACT layout `to`: reference positions
- * in mm, coefficients and directions in their packed units, so that the same folded weights apply.
- */
+ * in mm, coefficients and directions in packed units, as the weights of supine_fold require. */
 typedef void supine_widen_tiles(const supine_tiles *tiles, size_t first, size_t count,
                                 supine_tiles *to);
 
 typedef struct supine_kernels {
   supine_deform_tiles *deform;
-  /** Evaluate unit normals from tiles of supine_tiles_layout_lit into one array, with three weights
-   * for each word, in the order of the modes. */
+  /** Evaluate unit normals from tiles of supine_tiles_layout_lit. `weights` has three numbers for
+   * each word of a coordinate, in the order of the modes. */
   supine_deform_tiles *light;
   supine_widen_tiles *widen;
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;
-extern const supine_kernels supine_kernels_avx2;   /**< members are NULL in builds without it */
-extern const supine_kernels supine_kernels_avx512; /**< members are NULL in builds without it */
+extern const supine_kernels supine_kernels_avx2;   /**< members are NULL without AVX2 */
+extern const supine_kernels supine_kernels_avx512; /**< members are NULL without AVX-512 */
 
-/** Return the kernels of an instruction set; for AUTO, the widest of this processor, and set *simd
- * to it. NULL if the processor or the build lacks the instruction set. */
+/** Return the kernels of an instruction set, or NULL if the processor or the build lacks it.
+ * Replace AUTO in *simd by the widest set of this processor. */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
 
 /** Return the fastest way to prefetch on this processor. */

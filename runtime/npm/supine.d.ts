@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-/** A posture and a volume as text: "prone", "left:rest+500", "full-300", "2600mL". As an object: gravity, the direction in
- * which things fall in the patient's axes (default: supine, [0, 1, 0]), with a volume (default: that of the basis) or with
- * one gain for all lungs, whatever volume it gives: 0 is the reference surface. */
+/** A posture and a volume as text: "prone", "left:rest+500", "full-300", "2600mL". Or an object:
+ * `gravity` is the direction in which things fall in the patient's axes (default: supine, [0, 1, 0]); `volume` is a text
+ * (default: the volume of the basis); `gain`, in place of a volume, is one gain for all lungs, 0 on the reference surface. */
 export type State = string | { gravity?: ArrayLike<number>; volume?: string; gain?: number };
 
 /** The numbers of a tensor of the file: a view, row-major. */
@@ -10,26 +10,26 @@ export interface Tensor {
   data: Uint8Array | Uint32Array | Float32Array | Float64Array | Int16Array;
 }
 
-/** An open basis and its posed surface. Arrays are views of WebAssembly memory that never moves: write to none but
+/** An open basis and its posed surface. Arrays are views of WebAssembly memory that never moves: write only to
  * `positions` and `normals`. Lengths are mm, volumes mL, axes LPS: +x left, +y posterior, +z head. */
 export interface Basis {
   readonly vertexCount: number;
-  /** Reference positions [3 N]. */
+  /** Reference positions [3 N], mm. */
   readonly vertices: Float32Array;
   /** Indices of vertices [3 M]. */
   readonly triangles: Uint32Array;
   /** The vertices of each lung: index of the first, and index after the last. */
   readonly lungs: Record<string, [number, number]>;
   readonly metadata: Record<string, string>;
-  /** Positions [3 N] of the last `deform` or `deformLit`; before the first, the reference positions. */
+  /** Positions [3 N], mm, of the last `deform` or `deformLit`; at first the reference positions. */
   readonly positions: Float32Array;
   /** Unit normals [3 N] of the last `deformLit`. */
   readonly normals: Float32Array;
-  /** Volume of each lung in the pose, gas and tissue. Throws if the surface is open. */
+  /** Volume of each lung in the pose, gas and tissue, mL. Throws if the surface is open. */
   readonly volumes: Record<string, number>;
   /** Bound on the error of storage and rounding of any vertex in the pose, mm. */
   readonly error: number;
-  /** Get a tensor of the file by its name, such as "coefficients"; undefined if the file has none of that name. */
+  /** Get a tensor of the file by its name, such as "coefficients"; undefined if the file lacks it. */
   tensor(name: string): Tensor | undefined;
   /** Set the pose to a state, in a few microseconds. If the state is refused, the pose does not change.
    * @throws SupineError */

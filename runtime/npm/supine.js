@@ -59,7 +59,7 @@ class Basis {
     for (let at = pairs, end = pairs + 8 * this.#word(this.#text); at < end; at += 8) {
       this.metadata[this.#string(this.#word(at))] = this.#string(this.#word(at + 4));
     }
-    this.deform(); // with gains of 0: the reference surface
+    this.deform(); // the pose is still all 0 and gives the reference surface
   }
 
   tensor(name) {
@@ -113,7 +113,7 @@ class Basis {
     return this.#view(Float32Array, this.#expected, this.vertexCount);
   }
 
-  /** Fill in the next state; without a posture it is supine, without a volume it has the default volume. */
+  /** Write a state to #nextState. The default posture is supine; the default volume is that of the basis. */
   #read(state) {
     const { gravity = [0, 1, 0], volume = '' } = typeof state === 'string' ? { volume: state } : state;
     this.#view(Uint8Array, this.#nextState, STATE).fill(0);
@@ -123,7 +123,7 @@ class Basis {
 
   #write(text) {
     const bytes = new TextEncoder().encode(`${text}\0`);
-    if (bytes.length > TEXT) throw new SupineError(`a text of ${bytes.length} bytes: at most ${TEXT - 1}`, STATUS.indexOf('argument'));
+    if (bytes.length > TEXT) throw new SupineError(`the text has ${bytes.length - 1} bytes: give at most ${TEXT - 1}`, STATUS.indexOf('argument'));
     this.#view(Uint8Array, this.#text, bytes.length).set(bytes);
     return this.#text;
   }
@@ -152,7 +152,7 @@ class Basis {
   }
 }
 
-let beside; // promise of the library beside this file, compiled once
+let beside; // promise of the module compiled from supine.wasm beside this file
 
 async function load() {
   const url = new URL('./supine.wasm', import.meta.url);

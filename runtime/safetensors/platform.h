@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Functions that differ between operating systems: mapping of files and allocation of large memory.
- */
+ * Functions that differ between operating systems: mapping files and allocating large memory. */
 #ifndef SUPINE_PLATFORM_H
 #define SUPINE_PLATFORM_H
 
@@ -16,15 +15,15 @@ typedef struct supine_platform_file {
 } supine_platform_file;
 
 /** Map a file into memory.
- * @param path  UTF-8
- * @retval SUPINE_ERROR_READ  the file is missing or unreadable, or the path is not a regular file
- */
+ * @param path  in UTF-8
+ * @param file  written; empty on failure
+ * @retval SUPINE_ERROR_READ  the file is missing, unreadable or not a regular file */
 supine_status supine_platform_map(const char *path, supine_platform_file *file,
                                   supine_error *error);
 /** Unmap a file; legal on a zeroed struct. */
 void supine_platform_unmap(const supine_platform_file *file);
 
-/** Allocate memory, aligned to cache lines and not zeroed; in huge pages if it is large enough and
+/** Allocate memory, aligned to cache lines and not zeroed, in huge pages if it is large enough and
  * the system has them. Return NULL if out of memory. */
 void *supine_platform_allocate(size_t bytes);
 /** Free memory of supine_platform_allocate; NULL is legal. */

@@ -17,9 +17,9 @@ static uint64_t hash_text(const char *text, uint64_t seed) {
   return hash(text, strlen(text), seed);
 }
 
-/* Hash the element type and shape as text, "F32 [20000,3]". */
+/* Hash the element type and shape as text, such as "F32 [20000,3]". */
 static uint64_t hash_kind(const supine_tensor *tensor, uint64_t seed) {
-  char text[32 + 21 * SUPINE_TENSOR_RANK_MAX]; /* the longest count has 20 digits */
+  char text[32 + 21 * SUPINE_TENSOR_RANK_MAX]; /* the length of an axis has at most 20 digits */
   size_t used =
       (size_t)snprintf(text, sizeof text, "%s [", supine_safetensors_dtype_name(tensor->dtype));
   for (size_t r = 0; r < tensor->rank; ++r) {
@@ -46,9 +46,7 @@ uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor
   return sum;
 }
 
-/* Open the bytes of a file. If they are a mapping, the open file owns it; on failure it is
- * unmapped.
- */
+/* Open the bytes of a file. The open file takes ownership of `mapping`; on failure, unmap it. */
 static supine_status open_bytes(const void *bytes, size_t size, supine_platform_file mapping,
                                 const char *name, supine_safetensors **result,
                                 supine_error *error) {
@@ -104,10 +102,9 @@ void supine_safetensors_close(supine_safetensors *file) {
 supine_status supine_safetensors_verify(const supine_safetensors *file, supine_error *error) {
   const char *stated = supine_safetensors_metadata(file, "checksum");
   if (stated == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: no checksum, so it was not written by Supine: write it again with "
-                            "Supine",
-                            file->name);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: no checksum, so Supine did not write it: write it again with Supine", file->name);
   }
   char found[CHECKSUM_SIZE];
   (void)snprintf(found, sizeof found, CHECKSUM_FORMAT,

@@ -11,34 +11,35 @@
 
 #include "runtime/safetensors/platform.h"
 
-/** How the metadata "checksum" states a checksum: format, and bytes with the NUL. */
+/** Format of the metadata "checksum", and its size in bytes with the NUL. */
 #define CHECKSUM_FORMAT "xxh64:%016" PRIx64
 enum { CHECKSUM_SIZE = 23 };
 
 struct supine_safetensors {
   const unsigned char *bytes;
   size_t size;
-  supine_platform_file mapping; /**< the mapping of these bytes; zero if the caller owns them */
+  supine_platform_file mapping; /**< mapping that holds `bytes`; zero if the caller owns them */
   char *header;                 /**< a copy of the header, in which strings are decoded */
-  supine_tensor *tensors;       /**< in the order of their data */
+  supine_tensor *tensors;       /**< sorted by the position of their data */
   void **copies;                /**< aligned copies of misaligned tensors; NULL for the others */
   size_t tensor_count;
   supine_metadata *metadata;
   size_t metadata_count;
-  char name[]; /**< for messages */
+  char name[]; /**< name of the file in messages */
 };
 
-/** Return the name of an element type in the header, "F32"; `dtype` must be in range. */
+/** Return the name of an element type in the header, such as "F32"; `dtype` must be in range. */
 const char *supine_safetensors_dtype_name(supine_dtype dtype);
 
-/** Return the bytes of one element. */
+/** Return the size of one element in bytes. */
 size_t supine_safetensors_dtype_size(supine_dtype dtype);
 
 /** Compute the size of a tensor in bytes; return false if it overflows. */
 bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size);
 
-/** Parse and check the header of file->bytes, and set the data of the tensors.
- * @retval SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
+/** Parse and check the header of file->bytes, and point the tensors to their data.
+ * @retval SUPINE_ERROR_FORMAT  a check failed
+ * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *error);
 
 /** Compute the checksum that supine/safetensors.h describes. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Parse the header of a safetensors file, strict JSON (RFC 8259), and check every number in it;
- * look up element types. */
+/* Parse the header of a safetensors file, which is strict JSON (RFC 8259), and check every number
+ * in it; look up element types. */
 #include <inttypes.h>
 #include <limits.h>
 #include <stdarg.h>
@@ -41,8 +41,8 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
   return true;
 }
 
-/* The header being parsed, which ends with a NUL. After the first failure, take() accepts no
- * character, and later failures do not change the error. */
+/* The header being parsed; a NUL follows it. After a failure, take() accepts no character, and
+ * further failures do not change the error. */
 typedef struct parser {
   supine_safetensors *file;
   char *at, *end;
@@ -62,10 +62,10 @@ static void SUPINE_PRINTF(2, 3) fail(parser *p, const char *format, ...) {
 }
 
 static void fail_json(parser *p) {
-  fail(p, "the header is not safetensors JSON at its byte %td", p->at - p->file->header);
+  fail(p, "byte %td of the header is not valid JSON for safetensors", p->at - p->file->header);
 }
 
-/* Skip white space, then take a character if it is next; report whether it was. */
+/* Skip white space, and take `character` if it comes next; return whether it did. */
 static bool take(parser *p, char character) {
   p->at += p->status == SUPINE_OK ? strspn(p->at, " \t\n\r") : 0;
   if (p->status == SUPINE_OK && p->at < p->end && *p->at == character) {
@@ -102,8 +102,7 @@ static char *put_utf8(char *to, uint32_t code) {
   return to;
 }
 
-/* Decode an escape (\n, \uXXXX or a surrogate pair) into `to`; return the end of the decoded text.
- */
+/* Decode an escape (\n, \uXXXX or a surrogate pair) into `to`; return the end of the result. */
 static char *take_escape(parser *p, char *to) {
   static const char names[] = "\"\\/bfnrt";
   static const char meanings[] = "\"\\/\b\f\n\r\t";
@@ -131,7 +130,7 @@ static char *take_escape(parser *p, char *to) {
 static const char *take_string(parser *p) {
   expect(p, '"');
   char *const begin = p->at;
-  char *to = begin; /* never ahead of p->at, as an escape is longer than its decoded text */
+  char *to = begin; /* never passes p->at, as an escape is longer than its decoded text */
   while (p->status == SUPINE_OK && *p->at != '"') {
     const size_t length = supine_utf8_length(p->at, (size_t)(p->end - p->at));
     if (*p->at == '\\') {
@@ -153,7 +152,7 @@ static const char *take_string(parser *p) {
 }
 
 /* Take an array of at most `capacity` integers without sign, fraction, exponent or leading zeros;
- * return their number. ULLONG_MAX is refused, as strtoull also returns it for overflow. */
+ * return their number. Refuse ULLONG_MAX, which strtoull also returns for overflow. */
 static size_t take_counts(parser *p, size_t *values, size_t capacity) {
   size_t count = 0;
   expect(p, '[');
@@ -210,8 +209,8 @@ static supine_dtype take_dtype(parser *p, const char *tensor) {
   return (supine_dtype)dtype;
 }
 
-/* Parse {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, members in any order. Until
- * place_tensors, `data` holds the first offset. */
+/* Parse a tensor such as {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, with members
+ * in any order. Its `data` holds the first offset until place_tensors is called. */
 static void parse_tensor(parser *p, const char *name) {
   static const char *const members[] = {"dtype", "shape", "data_offsets"};
   supine_safetensors *file = p->file;
@@ -278,7 +277,7 @@ static void parse_header(parser *p) {
     } while (take(p, ','));
     expect(p, '}');
   }
-  if (take(p, '\0') || p->at != p->end) { /* only white space may follow */
+  if (take(p, '\0') || p->at != p->end) { /* only white space may follow the header */
     fail_json(p);
   }
 }
@@ -298,8 +297,7 @@ static int compare_places(const void *left, const void *right) {
   return (places[0][key] > places[1][key]) - (places[0][key] < places[1][key]);
 }
 
-/* Check that the tensors fill the data exactly, and point each to its data or to an aligned copy.
- */
+/* Check that the tensors fill the data exactly; point each to its data or to an aligned copy. */
 static supine_status place_tensors(parser *p, size_t data_begin) {
   supine_safetensors *file = p->file;
   const size_t data_size = file->size - data_begin;
@@ -315,7 +313,7 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
     at += size_of(&file->tensors[i]);
   }
   if (at != data_size) {
-    fail(p, "%s: the tensors need %zu bytes, the file has %zu: copy or write it again",
+    fail(p, "%s: the tensors need %zu bytes, but the file has %zu: copy or write it again",
          at > data_size ? "truncated" : "trailing bytes", at, data_size);
     return p->status;
   }
@@ -343,7 +341,9 @@ supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *e
   }
   memcpy(&length, file->bytes, PREFIX);
   if (length > file->size - PREFIX || length > HEADER_MAX || length < 2) {
-    fail(&p, "not a safetensors file, or truncated: a header of %" PRIu64 " bytes in a file of %zu",
+    fail(&p,
+         "not a safetensors file, or truncated: a header of %" PRIu64
+         " bytes in a file of %zu bytes",
          length, file->size);
     return p.status;
   }
@@ -351,7 +351,7 @@ supine_status supine_safetensors_parse(supine_safetensors *file, supine_error *e
     fail(&p, "not a safetensors file");
     return p.status;
   }
-  size_t members = 1; /* upper bound on the number of members of all objects */
+  size_t members = 1; /* upper bound on the number of members of all JSON objects */
   for (size_t i = 0; i < length; ++i) {
     members += file->bytes[PREFIX + i] == ':';
   }

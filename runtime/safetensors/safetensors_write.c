@@ -8,8 +8,8 @@
 #include "runtime/safetensors/safetensors_file.h"
 #include "sh/base/utf8.h"
 
-/* The content of a file to be written. Tensors are laid out by descending element size, which keeps
- * each aligned. */
+/* The content of a file to write. Tensors are laid out by descending element size, so that each is
+ * aligned to its element size. */
 typedef struct content {
   const supine_tensor *tensors;
   size_t tensor_count;
@@ -71,7 +71,7 @@ static supine_status check_metadata(const content *c, const char *path, supine_e
   return SUPINE_OK;
 }
 
-/* Print to a file, or nowhere if it is NULL; return the number of bytes. */
+/* Print to a file, or only count if `file` is NULL; return the number of bytes. */
 static size_t SUPINE_PRINTF(2, 3) put(FILE *file, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
@@ -99,8 +99,7 @@ static size_t put_string(FILE *file, const char *text) {
   return size + put(file, "\"");
 }
 
-/* Write the header to a file, or nowhere if it is NULL; return its number of bytes before padding.
- */
+/* Write the header to a file, or only count if `file` is NULL; return its size without padding. */
 static size_t put_header(const content *c, FILE *file) {
   size_t size = put(file, "{\"__metadata__\":{");
   size_t offset = 0;

@@ -9,8 +9,8 @@
 
 #include "runtime/safetensors/platform.h"
 
-/* Convert a path from UTF-8 to UTF-16; the caller frees it. Return NULL if it is not UTF-8 or if
- * out of memory. */
+/* Convert a path from UTF-8 to UTF-16; the caller frees the result. Return NULL if the path is not
+ * UTF-8 or if out of memory. */
 static wchar_t *widen(const char *path) {
   const int length = MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, path, -1, NULL, 0);
   wchar_t *wide = length > 0 ? malloc((size_t)length * sizeof *wide) : NULL;
@@ -20,7 +20,7 @@ static wchar_t *widen(const char *path) {
   return wide;
 }
 
-/* Map a file. The view stays valid after the handles are closed. */
+/* Map a file. The mapping stays valid after the handles are closed. */
 static const void *map_handle(HANDLE handle) {
   HANDLE mapping = CreateFileMappingW(handle, NULL, PAGE_READONLY, 0, 0, NULL);
   const void *bytes = mapping != NULL ? MapViewOfFile(mapping, FILE_MAP_READ, 0, 0, 0) : NULL;
@@ -44,7 +44,7 @@ supine_status supine_platform_map(const char *path, supine_platform_file *file,
       GetFileType(handle) != FILE_TYPE_DISK) {
     status = supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: Windows error %lu", path,
                               (unsigned long)GetLastError());
-  } else if (size.QuadPart > 0) { /* else there is nothing to map */
+  } else if (size.QuadPart > 0) { /* an empty file cannot be mapped */
     file->bytes = (uint64_t)size.QuadPart <= SIZE_MAX ? map_handle(handle) : NULL;
     file->size = (size_t)size.QuadPart;
     if (file->bytes == NULL) {

@@ -4,11 +4,11 @@
 #define SUPINE_CLONES_H
 
 #if defined(__linux__)
-#include <features.h> /* __GLIBC__ */
+#include <features.h> /* defines __GLIBC__ */
 #endif
 
-/** Mark a function to be compiled in several versions. The targets are architecture levels, as
- * processor names would match the models of one maker only. */
+/** Mark a function to be compiled in several versions. The versions are for architecture levels,
+ * because names of processors would match the models of one manufacturer only. */
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12 &&            \
     !defined(SUPINE_NO_CLONES)
 #define SUPINE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))

@@ -21,7 +21,7 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Read the next line that is not blank, trimmed; NULL at the end or on failure. */
+/* Return the next line that is not blank or a comment, trimmed; NULL at the end or on failure. */
 static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
   *status = SUPINE_OK;
   for (;;) {
@@ -43,8 +43,7 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
                            "%s:%zu: a NUL byte: save the file as CSV text", csv->path, csv->line);
       return NULL;
     }
-    static const char mark[] =
-        "\xEF\xBB\xBF"; /* some programs begin UTF-8 with a byte-order mark */
+    static const char mark[] = "\xEF\xBB\xBF"; /* byte-order mark of UTF-8 */
     const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
     char *text = trim(csv->text + skip);
     if (*text != '\0' && *text != '#') {
@@ -53,7 +52,7 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
-/* Return the field at *rest, terminated; *rest then points to the next field, or is NULL after the
+/* Return the field at *rest, ended by a NUL, and move *rest to the next field, or to NULL after the
  * last. A quoted field may contain the separator, and "" for a quote. Return NULL if a quote is not
  * closed. */
 static char *csv_field(char **rest, char separator) {
@@ -104,7 +103,7 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
   return SUPINE_OK;
 }
 
-/* Find the field of each expected column. */
+/* Find the index of the field for each expected column. */
 static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
                                 size_t required, supine_error *error) {
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {
@@ -120,7 +119,7 @@ static supine_status csv_header(supine_csv *csv, const char *const *names, size_
                               "%s:%zu: repeated column \"%s\" in the header: delete or rename one",
                               csv->path, csv->line, csv->field[f]);
     }
-    if (c < count) { /* else the column is not expected: ignore it */
+    if (c < count) { /* ignore columns that are not expected */
       csv->column[c] = f;
     }
   }
@@ -192,13 +191,13 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
   char *text = csv->field[csv->column[column]];
   char *end = NULL;
   char *comma = csv->separator == ';' ? strchr(text, ',') : NULL;
-  if (comma != NULL) { /* decimal comma, as in spreadsheets with ';' */
+  if (comma != NULL) { /* a decimal comma, as in spreadsheets with ';' */
     *comma = '.';
   }
   *number = strtod(text, &end);
   if (end == text || *end != '\0' || !isfinite(*number)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: %s \"%s\" is not a finite number: give one", csv->path,
+                            "%s:%zu: %s \"%s\" is not a finite number: give a number", csv->path,
                             csv->line, name, text);
   }
   return SUPINE_OK;

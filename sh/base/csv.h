@@ -11,26 +11,23 @@
 
 enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
-/* A CSV file being read: comments (#), blank lines, one header, quoted fields. The header
- * determines the separator: ',', ';' (then numbers may have a decimal comma) or tab.
- * Zero-initialise. */
+/* A CSV file being read: comments (#), blank lines, one header, quoted fields. The separator is the
+ * one in the header: ',', ';' (numbers may then have a decimal comma) or tab. Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
   char *text;      /* current line */
-  size_t capacity; /* of `text`, bytes */
+  size_t capacity; /* allocated size of `text`, bytes */
   size_t line;     /* number of the current line, from 1 */
   char separator;
   size_t field_count;
-  char *field[SUPINE_CSV_FIELDS_MAX]; /* fields of the current row */
-  size_t column_count;                /* number of fields of the header */
-  size_t
-      column[SUPINE_CSV_FIELDS_MAX]; /* index of the field of each expected column; SIZE_MAX: none
-                                      */
+  char *field[SUPINE_CSV_FIELDS_MAX];   /* fields of the current row */
+  size_t column_count;                  /* number of fields of the header */
+  size_t column[SUPINE_CSV_FIELDS_MAX]; /* field of each expected column, or SIZE_MAX */
 } supine_csv;
 
-/* Open a file and read its header. Of the `count` expected columns, the first `required` must be in
- * the header, in any order, upper or lower case; other columns are ignored.
+/* Open a file and read its header. Of the `count` expected columns in `names`, the first `required`
+ * must be in the header, in any order, upper or lower case. Other columns are ignored.
  * @param path  must outlive the reader */
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
                               size_t required, supine_csv *csv, supine_error *error);
@@ -41,8 +38,9 @@ supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);
 /* Return the text of an expected column in the current row; NULL if the file lacks the column. */
 const char *supine_csv_text(const supine_csv *csv, size_t column);
 
-/* Parse an expected column, which the file must have, as a finite number.
- * @param name  of the column, for messages */
+/* Parse the number in an expected column of the current row. The file must have the column.
+ * @param name    name of the column in messages
+ * @param number  finite number, written */
 supine_status supine_csv_number(const supine_csv *csv, size_t column, const char *name,
                                 double *number, supine_error *error);
 

@@ -7,13 +7,13 @@
 
 #include <supine/status.h>
 
-/** Lines that begin with "warning: " or "note: ", or with the name of a file and one of these.
- * Zero-initialise. */
+/** Lines that begin with "warning: " or "note: ", or with the name of a file and one of these
+ * words. Zero-initialise. */
 typedef struct supine_findings {
   char text[4096]; /**< each line ends with a line feed */
 } supine_findings;
 
-/** Add a line by a printf format; a line that does not fit is dropped. */
+/** Add a line by a printf format. A line that does not fit is dropped. */
 SUPINE_PRINTF(2, 3) void supine_findings_add(supine_findings *findings, const char *format, ...);
 
 /** Return the line at *at and move *at to the next line; return NULL after the last.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Load shared libraries at their first use. Linking those that few commands need would delay
- * the start of every command. List the functions once,
+/** @file Load shared libraries at their first use, because linking libraries that few commands need
+ * would delay the start of every command. List the functions once,
  *
  *     #define FUNCTIONS(EACH) EACH(cairo_, arc) EACH(cairo_, fill)
  *     static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
@@ -22,9 +22,9 @@
                       error)
 
 /** Load functions of a shared library, which stays loaded until the process ends.
- * @param library  soname
+ * @param library  name of its file, such as "libcairo.so.2"
  * @param names    names of the functions; NULL after the last
- * @param members  written: pointers to functions, one for each name
+ * @param members  pointers to the functions, in the order of the names, written
  * @retval SUPINE_ERROR_UNSUPPORTED  the library is not installed, or lacks a function */
 supine_status supine_library_load(const char *library, const char *const *names, void *members,
                                   supine_error *error);

@@ -17,10 +17,10 @@
 
 enum {
   LIVE_MAX = 16,   /* largest number of temporary names that supine_output_abandon_all removes */
-  BUFFER = 1 << 18 /* bytes of the buffer of an output */
+  BUFFER = 1 << 18 /* size of the buffer of an output in bytes */
 };
 
-/* Descriptor of the original standard output after supine_output_take_standard; -1 before. */
+/* Descriptor of the original standard output; -1 before supine_output_take_standard. */
 static atomic_int standard_output = -1;
 
 bool supine_output_is_standard(const char *path) {
@@ -35,10 +35,10 @@ bool supine_output_take_standard(void) {
   return atomic_load(&standard_output) >= 0 && dup2(STDERR_FILENO, STDOUT_FILENO) >= 0;
 }
 
-/* Existing temporary names, for supine_output_abandon_all. */
+/* Names of existing temporary files, for supine_output_abandon_all; NULL in free entries. */
 static char *_Atomic live[LIVE_MAX];
 
-/* Replace one entry `from` of `live` by `to`; NULL is a free entry. */
+/* Replace one entry of `live` that equals `from` by `to`. */
 static void set_live(char *from, char *to) {
   for (int i = 0; i < LIVE_MAX; ++i) {
     char *expected = from;
@@ -78,7 +78,7 @@ char *supine_path_beside(const char *path, const char *name) {
 
 /* Resolve symbolic links in the last part of a path, which need not exist. */
 static char *follow_links(const char *path) {
-  enum { LINKS_MAX = 40 }; /* the kernel's limit */
+  enum { LINKS_MAX = 40 }; /* the limit of the Linux kernel */
   char *at = strdup(path);
   for (int i = 0; at != NULL && i < LINKS_MAX; ++i) {
     char link[PATH_MAX];
@@ -99,8 +99,8 @@ static void descriptor_path(int descriptor, char path[32]) {
 }
 
 /* Choose a unique temporary name beside the target. If `link` is NULL, create a file of that name
- * and return its descriptor; else give the name to the file that `link` refers to and return 0.
- * Return -1 and set errno on failure. */
+ * and return its descriptor; otherwise give the name to the file that `link` refers to and return
+ * 0. Return -1 and set errno on failure. */
 static int take_temporary(supine_output *output, const char *link) {
   enum { TRIES = 100 };
   const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";
@@ -125,16 +125,15 @@ static int take_temporary(supine_output *output, const char *link) {
   return -1;
 }
 
-/* Open a file without a name in the target's folder if it can be named later, else a file with a
- * temporary name. Return its descriptor, or -1 and set errno. */
+/* Open a file without a name in the target's folder if the file can be named later, else a file
+ * with a temporary name. Return its descriptor, or -1 and set errno. */
 static int open_regular(supine_output *output) {
   char *folder = supine_path_beside(output->target, ".");
   if (folder == NULL) {
     errno = ENOMEM;
     return -1;
   }
-  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666); /* less
-                                                                                * the umask */
+  const int descriptor = open(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
   free(folder);
   if (descriptor >= 0) {
     char link[32];
@@ -142,7 +141,7 @@ static int open_regular(supine_output *output) {
     if (access(link, F_OK) == 0) {
       return descriptor;
     }
-    (void)close(descriptor); /* it cannot be named without /proc */
+    (void)close(descriptor); /* without /proc the file cannot be named later */
   }
   return take_temporary(output, NULL);
 }
@@ -206,7 +205,7 @@ static bool give_name(supine_output *output) {
     if (linkat(AT_FDCWD, link, AT_FDCWD, output->target, AT_SYMLINK_FOLLOW) == 0) {
       return true;
     }
-    /* link() does not replace an existing file: link to a temporary name, then rename. */
+    /* linkat() does not replace an existing file: link to a temporary name, then rename it. */
     if (errno != EEXIST || take_temporary(output, link) < 0) {
       return false;
     }
@@ -229,7 +228,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
   const int descriptor = fileno(output->file);
   struct stat made = {0};
   const bool flushed = fflush(output->file) == 0 && ferror(output->file) == 0;
-  if (!flushed) { /* errno of an earlier failure is lost: write again to set it */
+  if (!flushed) { /* errno of the failed write may be lost: write again to set it */
     errno = write(descriptor, "", 1) == 1 ? EIO : errno;
     return output_fail(output, error, "cannot write");
   }
@@ -244,7 +243,7 @@ supine_status supine_output_commit(supine_output *output, supine_error *error) {
     }
     if (output->temporary != NULL) {
       set_live(output->temporary, NULL);
-      output->temporary[0] = '\0'; /* it has been renamed */
+      output->temporary[0] = '\0'; /* the file was renamed: do not remove it */
     }
     sync_folder(output->target);
   }
@@ -258,7 +257,7 @@ void supine_output_abandon(supine_output *output) {
     set_live(output->temporary, NULL);
   }
   if (output->file != NULL) {
-    __fpurge(output->file); /* else fclose would write the rest of the buffer */
+    __fpurge(output->file); /* keep fclose from writing the rest of the buffer */
     (void)fclose(output->file);
   }
   free(output->temporary);
@@ -271,8 +270,7 @@ supine_status supine_output_try(const char *path, supine_error *error) {
   supine_output output;
   struct stat old;
   if (supine_output_is_standard(path) || (stat(path, &old) == 0 && S_ISFIFO(old.st_mode))) {
-    return SUPINE_OK; /* opening and closing a pipe would tell its reader that the output is
-                         complete */
+    return SUPINE_OK; /* closing a pipe would tell its reader that the output is complete */
   }
   const supine_status status = supine_output_open(path, &output, error);
   supine_output_abandon(&output);

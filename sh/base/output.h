@@ -12,49 +12,47 @@
 
 #include <supine/status.h>
 
-/** A file being written. Write to `file` with stdio, seekable except in a pipe or device; commit
- * reports errors. */
+/** A file being written. Write to `file` with stdio; it is seekable except in a pipe or device.
+ * supine_output_commit reports errors. */
 typedef struct supine_output {
   FILE *file;
-  char *path;      /**< as given by the user */
+  char *path;      /**< path as given by the user */
   char *target;    /**< path with symbolic links followed */
-  char *temporary; /**< temporary name; NULL or "": none */
-  bool standard;   /**< standard output */
+  char *temporary; /**< temporary name; NULL or "" if there is none */
+  bool standard;   /**< the file is standard output */
 } supine_output;
 
 /** Open an output file. A new file gets its mode from the umask; a replaced file keeps its mode. A
- * symbolic link stays, and its target is replaced. A device, a pipe or standard output is written
- * directly.
- * @retval SUPINE_ERROR_WRITE  the folder is missing or not writable, or the path is a folder or
- *   a read-only file
- * @retval SUPINE_ERROR_MEMORY */
+ * symbolic link stays, and its target is replaced. Write directly to a device, pipe or standard
+ * output.
+ * @retval SUPINE_ERROR_WRITE   the folder is missing or not writable, or the path is a folder or a
+ *                              read-only file
+ * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_output_open(const char *path, supine_output *output, supine_error *error);
 
-/** Flush, wait for the disk, and give the file its name. On failure the new file is removed and an
- * old file is unchanged.
- * @retval SUPINE_ERROR_WRITE  a write failed; the message says why: full disk, file too large */
+/** Flush, wait until the file is on the disk, and give the file its name. On failure, remove the
+ * new file and leave an existing file unchanged.
+ * @retval SUPINE_ERROR_WRITE  a write failed; the message says why, such as a full disk */
 supine_status supine_output_commit(supine_output *output, supine_error *error);
 
-/** Discard the file; legal after a failed open, after commit, and on a zeroed struct. */
+/** Discard the file. Legal after a failed open, after commit, and on a zeroed struct. */
 void supine_output_abandon(supine_output *output);
 
-/** Return whether the path is standard output: "-", or "-" and an ending that names a format, such
- * as "-.ply". */
+/** Return whether the path means standard output: "-", alone or with an ending ("-.ply"). */
 bool supine_output_is_standard(const char *path);
 
-/** Reserve standard output for supine_output_open: from then on other output goes to standard
+/** Reserve standard output for supine_output_open: from then on, all other output goes to standard
  * error. Return false if standard output is closed. */
 bool supine_output_take_standard(void);
 
-/** Check that a file of this name can be written, without leaving one.
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY  as supine_output_open */
+/** Check that a file can be written, without leaving one. Statuses: as supine_output_open. */
 supine_status supine_output_try(const char *path, supine_error *error);
 
 /** Return the path of `name` in the folder of the file `path`, or `name` if it is absolute; the
  * caller frees it. Return NULL if out of memory. */
 char *supine_path_beside(const char *path, const char *name);
 
-/** Remove the temporary files of all outputs of the process; for handlers of fatal signals. */
+/** Remove the temporary files of all outputs of the process. For handlers of fatal signals. */
 void supine_output_abandon_all(void);
 
 #endif

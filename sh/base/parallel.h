@@ -6,8 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/** A function that works on items begin <= i < end; `thread` is the number of its thread, 0 to
- * threads - 1. */
+/** A function for items begin <= i < end; `thread` is its thread's index, 0 to threads - 1. */
 typedef void supine_range_function(void *context, size_t begin, size_t end, size_t thread);
 
 /** Return the default number of threads: the environment variable SUPINE_THREADS (1 to 256) or, if
@@ -17,14 +16,14 @@ size_t supine_thread_count(void);
 /** Return whether the environment variable SUPINE_THREADS is unset or valid. */
 bool supine_thread_count_is_valid(void);
 
-/** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait.
+/** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait for all.
  *
  * @param count    number of items
  * @param grain    smallest number of items for a thread, at least 1; small counts use fewer threads
- * @param threads  largest number of threads; 0: supine_thread_count()
+ * @param threads  largest number of threads; 0 selects supine_thread_count()
  *
  * Pieces begin at multiples of `grain` and depend only on the arguments and the number of threads.
- * The piece of a thread that cannot be started runs in the caller's thread. */
+ * If a thread cannot be started, its piece runs in the caller's thread. */
 void supine_parallel_for(size_t count, size_t grain, size_t threads,
                          supine_range_function *function, void *context);
 

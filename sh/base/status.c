@@ -10,7 +10,8 @@ const char *supine_status_string(supine_status status) {
       "success",        "argument out of range", "out of memory",   "cannot read",
       "malformed file", "unusable mesh",         "surface is open", "not supported here",
       "cannot write",   "numerical failure",     "interrupted"};
-  _Static_assert(sizeof phrases / sizeof *phrases == SUPINE_STATUS_COUNT, "a phrase for each");
+  _Static_assert(sizeof phrases / sizeof *phrases == SUPINE_STATUS_COUNT,
+                 "a phrase for each status");
   return (unsigned)status < SUPINE_STATUS_COUNT ? phrases[status] : "unknown status";
 }
 

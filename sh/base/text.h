@@ -8,17 +8,17 @@
 
 #include <supine/status.h>
 
-/** Append to `text` by a printf format. `text` has room for `size` bytes with its NUL; what does
- * not fit is cut off. */
+/** Append to `text` by a printf format. `text` has room for `size` bytes with its NUL; longer text
+ * is cut off. */
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 
 /** Replace bytes that are not UTF-8, which file names may contain, by '?'. Return `text`. */
 char *supine_text_make_utf8(char *text);
 
-/** Return whether a name ends in `ending` (".csv") and has at least one character before it. */
+/** Return whether a name ends in `ending` (".csv") with at least one character before it. */
 bool supine_text_ends_in(const char *name, const char *ending);
-/** Return the same, ignoring case. */
+/** Do the same as supine_text_ends_in, ignoring case. */
 bool supine_text_ends_in_any_case(const char *name, const char *ending);
 
 #endif

@@ -5,8 +5,8 @@
 
 #include <stddef.h>
 
-/** Return the number of bytes of the first UTF-8 character in `text` [size]; 0 if it is cut off,
- * overlong, a surrogate, out of range or otherwise malformed. */
+/** Return the number of bytes of the first UTF-8 character in `text` [size]; 0 if the character is
+ * cut off, overlong, a surrogate, out of range or otherwise malformed. */
 static inline size_t supine_utf8_length(const char *text, size_t size) {
   const unsigned char *u = (const unsigned char *)text;
   if (size == 0 || u[0] < 0x80) {

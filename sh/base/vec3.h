@@ -10,14 +10,14 @@ static inline double supine_dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/** Compute a x b; `product` must not alias them. */
+/** Compute a x b; `product` must be neither `a` nor `b`. */
 static inline void supine_cross(const double a[3], const double b[3], double product[3]) {
   product[0] = a[1] * b[2] - a[2] * b[1];
   product[1] = a[2] * b[0] - a[0] * b[2];
   product[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/** Compute a . (b x c), the determinant of the three vectors. */
+/** Return a . (b x c), the determinant of the three vectors. */
 static inline double supine_triple(const double a[3], const double b[3], const double c[3]) {
   double product[3];
   supine_cross(b, c, product);
@@ -34,8 +34,8 @@ static inline void supine_subtract(const double a[3], const double b[3], double 
   }
 }
 
-/** Scale a vector to length 1 without overflow or underflow; false if it is zero or not finite.
- * `unit` may be `v`. */
+/** Scale a vector to length 1 without overflow or underflow; return false if it is zero or not
+ * finite. `unit` may be `v`. */
 static inline bool supine_normalise(const double v[3], double unit[3]) {
   const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
   if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]) || largest == 0) {
@@ -65,9 +65,9 @@ static inline void supine_normal(const double p[3], const double q[3], const dou
   supine_cross(u, v, normal);
 }
 
-/** Compute direction number `at` of a golden-angle spiral of `count` directions that covers the
- * sphere evenly from +z to -z.
- * @param at    0 to count - 1, not necessarily an integer
+/** Compute a direction of a golden-angle spiral of `count` directions, which covers the sphere
+ * evenly from +z to -z.
+ * @param at    index of the direction, 0 to count - 1, not necessarily an integer
  * @param from  longitude of direction 0, rad */
 static inline void supine_spiral(double at, double count, double from, double direction[3]) {
   static const double golden_angle = 2.3999632297286533222; /* pi (3 - sqrt 5) */

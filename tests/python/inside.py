@@ -198,7 +198,7 @@ assert np.median(inner) < 20 < np.median(abs(moved[0].astype(int) - image)[size[
 refused(supine.FormatError, "no grid", lungs.warp, image, "prone:rest", **frame)
 refused(ValueError, "[z, y, x]", grid.warp, image[0], "prone:rest", **frame)
 refused(ValueError, "uint8", grid.warp, image.astype(np.int64), "prone:rest", **frame)
-refused(supine.ArgumentError, "mL from what", grid.warp, image, "500", **frame)
+refused(supine.ArgumentError, "needs a reference", grid.warp, image, "500", **frame)
 
 # Bases made from arrays are the program's own, bit for bit; `path` was made with --band 3.
 parts = []
@@ -223,7 +223,7 @@ refused(supine.MeshError, f"surface 1: face 0 names vertex {n + 3}", supine.prec
         lungs.triangles[:1].astype(np.int64) * 0 + n + 3)
 refused(supine.MeshError, "names vertex", supine.precompute, lungs.vertices, lungs.triangles.astype(np.int64) + 2**32)
 refused(supine.ArgumentError, "no option '--colour'", supine.precompute, lungs.vertices, lungs.triangles, colour="red")
-refused(supine.ArgumentError, "mL from what?", supine.precompute, lungs.vertices, lungs.triangles, scanned="supine:500")
+refused(supine.ArgumentError, "needs a reference", supine.precompute, lungs.vertices, lungs.triangles, scanned="supine:500")
 refused(supine.ReadError, "nowhere.ply: cannot read", supine.precompute, "nowhere.ply")
 refused(ValueError, "[N, 3]", supine.precompute, lungs.vertices[:, :2], lungs.triangles)
 refused(ValueError, "integers", supine.precompute, lungs.vertices, lungs.vertices)

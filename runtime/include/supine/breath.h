@@ -15,7 +15,7 @@
  *     V''(x) = u(x) V'(x)      u(x) = c_1 P_0(x) + c_2 P_1(x) + ... + c_5 P_4(x)
  *     x = (2 P - P_low - P_high) / (P_high - P_low)      V(-1) = V_low      V(1) = V_high
  *
- * The source gives the form of the equation but not the functions. These are chosen because:
+ * [Santhanam2008] gives the form of the equation but not the functions. They are chosen because:
  * - V' is the compliance, so u is the relative rate at which compliance changes as the lung
  *   inflates. Compliance is positive for all parameters, so V rises with P everywhere and P(V)
  *   exists. With an added control function (V'' = u) a noisy limb can fold over, and V is a
@@ -49,11 +49,12 @@ extern "C" {
 #endif
 
 enum {
-  SUPINE_PV_CONTROLS = 5,    /**< control parameters of a limb */
+  SUPINE_PV_CONTROLS = 5,    /**< number of control parameters of a limb */
   SUPINE_PV_CONTROL_MAX = 50 /**< largest |c_i|; c_1 = 50 changes the compliance e^100-fold over the
-                                  range, far more than in any lung */
+                                range, far more than in any lung */
 };
 
+/** The limbs of a P-V loop. */
 typedef enum supine_pv_limb {
   SUPINE_PV_INHALE = 0,
   SUPINE_PV_EXHALE,
@@ -62,17 +63,17 @@ typedef enum supine_pv_limb {
 
 /** One limb of the P-V loop. */
 typedef struct supine_pv_curve {
-  double pressure[2];                 /**< P_low < P_high, cmH2O */
-  double volume[2];                   /**< V_low < V_high, mL */
-  double control[SUPINE_PV_CONTROLS]; /**< c_1 to c_5 */
+  double pressure[2]; /**< pressures P_low < P_high at the ends of the limb, cmH2O */
+  double volume[2];   /**< volumes V_low < V_high at the ends of the limb, mL */
+  double control[SUPINE_PV_CONTROLS]; /**< control parameters c_1 to c_5 */
 } supine_pv_curve;
 
-/** Both limbs of a lung; equal without hysteresis. */
+/** The P-V loop of a lung: two limbs, which are equal if there is no hysteresis. */
 typedef struct supine_pv {
   supine_pv_curve limb[SUPINE_PV_LIMB_COUNT];
 } supine_pv;
 
-/** Return "inhale" or "exhale"; never NULL. */
+/** Return "inhale", "exhale" or, for other values, "unknown limb"; never NULL. */
 SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
 
 /** Return the P-V loop of a normal adult lung, the default if no loop was measured: 0 to 30 cmH2O,
@@ -81,18 +82,17 @@ SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
  * The exhale limb is the exponential of [Salazar1964] with k = ln 2 / 7.58 cmH2O, the mean
  * half-inflation pressure of 20 normal subjects, and 6000 mL, an adult's total lung capacity, at 30
  * cmH2O. The inhale limb is a sigmoid [Venegas1998] between the same ends with c = 10 and d = 6
- * cmH2O; it stays below the exhale limb. Its b d = 44,600 mL cmH2O lies in the 10^4 to 10^5 that
- * Narusawa (J. Appl. Physiol. 91, 2001, 201-210) found over published curves, but c and d are round
- * numbers, not means of measured lungs. */
+ * cmH2O; it stays below the exhale limb. The product b d, 44,600 mL cmH2O, lies between the 10^4
+ * and 10^5 that Narusawa (J. Appl. Physiol. 91, 2001, 201-210) found in published curves, but c and
+ * d are round numbers, not means of measured lungs. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
-/** Check a limb: finite numbers, rising ranges, and parameters within bounds.
- * @retval SUPINE_ERROR_ARGUMENT  it fails one of these */
+/** Check a limb: finite numbers, rising ranges, and parameters within SUPINE_PV_CONTROL_MAX.
+ * @retval SUPINE_ERROR_ARGUMENT  the limb fails one of these checks */
 SUPINE_API supine_status supine_breath_curve_check(const supine_pv_curve *curve,
                                                    supine_error *error);
 
-/** Compute the volume V(P) and the compliance dV/dP. The equation is linear in V and has the
- * solution
+/** Compute the volume V(P) and the compliance dV/dP of a limb. Its equation has the solution
  *
  *     V(x) = V_low + (V_high - V_low) I(x) / I(1)        I(x) = integral from -1 to x of exp(U)
  *     U(x) = integral from -1 to x of u
@@ -102,33 +102,34 @@ SUPINE_API supine_status supine_breath_curve_check(const supine_pv_curve *curve,
  * exponentials, and 16 for each pressure.
  *
  * @param pressures    [count] cmH2O within the limb's range, in any order
- * @param volumes      [count] mL, written; NULL: not wanted
- * @param compliances  [count] mL/cmH2O, written; NULL: not wanted
- * @retval SUPINE_ERROR_ARGUMENT  a pressure outside the range, or not finite; a bad curve */
+ * @param volumes      [count] mL, written; may be NULL
+ * @param compliances  [count] mL/cmH2O, written; may be NULL
+ * @retval SUPINE_ERROR_ARGUMENT  a pressure is outside the range or not finite, or the limb fails
+ *                                supine_breath_curve_check */
 SUPINE_API supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t count,
                                                       const double *pressures, double *volumes,
                                                       double *compliances, supine_error *error);
 
 /** The course of pressure from rest to its peak and back. */
 typedef enum supine_pv_course {
-  SUPINE_PV_COSINE = 0,    /**< half a cosine each way: quiet breathing */
-  SUPINE_PV_RAMP,          /**< straight lines: a ventilator's pressure ramp */
-  SUPINE_PV_CONSTANT_FLOW, /**< straight lines of volume instead of pressure, as in [Santhanam2008]
-                              V: 500 mL in 5 s of inhalation, 1.5 mL in each step of 15 ms */
+  SUPINE_PV_COSINE = 0,    /**< half a cosine of pressure each way, as in quiet breathing */
+  SUPINE_PV_RAMP,          /**< pressure linear in time, as a ventilator's ramp */
+  SUPINE_PV_CONSTANT_FLOW, /**< volume linear in time, as in [Santhanam2008] V: 500 mL in 5 s of
+                              inhalation, 1.5 mL in each step of 15 ms */
   SUPINE_PV_COURSE_COUNT
 } supine_pv_course;
 
 /** A breath, repeated without end. */
 typedef struct supine_pv_breath {
-  double tidal;           /**< mL inhaled, > 0 */
-  double rate;            /**< breaths a minute, > 0 */
+  double tidal;           /**< volume of a breath, mL, > 0 */
+  double rate;            /**< breaths per minute, > 0 */
   double inhale_fraction; /**< fraction of the breath's time that is inhalation, > 0 and < 1 */
-  double rest_pressure;   /**< cmH2O at the end of an exhalation */
+  double rest_pressure;   /**< pressure at the end of an exhalation, cmH2O */
   supine_pv_course course;
 } supine_pv_breath;
 
-/** Return the default breath: 500 mL, 12 a minute, a third of the time inhaling, from 5 cmH2O at
- * rest, by half cosines of pressure. */
+/** Return the default breath: 500 mL, 12 per minute, a third of the time inhaling, from a pressure
+ * of 5 cmH2O at rest, by half cosines of pressure. */
 SUPINE_API supine_pv_breath supine_breath_default(void);
 
 /** Compute the volume above rest, and the pressure, at given times. A breath begins at time 0, at
@@ -142,17 +143,17 @@ SUPINE_API supine_pv_breath supine_breath_default(void);
  *
  * The scale is 1 on the inhale limb. V is 0 at rest and the tidal volume at the peak, to rounding.
  *
- * @param pv         NULL is legal for constant flow without pressures
+ * @param pv         may be NULL for constant flow if `pressures` is NULL
  * @param times      [count] s, any finite
- * @param volumes    [count] mL, written; NULL: not wanted
- * @param pressures  [count] cmH2O, written; NULL: not wanted
+ * @param volumes    [count] mL above rest, written; may be NULL
+ * @param pressures  [count] cmH2O, written; may be NULL
  * @retval SUPINE_ERROR_ARGUMENT   the breath is outside its documented ranges, the pressure at rest
- *                                 is outside a limb, or the tidal volume or its peak pressure is
- *                                 beyond the end of a limb
+ *                                 is outside the range of a limb, or the tidal volume or its peak
+ *                                 pressure is beyond the end of a limb
  * @retval SUPINE_ERROR_NUMERICAL  a limb is so flat that its volume does not rise between rest and
  *                                 peak
  *
- * Cost: some 20 microseconds, and less than 1 microsecond for each time. */
+ * Cost: about 20 microseconds, and less than 1 microsecond for each time. */
 SUPINE_API supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
                                                 size_t count, const double *times, double *volumes,
                                                 double *pressures, supine_error *error);

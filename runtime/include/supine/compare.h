@@ -3,8 +3,7 @@
  * Comparisons of states: distances between deformed lungs, and ventilation by height.
  *
  * Averages are over the area of the reference surface: the weight a_i of vertex i is a third of the
- * area of its triangles, divided by the area of all triangles. A deformed state is a supine_pose.
- */
+ * area of its triangles, divided by the area of all triangles. States are given as supine_pose. */
 #ifndef SUPINE_COMPARE_H
 #define SUPINE_COMPARE_H
 
@@ -17,18 +16,19 @@
 extern "C" {
 #endif
 
-/** Areas and Gram matrices of a basis. Any number of threads may share one, as no function changes
- * it. */
+/** Areas and Gram matrices of a basis. They never change: any number of threads may share them. */
 typedef struct supine_compare supine_compare;
 
-/** Compute the Gram matrix of each lung and axis j, in one pass over the vertices:
+/** Compute the Gram matrix of each lung and axis j, in one pass over the vertices i of the lung,
+ * with the symbols of supine/runtime.h:
  *
  *     G_j,kl = sum over i of a_i d_ij^2 c_ik c_il       (vector fields: a_i c_ijk c_ijl)
  *
- * @param basis  must outlive the comparison
- * Cost: 3 N K^2 / 2 multiplications.
- * @retval SUPINE_ERROR_MESH    the surface has no area
- * @retval SUPINE_ERROR_MEMORY */
+ * @param basis    must outlive the comparison
+ * @param compare  written; free it with supine_compare_destroy
+ * @retval SUPINE_ERROR_MESH    the area of the surface is 0 or not finite
+ * @retval SUPINE_ERROR_MEMORY  an allocation failed
+ * Cost: 3 N K^2 / 2 multiplications. */
 SUPINE_API supine_status supine_compare_create(const supine_basis *basis, supine_compare **compare,
                                                supine_error *error);
 /** Free a comparison; NULL is legal. */
@@ -37,42 +37,44 @@ SUPINE_API void supine_compare_destroy(supine_compare *compare);
 /** Return the area of the reference surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
 
-/** Compute the RMS distance between two poses, mm, from the Gram matrices alone:
+/** Return the RMS distance between two poses, mm, from the Gram matrices alone:
  *
  *     d^2 = sum over lungs and axes of q^T G q,     q = A w - A' w'
  *
- * @param from  NULL: the reference surface
+ * with the gains A and weights w of `pose`, and A' and w' of `from`.
+ * @param from  NULL for the reference surface
  * Cost: 3 G K^2 multiplications, no pass over the vertices. */
 SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
                                      const supine_pose *from);
 
-/** Compute the distance of every vertex between two poses, mm.
- * @param from      NULL: the reference surface
- * @param distance  [N], written
- * Cost: one pass, 3 K + 6 multiplications per vertex. */
+/** Compute the distance of every vertex between two poses.
+ * @param from      NULL for the reference surface
+ * @param distance  [N] mm, written
+ * Cost: one pass over the vertices, 3 K + 6 multiplications per vertex. */
 SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
                                          const supine_pose *from, float *distance);
 
 /** Statistics of distances over the surface, mm. */
 typedef struct supine_distance_statistics {
-  double mean; /**< area-weighted */
-  double rms;  /**< area-weighted */
+  double mean; /**< area-weighted mean */
+  double rms;  /**< area-weighted root mean square */
   double p95;  /**< 95th percentile by area */
   double max;  /**< largest distance of any vertex */
 } supine_distance_statistics;
 
-/** Compute the statistics of distances [N], none of which is negative: exactly, in four passes,
- * without allocation. */
+/** Compute the statistics of distances, mm: exactly, in four passes, without allocation.
+ * @param distance  [N] mm, none negative */
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Compute the energy of each band of harmonics, mm^2: its part of the squared displacement at gain
- * 1, averaged over the area and over all directions of gravity,
+/** Compute the energy of each band of harmonics: its part of the squared displacement at gain 1,
+ * averaged over the area and over all directions of gravity,
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm       M_lm: column lm of `modes`
  *
- * When gravity changes its sign, so do the odd bands; the even bands do not change.
- * @param energy  [L + 1], written */
+ * with the sum G of all Gram matrices. When gravity changes its sign, so do the odd bands; the even
+ * bands do not change.
+ * @param energy  [L + 1] mm^2, written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
 /** The part of one lung between two heights. */
@@ -86,24 +88,24 @@ enum { SUPINE_SLABS_MAX = 64 };
 
 /** Compute ventilation by height: cut the surface before a breath into slabs of equal thickness
  * across gravity, from the highest to the lowest point of all lungs, and find the volume that the
- * tissue in each gains.
+ * tissue in each slab gains:
  *
- *     gain = volume within the slab's part of the surface and its two cuts after the breath
- *            - the same before it
+ *     gain = volume after the breath - volume before the breath
  *
- * The part of the surface is exact, so that the slabs of a lung sum to the volume that it gains. A
- * cut inside the lung has no vertices: after the breath it is the fan of triangles from the mean of
- * its outline to its outline. This is exact for displacements that are linear in position: the
- * gains are 0 for a rotation, and gain / volume is the same in all slabs for a uniform expansion.
+ * between the slab's part of the surface and its two cuts. The part of the surface is exact, so
+ * that the gains of a lung's slabs sum to the gain of the lung. A cut inside the lung has no
+ * vertices: after the breath, it is approximated by triangles from the mean of its outline to each
+ * edge. This is exact for displacements that are linear in position: the gains are 0 for a
+ * rotation, and gain / volume is the same in all slabs for a uniform expansion.
  *
  * @param gravity  [3], any length but 0
- * @param from     [N, 3] positions before the breath; NULL: the reference surface
- * @param xyz      [N, 3] positions after it (supine_deform)
- * @param count    1 to SUPINE_SLABS_MAX
+ * @param from     [N, 3] positions before the breath, mm; NULL for the reference surface
+ * @param xyz      [N, 3] positions after the breath (supine_deform), mm
+ * @param count    number of slabs, 1 to SUPINE_SLABS_MAX
  * @param slabs    [G, count], uppermost first, written
- * Cost: one pass over the triangles.
  * @retval SUPINE_ERROR_ARGUMENT      gravity has no direction, or the count is out of range
- * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes */
+ * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes
+ * Cost: one pass over the triangles for each lung. */
 SUPINE_API supine_status supine_compare_slabs(const supine_basis *basis, const double gravity[3],
                                               const float *from, const float *xyz, size_t count,
                                               supine_slab *slabs, supine_error *error);

@@ -23,17 +23,18 @@ extern "C" {
  *
  * "left" is lying on the left side. The capitals are DICOM patient positions (0018,5100); head or
  * feet first makes no difference to gravity.
- * @retval SUPINE_ERROR_ARGUMENT  no such posture; `gravity` is unchanged */
+ * @param gravity  [3] unit vector, written
+ * @retval SUPINE_ERROR_ARGUMENT  the name is unknown; `gravity` is unchanged */
 SUPINE_API supine_status supine_posture_gravity(const char *name, double gravity[3]);
 
 /** Return the number of names that supine_posture_gravity knows. */
 SUPINE_API size_t supine_posture_count(void);
 
-/** Return name number `index`, in lower case except DICOM's; NULL past the last. */
+/** Return the posture name with an index, in lower case except DICOM's; NULL past the last. */
 SUPINE_API const char *supine_posture_name(size_t index);
 
-/** Return the known name nearest to `name`, by the number of characters inserted, deleted or
- * replaced, for "did you mean ...?"; never NULL. */
+/** Return the posture name nearest to `name`, by the number of characters to insert, delete or
+ * replace, for a suggestion; never NULL. */
 SUPINE_API const char *supine_posture_nearest(const char *name);
 
 /** Compute gravity for a body's orientation, a rotation from body axes to world axes, in a world
@@ -44,7 +45,8 @@ SUPINE_API const char *supine_posture_nearest(const char *name);
  * The identity (1, 0, 0, 0) is upright; a turn about the world's z changes nothing.
  *
  * @param quaternion  W, X, Y, Z of any length but 0
- * @retval SUPINE_ERROR_ARGUMENT  it is zero or not finite */
+ * @param gravity     [3] unit vector, written
+ * @retval SUPINE_ERROR_ARGUMENT  the quaternion is zero or not finite */
 SUPINE_API supine_status supine_posture_quaternion(const double quaternion[4], double gravity[3]);
 
 /** Turn gravity by t = `degrees` about the left-right axis, in the sagittal plane, from posterior
@@ -53,8 +55,8 @@ SUPINE_API supine_status supine_posture_quaternion(const double quaternion[4], d
  *     (x, y, z) -> (x, y cos t - z sin t, y sin t + z cos t)
  *
  * Supine with +15 degrees is Trendelenburg, head down: (0, cos 15, sin 15). As gravity turns in the
- * axes of the body, the same sign lowers the feet from prone and leans the body back from upright;
- * a lateral posture does not change.
+ * axes of the body, a positive angle lowers the feet from prone and leans the body back from
+ * upright; a lateral posture does not change.
  *
  * @param tilted  [3], written; may be `gravity`
  * @retval SUPINE_ERROR_ARGUMENT  gravity or the angle is not finite */

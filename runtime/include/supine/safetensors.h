@@ -51,42 +51,44 @@ enum { SUPINE_TENSOR_RANK_MAX = 4 };
 typedef struct supine_tensor {
   const char *name;
   supine_dtype dtype;
-  size_t rank; /**< 1 to SUPINE_TENSOR_RANK_MAX */
-  size_t shape[SUPINE_TENSOR_RANK_MAX];
+  size_t rank;                          /**< number of axes, 1 to SUPINE_TENSOR_RANK_MAX */
+  size_t shape[SUPINE_TENSOR_RANK_MAX]; /**< length of each axis */
   const void *data;
 } supine_tensor;
 
-/** One string of __metadata__. */
+/** One string of the metadata, in UTF-8. */
 typedef struct supine_metadata {
   const char *key;
   const char *value;
 } supine_metadata;
 
-/** An open file. */
+/** An open safetensors file. */
 typedef struct supine_safetensors supine_safetensors;
 
-/** Map a file and check all of it but its checksum (supine_safetensors_verify): length of the
+/** Map a file and check all of it except its checksum (supine_safetensors_verify): length of the
  * header, JSON, element types, shapes, sizes that overflow, offsets that overlap, leave gaps or
  * pass the end, trailing bytes, repeated names. The file must not change while it is open.
  * @param file  written; NULL on failure
- * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
+ * @retval SUPINE_ERROR_READ    the file is missing or unreadable
+ * @retval SUPINE_ERROR_FORMAT  a check failed
+ * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 SUPINE_API supine_status supine_safetensors_open(const char *path, supine_safetensors **file,
                                                  supine_error *error);
 
-/** Open a file in memory; the caller keeps the bytes until it is closed. They need no alignment, as
- * misaligned tensors are copied.
- * @param name  name of the file, for messages */
+/** Open a file in memory. The caller keeps its bytes unchanged until the file is closed. They need
+ * no alignment, as misaligned tensors are copied. Statuses: as supine_safetensors_open.
+ * @param name  name of the file in messages */
 SUPINE_API supine_status supine_safetensors_open_memory(const void *bytes, size_t size,
                                                         const char *name, supine_safetensors **file,
                                                         supine_error *error);
 /** Close a file; NULL is legal. */
 SUPINE_API void supine_safetensors_close(supine_safetensors *file);
 
-/** Return the tensor of a name, or NULL. */
+/** Return the tensor with a name, or NULL if there is none. */
 SUPINE_API const supine_tensor *supine_safetensors_find(const supine_safetensors *file,
                                                         const char *name);
 
-/** Return the metadata string of a key, or NULL. */
+/** Return the metadata string of a key, or NULL if there is none. */
 SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *file, const char *key);
 
 /** Return all metadata, in the order of the file.
@@ -94,19 +96,20 @@ SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *fil
 SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
                                                                   size_t *count);
 
-/** Check the content against the metadata "checksum". Cost: one pass at about the speed of memory.
- * @retval SUPINE_ERROR_FORMAT  the file states no checksum, or it is corrupted and has another */
+/** Check the content against the metadata "checksum".
+ * @retval SUPINE_ERROR_FORMAT  the file states no checksum, or its content has a different one
+ * Cost: one pass over the file, at about the speed of memory. */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
 
-/** Write a file to a stream, with the metadata "checksum" added. Tensors are laid out by descending
- * element size, in the given order within one size, so that each begins at a multiple of its
- * element size; the header is padded with spaces to a multiple of 8. The caller checks the stream
- * for errors (ferror, fclose).
- * @param name  name of the file, for messages
+/** Write a safetensors file to a stream, with the metadata "checksum" added. Tensors are laid out
+ * by descending element size and, for one size, in the given order, so that each begins at a
+ * multiple of its element size. The header is padded with spaces to a multiple of 8 bytes. Errors
+ * of the stream are not reported: check ferror and fclose.
+ * @param name  name of the file in messages
  * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys have the same name, a dtype, rank or size
  *                                is out of range, text is not UTF-8, or metadata has the key
- *                                "checksum", which this function adds */
+ *                                "checksum" already */
 SUPINE_API supine_status supine_safetensors_write(FILE *file, const char *name,
                                                   const supine_tensor *tensors, size_t tensor_count,
                                                   const supine_metadata *metadata,

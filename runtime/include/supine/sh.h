@@ -2,13 +2,13 @@
 /** @file
  * Real spherical harmonics of a direction.
  *
- * Convention: orthonormal on the unit sphere, no Condon-Shortley phase, z the polar axis,
- * index l*l + l + m, m < 0 the sine terms:
+ * Convention: orthonormal on the unit sphere, no Condon-Shortley phase, the polar axis is z. The
+ * index of Y(l, m) is l*l + l + m; m < 0 denotes the sine terms.
  *
  *     Y(0, 0) = 0.28209479        Y(1,-1) = 0.48860251 y
  *     Y(1, 0) = 0.48860251 z      Y(1, 1) = 0.48860251 x
  *
- * Every function is thread-safe, allocates nothing and needs libm alone. */
+ * Every function is thread-safe, allocates nothing and needs only libm. */
 #ifndef SUPINE_SH_H
 #define SUPINE_SH_H
 
@@ -20,7 +20,7 @@
 extern "C" {
 #endif
 
-/** The highest band: the recurrences are tested up to it. */
+/** The highest band. The recurrences are tested up to this band. */
 #define SUPINE_SH_BAND_MAX 64
 
 /** Return the number of harmonics with l <= band: (band + 1)^2. */
@@ -34,10 +34,11 @@ SUPINE_API size_t supine_sh_index(size_t l, int m);
  * @param band       0 to SUPINE_SH_BAND_MAX
  * @param direction  [3], any length but 0; normalised here
  * @param y          [(band + 1)^2], written
- * @retval SUPINE_ERROR_ARGUMENT  band too high, or a direction that is zero or not finite */
+ * @retval SUPINE_ERROR_ARGUMENT  the band is too high, or the direction is zero or not finite */
 SUPINE_API supine_status supine_sh_evaluate(size_t band, const double direction[3], double *y);
 
-/** Compute supine_sh_evaluate for `count` directions [count, 3] into y [count, (band + 1)^2]. */
+/** Compute supine_sh_evaluate for `count` directions [count, 3] into y [count, (band + 1)^2].
+ * Statuses: as supine_sh_evaluate. */
 SUPINE_API supine_status supine_sh_evaluate_many(size_t band, size_t count,
                                                  const double *directions, double *y);
 

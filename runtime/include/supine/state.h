@@ -6,7 +6,7 @@
  *              position, any of them tilted (supine+15), or gravity X:Y:Z
  *     VOLUME   rest   the end of a quiet expiration in that posture (FRC, with the tissue)
  *              full   full inflation (TLC, with the tissue)
- *              scan   the volume scanned
+ *              scan   the volume in the scan
  *              each with +ML or -ML added, as rest+500 or full-3000;
  *              2600mL, an absolute volume of gas and tissue;
  *              left=VOLUME,right=VOLUME for each lung
@@ -26,26 +26,29 @@
 extern "C" {
 #endif
 
-/** What a volume is counted from. */
+/** The reference from which a volume counts. */
 typedef enum supine_volume_kind {
-  SUPINE_VOLUME_DEFAULT = 0, /**< the default of the basis, see supine_basis_pose */
+  SUPINE_VOLUME_DEFAULT = 0, /**< the default volume of a basis (supine_basis_pose) */
   SUPINE_VOLUME_REST,        /**< the end of a quiet expiration in the posture */
   SUPINE_VOLUME_FULL,        /**< full inflation */
-  SUPINE_VOLUME_SCAN,        /**< the volume scanned */
-  SUPINE_VOLUME_ABSOLUTE,    /**< 0 mL: `ml` is the volume of gas and tissue, as measured in a CT */
+  SUPINE_VOLUME_SCAN,        /**< the volume in the scan */
+  SUPINE_VOLUME_ABSOLUTE,    /**< 0 mL: `ml` is the volume of gas and tissue, as in a CT */
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;
 
+/** A volume, counted from a reference. */
 typedef struct supine_volume {
   supine_volume_kind kind;
-  double ml; /**< mL above the volume of the kind; negative: below */
+  double ml; /**< volume above the reference, mL; negative: below */
 } supine_volume;
 
+/** Largest number of named lungs, and size of a name in bytes with its NUL. */
 enum { SUPINE_STATE_LUNGS_MAX = 2, SUPINE_STATE_NAME_SIZE = 16 };
 
+/** A posture, and a volume of all lungs or of each lung. */
 typedef struct supine_state {
   double gravity[3];    /**< unit vector in body axes (LPS) that points where things fall */
-  supine_volume volume; /**< of all lungs together; unused if lungs are named */
+  supine_volume volume; /**< volume of all lungs together; unused if lungs are named */
   size_t lung_count;    /**< number of lungs named below; 0: none */
   struct {
     char name[SUPINE_STATE_NAME_SIZE];
@@ -61,19 +64,20 @@ typedef struct supine_state {
 SUPINE_API supine_status supine_state_parse(const char *text, supine_state *state,
                                             supine_error *error);
 
-/** Parse a posture alone, or a volume alone; statuses as supine_state_parse. */
+/** Parse a posture alone, or a volume alone. Statuses: as supine_state_parse. */
 SUPINE_API supine_status supine_state_parse_posture(const char *text, supine_state *state,
                                                     supine_error *error);
 SUPINE_API supine_status supine_state_parse_volume(const char *text, supine_state *state,
                                                    supine_error *error);
 
-/** Print a state as supine_state_parse reads it: "left:rest+500", with up to 9 digits a volume.
- * @param size  bytes of `text`; longer text is cut off, and 160 bytes are enough for any state
+/** Print a state as supine_state_parse reads it, such as "left:rest+500"; volumes have up to 9
+ * digits.
+ * @param size  size of `text` in bytes; longer text is cut off; 160 bytes are enough for any state
  * @return the length of the whole text, without its NUL */
 SUPINE_API size_t supine_state_print(const supine_state *state, char *text, size_t size);
 
-/** Print a state in words: "left side at rest + 500 mL"; a default volume is omitted. Parameters
- * and result as supine_state_print. */
+/** Print a state in words, such as "left side at rest + 500 mL"; omit a default volume. Parameters
+ * and result: as supine_state_print. */
 SUPINE_API size_t supine_state_describe(const supine_state *state, char *text, size_t size);
 
 #ifdef __cplusplus

@@ -44,15 +44,15 @@ typedef enum supine_status {
 /** Return a phrase for a status; never NULL, even for values outside the enumeration. */
 SUPINE_API const char *supine_status_string(supine_status status);
 
-/** The detail of a failure: which file, which vertex, which remedy. The caller owns it and passes
- * it as the last argument, or NULL if it does not want the detail. */
+/** The detail of a failure, such as the file, the vertex and the remedy. The caller owns the struct
+ * and passes it as the last argument, or NULL to get no detail. */
 typedef struct supine_error {
   supine_status status;
   char message[512]; /**< one line, NUL-terminated, no trailing newline */
 } supine_error;
 
-/** Set the status of `error` and its message by a printf format, cut to fit, unless `error` is
- * NULL.
+/** Set the status and the message of `error` unless it is NULL. A long message is cut off.
+ * @param format  printf format of the message
  * @return `status` */
 SUPINE_API supine_status supine_error_set(supine_error *error, supine_status status,
                                           const char *format, ...) SUPINE_PRINTF(3, 4);

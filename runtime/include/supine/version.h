@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The version. Before 1.0 a new minor version may change the interface, and the name of the shared
- * library contains the minor version; a new patch never changes the interface. */
+ * The version. Before 1.0, a new minor version may change the interface, and the name of the shared
+ * library contains the minor version. A new patch version never changes the interface. */
 #ifndef SUPINE_VERSION_H
 #define SUPINE_VERSION_H
 
@@ -16,7 +16,7 @@ extern "C" {
 #define SUPINE_VERSION_NUMBER 300 /**< 10000 major + 100 minor + patch */
 /** @} */
 
-/** Return the version of the library that is linked or loaded, as SUPINE_VERSION; never NULL. */
+/** Return the version of the linked or loaded library in the form of SUPINE_VERSION; never NULL. */
 SUPINE_API const char *supine_version(void);
 
 #ifdef __cplusplus

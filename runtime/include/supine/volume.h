@@ -14,8 +14,8 @@
 extern "C" {
 #endif
 
-/** The volume V of a lung less the volume F of its reference surface, mL, as a polynomial of its
- * gains (x, y, z) at given weights:
+/** Coefficients of the volume V of a lung less the volume F of its reference surface, mL, as a
+ * polynomial of its gains x, y and z at given weights:
  *
  *     V - F = of . (x, y, z, yz, xz, xy, xyz) */
 typedef struct supine_volume_form {
@@ -23,37 +23,39 @@ typedef struct supine_volume_form {
 } supine_volume_form;
 
 /** Add the polynomial at K weights to `form`. A volume is a sum of determinants, and each product
- * in one takes one x, one y and one z, so that
+ * in a determinant has one factor from x, one from y and one from z, so that
  *
  *     of[j]     += sum_k L_jk w_k             j = x, y, z
- *     of[3 + j] += sum_kl Q_jkl w_k w_l       the product of the two axes besides j
+ *     of[3 + j] += sum_kl Q_jkl w_k w_l       for the product of the other two axes
  *     of[6]     += sum_klm T_klm w_k w_l w_m
  *
- * @param count      K
- * @param axes       3; or 1 if all axes have one gain: the sums are then added for x, yz and xyz
- * @param linear     L [axes, K], mL
- * @param quadratic  Q [axes, K, K], mL
- * @param third      T [K, K, K], mL
- * @param weights    w [K] */
+ * @param count      number K of weights
+ * @param axes       3; or 1 if all axes have one gain: sums are then added for x, yz and xyz alone
+ * @param linear     [axes, K] L, mL
+ * @param quadratic  [axes, K, K] Q, mL
+ * @param third      [K, K, K] T, mL
+ * @param weights    [K] w */
 SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *linear,
                                        const double *quadratic, const double *third,
                                        const double *weights, supine_volume_form *form);
 
-/** Compute V - F, mL, at three gains. */
+/** Return V - F at the gains x, y and z, mL. */
 SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
 
-/** Compute the coefficients of V - F = c[0] s + c[1] s^2 + c[2] s^3 for the gains s `ratio`. */
+/** Compute the coefficients of V - F = cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL, where the
+ * gains are s ratio[0], s ratio[1] and s ratio[2]. */
 SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
                                          double cubic[3]);
 
-/** Find the scale at which the cubic is `volume`, in the interval around 0 in which it is monotone.
- * @retval SUPINE_ERROR_NUMERICAL  there is none: the surface folds before, or the volume does not
- *                                 change with the scale */
+/** Find the scale s at which cubic[0] s + cubic[1] s^2 + cubic[2] s^3 is `volume`, mL, in the
+ * interval around 0 in which this polynomial is monotone.
+ * @retval SUPINE_ERROR_NUMERICAL  there is none: the surface folds before it holds the volume, or
+ *                                 the volume does not change with the scale */
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                              supine_error *error);
 
-/** Compute the gains relative to those at rest, on the path from full inflation (sigma 0) to rest
- * (sigma 1) and beyond both:
+/** Compute the gains relative to the gains at rest, on the path from full inflation (sigma 0) to
+ * rest (sigma 1) and beyond both:
  *
  *     ratio_j = sigma + 2 bend_j e(sigma)
  *     e = (sigma^3 - sigma) / 2  for sigma <= 1,   (sigma - 1) / sigma^6  for sigma > 1
@@ -61,6 +63,7 @@ SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volum
  * The diaphragm (z) makes most of a quiet breath, the rib cage (x, y) most of a breath near full
  * inflation (Verschakelen 1995, 120 subjects). Below rest (sigma > 1) the bend fades, as it would
  * turn triangles over. A bend of 0 gives a straight path.
+ * @param bend   [3] bend on x, y and z
  * @param ratio  [3], written */
 SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ratio[3]);
 
@@ -69,8 +72,8 @@ SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ra
  * @param rest    volume at rest less F, mL; unused if the bend is 0
  * @param volume  volume to hold less F, mL
  * @param gains   [3], written
- * @retval SUPINE_ERROR_NUMERICAL  there are none: the surface folds before, or the volume does not
- *                                 change with the gains */
+ * @retval SUPINE_ERROR_NUMERICAL  there are none: the surface folds before it holds the volume, or
+ *                                 the volume does not change with the gains */
 SUPINE_API supine_status supine_volume_form_gains(const supine_volume_form *form,
                                                   const double bend[3], double rest, double volume,
                                                   double gains[3], supine_error *error);

@@ -4,14 +4,14 @@
     import supine
 
     lungs = supine.open("lungs.safetensors")
-    pose = lungs.pose("prone:rest+500")        # a posture and a volume: once a state
+    pose = lungs.pose("prone:rest+500")        # a posture and a volume: once for each state
     points = lungs.deform(pose)                # float32 [N, 3], mm, LPS
 
 Lengths are millimetres, volumes millilitres, axes the DICOM patient axes (LPS: +x left, +y posterior,
-+z head). A state is a text as the program's options take it: POSTURE, VOLUME or POSTURE:VOLUME, where a
-volume is rest, full or scan with +ML or -ML, or absolute: 2600mL. Arrays of an open basis are views of its
-memory, read-only. Calls release the interpreter's lock, so that threads may share one basis, each with a
-range of vertices.
++z head). A state is a text, as in the program's options: POSTURE, VOLUME or POSTURE:VOLUME, where a
+volume is rest, full or scan with +ML or -ML, or absolute, such as 2600mL. Arrays of an open basis are
+read-only views of its memory. Calls release the interpreter's lock, so that threads may share one basis,
+each with a range of vertices.
 """
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ COURSES = ("cosine", "ramp", "flow")
 SIMDS = ("auto", "portable", "avx2", "avx512")
 _SUPINE = (0.0, 1.0, 0.0)
 _VOXELS = {"int8": "int8", "uint8": "uint8", "int16": "int16", "uint16": "uint16", "int32": "int32", "uint32": "uint32",
-           "float32": "float", "float64": "double"}  # as NRRD names them
+           "float32": "float", "float64": "double"}  # names of types in NRRD files
 
 
 def _three(gravity: Gravity) -> Any:
@@ -97,15 +97,16 @@ def postures() -> tuple[str, ...]:
 def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale: float = 1 / 3,
            rest_pressure: float = 5.0, course: str = "cosine",
            pv: Optional[ArrayLike] = None) -> Doubles:
-    """Compute the volume in mL above rest at times in s, for repeated breaths as in `supine breathe`; one begins at 0.
+    """Compute the volume in mL above rest at times in s, for repeated breaths as in `supine breathe`; the first breath
+    begins at time 0.
 
-    tidal          mL inhaled
-    rate           breaths a minute
+    tidal          volume of a breath, mL
+    rate           breaths per minute
     inhale         fraction of the breath's time that is inhalation
-    rest_pressure  cmH2O at the end of an exhalation
-    course         course of the pressure, "cosine" or "ramp"; or "flow", a constant flow
+    rest_pressure  pressure at the end of an exhalation, cmH2O
+    course         course of the pressure, "cosine" or "ramp", or "flow" for a constant flow
     pv             [2, 9], for inhalation and exhalation: P_low, P_high (cmH2O), V_low, V_high (mL) and c1 to c5, as
-                   `supine pv fit` finds them; default: a normal adult's
+                   `supine pv fit` finds them; by default those of a normal adult
     """
     times = np.asarray(times, np.float64)
     flat = np.ascontiguousarray(times).ravel()
@@ -117,7 +118,7 @@ def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale
 
 
 class Pose(_c.CPose):
-    """Weights and gains of one state of a basis; `Basis.pose` makes it."""
+    """The weights and gains of one state of a basis, made by `Basis.pose`."""
 
     def fill(self, gain: float) -> Pose:
         """Set every gain to one number, without regard to volumes: for open surfaces and fields."""
@@ -137,7 +138,7 @@ def _address(array: Floats, count: int, name: str, writable: bool = True) -> int
 
 
 def _state(state: Gravity, volume: str = "") -> Any:
-    """Convert a state to a C struct; without a posture it is supine, without a volume it has the default volume."""
+    """Convert a state to a C struct. The default posture is supine; the default volume is that of the basis."""
     wanted = _c.State(_SUPINE)
     if isinstance(state, str):
         _c.state_parse(state.encode(), wanted)
@@ -155,7 +156,7 @@ class _Owner:
         self.pointer = ctypes.c_void_p()
         self.source = source
         if isinstance(source, (bytes, bytearray, memoryview)):
-            self.bytes = np.frombuffer(source, np.uint8)  # held as long as the basis is
+            self.bytes = np.frombuffer(source, np.uint8)  # keep the bytes as long as the basis
             _c.basis_open_memory(self.bytes.ctypes.data, self.bytes.size, options, self.pointer)
         else:
             _c.basis_open(os.fsencode(source), options, self.pointer)
@@ -177,9 +178,9 @@ class Basis:
 
     vertices      float32 [N, 3], reference positions, mm
     triangles     uint32 [M, 3]
-    coefficients  float32 [N, K], or [N, 3, K] where `vector`
-    direction     float32 [N, 3]; None where `vector`
-    modes         float64 [K, (band + 1)^2]
+    coefficients  float32 [N, K], or [N, 3, K] if `vector`
+    direction     float32 [N, 3], mm; None if `vector`
+    modes         float64 [K, (band + 1)^2], coefficients of the weights in spherical harmonics
     bounds        float32 [G, 2, 3], lowest and highest corner of the box around each lung, mm
     lungs         the vertices of each lung: name -> slice
     metadata      the metadata of the file: key -> text
@@ -242,8 +243,8 @@ class Basis:
 
     def pose(self, state: Gravity, volume: str = "", out: Optional[Pose] = None) -> Pose:
         """Compute the weights and gains of a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
-        `pose((0, 0.6, -0.8), "rest")`. Without a volume, the state is at rest if the basis has rest. Give `out` to
-        write into a pose."""
+        `pose((0, 0.6, -0.8), "rest")`. Without a volume, the state is at rest if the basis has rest. `out` is
+        a pose to write into."""
         out = Pose() if out is None else out
         _c.basis_pose(self._c, _state(state, volume), out)
         return out
@@ -251,7 +252,7 @@ class Basis:
     def expected_error(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> Floats:
         """Compute the expected error [N] of the positions of a state, mm, 3-D RMS, if the positions in the scan or in
         state `since` are exact. Half of all points lie within 0.9 times their expected error, 95 % within 1.8 times.
-        It was measured on full breaths in one posture; for a change of posture it is an extrapolation."""
+        These errors were measured on full breaths in one posture; for a change of posture they are extrapolated."""
         sigma = np.empty(self.vertex_count, _FLOAT)
         _c.expected_error(self._c, _state(state, volume), None if since is None else _state(since),
                           _address(sigma, self.vertex_count, "sigma"))
@@ -259,7 +260,7 @@ class Basis:
 
     @property
     def points(self) -> dict[str, int]:
-        """The vertex of each named point of a file of `supine embed`, as a new dict: name -> index."""
+        """The named points of a basis made by `embed`, as a new dict: name -> index of the vertex."""
         names, part = self.tensor("names"), self.tensor("part")
         if names is None or part is None:
             return {}
@@ -269,20 +270,22 @@ class Basis:
 
     def locate(self, vertices: Sequence[int], positions: ArrayLike, state: Gravity = _SUPINE, volume: str = "", *,
                noise: float = 2.0, rigid: bool = False) -> Location:
-        """Find the lungs from observed points of this basis, usually one of `supine embed`: their vertices, and their
-        observed positions [n, 3], mm, in a frame that may be translated from the body's (and rotated, if `rigid`).
-        Without a volume, find it as well.
+        """Find the lungs from observed points of this basis, usually one made by `embed`.
 
-        noise  standard deviation of a position per axis, mm"""
+        vertices   the vertex of each point
+        positions  [n, 3] observed positions, mm, in a frame that may be translated from the frame of the basis and,
+                   if `rigid`, rotated
+        volume     empty if the volume is unknown and must be found
+        noise      standard deviation of a position on each axis, mm"""
         return Location(self, vertices, positions, _state(state, volume), noise, rigid)
 
     def warp(self, image: NDArray[Any], states: Union[str, Sequence[str]], *, step: ArrayLike = (1.0, 1.0, 1.0),
              origin: ArrayLike = (0.0, 0.0, 0.0), labels: bool = False, density: bool = False, since: str = "") -> Any:
-        """Move an image [z, y, x] of the scan into a state, or into each of a list of states. This basis must be that
-        of a grid (`embed` with grid=...). It runs the program `supine`, as `precompute` does. Return an image on the
-        same voxels and of the same type; for a list of states, a list of images.
+        """Move an image [z, y, x] of the scan into a state, or into each of a list of states, by the program `supine`.
+        This basis must be a grid (`embed` with grid=...). Return an image on the same voxels and of the same type;
+        for a list of states, a list of images.
 
-        step     mm from voxel to voxel, (x, y, z); or a vector for each of the three axes, [3, 3], LPS
+        step     distances (x, y, z) from voxel to voxel, mm; or a vector for each of the three axes, [3, 3], mm, LPS
         origin   centre of the first voxel, mm, LPS
         labels   take the nearest voxel instead of interpolating, for label maps
         density  scale Hounsfield units by the change of volume, so that mass is kept
@@ -290,7 +293,7 @@ class Basis:
         """
         image = np.ascontiguousarray(image, image.dtype.newbyteorder("<"))
         if image.ndim != 3 or image.dtype.name not in _VOXELS:
-            raise ValueError(f"image must be [z, y, x], of {', '.join(_VOXELS)}")
+            raise ValueError(f"image must be an array [z, y, x] of {', '.join(_VOXELS)}")
         wanted = [states] if isinstance(states, str) else list(states)
         steps = np.asarray(step, np.float64)
         with tempfile.TemporaryDirectory() as folder:
@@ -320,11 +323,11 @@ class Basis:
         return moved[0] if isinstance(states, str) else moved
 
     def weights(self, pose: Pose) -> Doubles:
-        """Return the weights [K] of a pose, as a view of it."""
+        """Return a view of the weights [K] of a pose."""
         return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
 
     def gains(self, pose: Pose) -> Doubles:
-        """Return the gains [G, 3] of a pose, those of each lung along x, y and z, as a view of it."""
+        """Return a view of the gains [G, 3] of a pose: for each lung those along x, y and z."""
         return np.ctypeslib.as_array(pose.gains)[:len(self.lungs)]
 
     def volumes(self, pose: Pose) -> Doubles:
@@ -342,7 +345,7 @@ class Basis:
     def _range(self, begin: int, end: Optional[int]) -> tuple[int, int]:
         end = self.vertex_count if end is None else end
         if not 0 <= begin <= end <= self.vertex_count:
-            raise IndexError(f"vertices {begin} to {end} of {self.vertex_count}")
+            raise IndexError(f"vertices {begin} to {end}: the range must lie within 0 to {self.vertex_count}")
         return end, 3 * (end - begin)
 
     def deform(self, pose: Pose, out: Optional[Floats] = None, begin: int = 0, end: Optional[int] = None) -> Floats:
@@ -353,7 +356,7 @@ class Basis:
         return out
 
     def displace(self, pose: Pose, out: Optional[Floats] = None, begin: int = 0, end: Optional[int] = None) -> Floats:
-        """Compute the displacements [N, 3] from the reference surface, mm; parameters as `deform`."""
+        """Compute the displacements [N, 3] from the reference surface, mm. Parameters: as `deform`."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         _c.displace_range(self._c, pose, begin, end, _address(out, size, "out"))
@@ -373,7 +376,7 @@ class Basis:
 
     def deform_batch(self, poses: Sequence[Pose], out: Optional[Floats] = None, begin: int = 0,
                      end: Optional[int] = None) -> Floats:
-        """Compute the positions [T, N, 3] in T poses at once."""
+        """Compute the positions [T, N, 3], mm, in each of T poses."""
         count = len(poses)
         end, size = self._range(begin, end)
         out = np.empty((count, end - begin, 3), _FLOAT) if out is None else out
@@ -392,7 +395,7 @@ class Location:
 
     volume, volume_error   volume of all lungs and its standard deviation, mL (0 if the volume was given)
     rotation, translation  observed = rotation @ (body + correction) + translation
-    distances, sigmas      [n] distance of each point from its prediction by all others, and its expected value, mm
+    distances, sigmas      [n] distance of each point from its prediction by all others, and its standard deviation, mm
     outliers               [n] True for observations that do not fit; the result ignores them
     log_evidence           log likelihood, to compare results that differ only in the posture
     """
@@ -402,11 +405,11 @@ class Location:
         places = np.asarray(positions, np.float64).reshape(-1, 3)
         count = len(places)
         if len(vertices) != count:
-            raise ValueError(f"{len(vertices)} vertices have {count} positions")
+            raise ValueError(f"the number of vertices, {len(vertices)}, is not the number of positions, {count}")
         seen = (_c.Observation * max(count, 1))(*((int(v), tuple(p), noise)
                                                   for v, p in zip(vertices, places, strict=True)))
         residuals = (_c.Residual * max(count, 1))()
-        self._space = np.empty(_c.locate_space(count))  # memory that the C library's fit uses
+        self._space = np.empty(_c.locate_space(count))  # memory of the fit in the C library
         self._c = _c.Location()
         task = _c.LocateTask(inside._c, count, seen, state, rigid)
         _c.locate(task, residuals, self._space.ctypes.data, self._c)
@@ -430,9 +433,9 @@ class Location:
 def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True) -> Basis:
     """Open a basis file, or one in memory (bytes), and check all of it.
 
-    storage  how numbers are kept in memory: "exact", "int16", "mixed"; or "auto", the smallest of these whose error is
-             at most 0.005 mm
-    simd     instruction set: "portable", "avx2", "avx512"; or "auto", the widest of this processor
+    storage  kind of numbers in memory: "exact", "int16", "mixed"; or "auto", the smallest with an error of at most
+             0.005 mm
+    simd     instruction set: "portable", "avx2", "avx512"; or "auto", the widest set of this processor
     normals  False ignores the file's normals, to save memory
     """
     return Basis(source, storage=storage, simd=simd, normals=normals)
@@ -445,9 +448,9 @@ def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **o
         precompute((vertices, faces), (vertices, faces))        # one surface for each lung
         precompute("lungs.nii.gz", resting={"supine": "2600mL"}, output="lungs.safetensors")
 
-    The basis has the vertices of the left lung first, those of each lung in the given order. Options are those of
-    `supine precompute --help`: held_out=200 gives --held-out 200, True gives a flag, a tuple one value of several
-    numbers, a dict one value a=b,c=d, a list repeats the option. Without `output`, the basis is only in memory.
+    The basis has the vertices of the left lung first, and the vertices of each lung in the given order. Options are
+    those of `supine precompute --help`: held_out=200 stands for --held-out 200, the value True for a flag, a tuple
+    for a,b,c and a dict for a=b,c=d; a list repeats the option. Without `output`, the basis is only in memory.
     Warnings of the program become Python warnings.
 
     progress  called with the fraction done, 0 to 1; an exception from it stops the program
@@ -464,7 +467,7 @@ def embed(lungs: Basis, *content: Any, progress: Optional[_program.Progress] = N
         embed(lungs, (vertices, faces), "airways.ply")          # meshes
         embed(lungs, "labels.nii.gz", labels="7=nodule")        # and all options of `supine embed --help`
 
-    Options, output and progress as in `precompute`."""
+    Options, `output` and `progress`: as in `precompute`."""
     return _made("embed", lungs._owner.source, content, options, progress)
 
 

@@ -12,7 +12,7 @@ MODES_MAX, LUNGS_MAX = 256, 16
 
 
 def _load() -> ctypes.CDLL:
-    """Load the library in this folder, where wheels have it, or else the system's."""
+    """Load the library from this folder, where wheels have it, or else from the system."""
     beside = os.path.join(os.path.dirname(__file__), "libsupine_runtime.so")
     return ctypes.CDLL(beside if os.path.exists(beside) else ctypes.util.find_library("supine_runtime"))
 
@@ -60,16 +60,16 @@ class NumericalError(Error, ArithmeticError):
 _ERRORS = (Error, ArgumentError, OutOfMemoryError, ReadError, FormatError, MeshError, OpenSurfaceError,
            UnsupportedError, Error, NumericalError, Error)
 for _kind in _ERRORS:
-    _kind.__module__ = "supine"  # as users see them
+    _kind.__module__ = "supine"  # the package that users import
 
 
 class CError(ctypes.Structure):
-    """supine_error"""
+    """The C struct supine_error."""
     _fields_ = [("status", c_int), ("message", c_char * 512)]
 
 
 class Volume(ctypes.Structure):
-    """supine_volume"""
+    """The C struct supine_volume."""
     _fields_ = [("kind", c_int), ("ml", c_double)]
 
 
@@ -78,17 +78,17 @@ class LungVolume(ctypes.Structure):
 
 
 class State(ctypes.Structure):
-    """supine_state"""
+    """The C struct supine_state."""
     _fields_ = [("gravity", c_double * 3), ("volume", Volume), ("lung_count", c_size_t), ("lungs", LungVolume * 2)]
 
 
 class CPose(ctypes.Structure):
-    """supine_pose"""
+    """The C struct supine_pose."""
     _fields_ = [("weights", c_double * MODES_MAX), ("gains", c_double * 3 * LUNGS_MAX)]
 
 
 class GivenPose:
-    """Argument type of a pose: refuses None, which POINTER(CPose) would accept."""
+    """The type of arguments that are a pose. It refuses None, which POINTER(CPose) would accept."""
     @staticmethod
     def from_param(pose: Any) -> Any:
         if not isinstance(pose, CPose):
@@ -97,12 +97,12 @@ class GivenPose:
 
 
 class Options(ctypes.Structure):
-    """supine_basis_options"""
+    """The C struct supine_basis_options."""
     _fields_ = [("size", c_size_t), ("storage", c_int), ("simd", c_int), ("without_normals", c_bool)]
 
 
 class Info(ctypes.Structure):
-    """supine_basis_info"""
+    """The C struct supine_basis_info."""
     _fields_ = [("vertex_count", c_size_t), ("triangle_count", c_size_t), ("mode_count", c_size_t),
                 ("band", c_size_t), ("lung_count", c_size_t), ("lung_begin", POINTER(c_size_t)),
                 ("vector", c_bool), ("has_volume", c_bool), ("storage", c_int), ("simd", c_int),
@@ -116,7 +116,7 @@ class Info(ctypes.Structure):
 
 
 class Tensor(ctypes.Structure):
-    """supine_tensor"""
+    """The C struct supine_tensor."""
     _fields_ = [("name", c_char_p), ("dtype", c_int), ("rank", c_size_t), ("shape", c_size_t * 4), ("data", c_void_p)]
 
 
@@ -125,36 +125,36 @@ DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16)
 
 
 class Metadata(ctypes.Structure):
-    """supine_metadata"""
+    """The C struct supine_metadata."""
     _fields_ = [("key", c_char_p), ("value", c_char_p)]
 
 
 class Breath(ctypes.Structure):
-    """supine_pv_breath"""
+    """The C struct supine_pv_breath."""
     _fields_ = [("tidal", c_double), ("rate", c_double), ("inhale_fraction", c_double),
                 ("rest_pressure", c_double), ("course", c_int)]
 
 
 class Observation(ctypes.Structure):
-    """supine_observation"""
+    """The C struct supine_observation."""
     _fields_ = [("vertex", c_size_t), ("position", c_double * 3), ("noise", c_double)]
 
 
 class LocateTask(ctypes.Structure):
-    """supine_locate_task"""
+    """The C struct supine_locate_task."""
     _fields_ = [("inside", c_void_p), ("count", c_size_t), ("observed", POINTER(Observation)), ("state", State),
                 ("rigid", c_bool)]
 
 
 class Location(ctypes.Structure):
-    """supine_location"""
+    """The C struct supine_location."""
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
                 ("log_evidence", c_double), ("outlier_count", c_size_t), ("fit", c_void_p)]
 
 
 class Residual(ctypes.Structure):
-    """supine_locate_residual"""
+    """The C struct supine_locate_residual."""
     _fields_ = [("distance", c_double), ("sigma", c_double), ("outlier", c_bool)]
 
 
@@ -165,7 +165,7 @@ def _declare(name: str, result: Any, *arguments: Any) -> Any:
 
 
 def _checked(name: str, *arguments: Any) -> Any:
-    """Declare a function whose last argument is a supine_error; it raises an exception if it fails."""
+    """Declare a function whose last argument is a supine_error; it raises an exception on failure."""
     function = _declare(name, c_int, *arguments, POINTER(CError))
 
     def call(*given: Any) -> None:
@@ -177,7 +177,7 @@ def _checked(name: str, *arguments: Any) -> Any:
 
 
 def fail(status: int, message: bytes = b"") -> None:
-    """Raise the exception of a status."""
+    """Raise the exception for a status."""
     text = message or status_string(status)
     raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text.decode(errors="replace"))
 
@@ -213,5 +213,5 @@ normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 
 
 def string(text: Optional[bytes]) -> str:
-    """Decode UTF-8; None gives ""."""
+    """Decode UTF-8; return "" for None."""
     return (text or b"").decode(errors="replace")

@@ -30,8 +30,8 @@ def _find() -> str:
 
 
 def _words(options: dict[str, Any]) -> list[str]:
-    """Convert options to arguments of the program: held_out=200 gives --held-out 200, True a flag, a tuple a,b,c, a
-    dict a=b,c=d, and a list repeats the option."""
+    """Convert options to arguments of the program: held_out=200 becomes --held-out 200, the value True a flag, a tuple
+    a,b,c and a dict a=b,c=d; a list repeats the option."""
     words: list[str] = []
     for name, given in options.items():
         for value in given if isinstance(given, list) else [given]:
@@ -58,7 +58,7 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
         raise ValueError(f"faces must be integers [M, 3], not {corners.dtype} {list(corners.shape)}")
     records = np.empty(len(corners), [("count", "u1"), ("corner", "<i4", 3)])
     records["count"] = 3
-    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # indices out of range stay so: the program reports them
+    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # out of range stays out of range: the program reports it
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n"
                    b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
@@ -67,7 +67,7 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
 
 
 def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[float]]]) -> None:
-    """Write points [n, 3], or a dict of names and points, as CSV."""
+    """Write points [n, 3], or a dict from names to points, as CSV."""
     names = [[name] for name in points] if isinstance(points, Mapping) else None
     places = np.asarray(list(points.values()) if isinstance(points, Mapping) else points, np.float64)
     if places.size == 0 or places.shape[-1] != 3:
@@ -80,14 +80,14 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
 
 
 def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
-    """Read the program's terminal until it ends: call `progress` with its progress, and return all other lines."""
+    """Read the terminal until the program ends: call `progress` with each fraction done; return all other lines."""
     said, line = "", b""
     if progress is not None:
         progress(0.0)
     while True:
         try:
             byte = os.read(terminal, 4096)
-        except OSError:  # the other end is closed
+        except OSError:  # the program closed its end
             byte = b""
         *lines, line = re.split(b"[\r\n]+", line + byte.replace(b"\x1b[K", b""))
         for text in (each.decode(errors="replace") for each in lines + ([] if byte else [line])):
@@ -102,11 +102,11 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
 
 def run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
         progress: Optional[Progress]) -> str:
-    """Run a command and return its standard output. Its warnings become Python warnings, its errors exceptions with
-    its message.
+    """Run a command and return its standard output. Its warnings become Python warnings. Its errors become exceptions
+    with the same message.
 
-    names  names of temporary files to show in messages instead of their paths: path -> name"""
-    import pty  # Windows does not have it
+    names  what messages show instead of the paths of temporary files: path -> name"""
+    import pty  # not at the top, as Windows does not have this module
 
     arguments = [_find(), command, *_words(options), "--", *operands]
     terminal, other_end = pty.openpty()
@@ -115,7 +115,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
         os.close(other_end)
         try:
             said = _listen(terminal, command, progress)
-        except BaseException:  # also Ctrl+C and exceptions of `progress`
+        except BaseException:  # including Ctrl+C and exceptions of `progress`
             process.terminate()
             raise
         finally:
@@ -136,7 +136,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
             kind = _c.ReadError
         elif status == 2 and command == "precompute":
             kind = _c.MeshError
-        raise kind(what or f"supine {command} ended with {status}")
+        raise kind(what or f"supine {command} ended with exit status {status}")
     if progress is not None:
         progress(1.0)
     return text
@@ -146,7 +146,7 @@ def make(command: str, lungs: Any, content: Sequence[Any], options: dict[str, An
          progress: Optional[Progress]) -> tuple[Any, str]:
     """Run a command that makes a basis; return the basis, as bytes or as the path `output`, and the standard output.
 
-    lungs    None, or a basis: its path, or its bytes
+    lungs    None, or the path or the bytes of a basis
     content  paths, (vertices, faces) or points; arrays are written to a temporary folder"""
     with tempfile.TemporaryDirectory(prefix="supine-") as folder:
         operands: list[str] = []
