@@ -19,7 +19,8 @@ typedef struct block {
 } block;
 
 /* Evaluate whole tiles of one lung for `count` poses. `positions` points to the first position of
- * pose 0; the positions of pose j begin j * apart floats later. */
+ * pose 0; the positions of pose j begin j * apart floats later. The nine parameters are the poses,
+ * the range of tiles, and the work space and output of a batch. */
 static void batch_tiles(const supine_basis *basis, size_t count, block *scratch, supine_tiles *wide,
                         size_t first, size_t tiles, float *positions, size_t apart, bool stream) {
   const size_t fit = BLOCK_BYTES / wide->stride;

@@ -215,14 +215,14 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(0, "3000.00 mL (-3000.00 mL)", "deform a.safetensors --posture supine -o a.ply");
   EXPECT(0, "the scan holds 4000 mL, but --resting and --scanned say 3000 mL",
          "precompute low.ply --scanned rest --resting supine=3000mL --band 2 -o a.safetensors");
-  EXPECT(0, "deep law; scan supine at rest",
+  EXPECT(0, "deep law\n  scan supine at rest",
          "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");
   EXPECT(1, "deep or paper", "precompute low.ply --law shallow -o b.safetensors");
   EXPECT(1, "leave --scanned out",
          "precompute low.ply --law paper --scanned supine:rest -o b.safetensors");
   EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply"); /* rest, as scanned */
   assert_true(positions_apart("low.ply", "rested.ply") < 0.005);
-  EXPECT(0, "paper law; scan taken as the reference",
+  EXPECT(0, "paper law\n  scan taken as the reference",
          "precompute lungs.ply --law paper --band 3 -o a.safetensors");
   EXPECT(0, "+500.00 mL", "deform a.safetensors --posture prone -o a.ply");
   assert_int_equal(count_files("b."), 0);
