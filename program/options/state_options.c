@@ -223,7 +223,7 @@ supine_status supine_options_pose(const supine_basis *basis, const char *command
   supine_state state = wanted->state;
   memcpy(state.gravity, gravity, sizeof state.gravity);
   const supine_status status = supine_basis_pose(basis, &state, pose, error);
-  return status == SUPINE_OK && supine_basis_get_info(basis)->has_volume
+  return status == SUPINE_OK
              ? supine_options_pose_check(basis, command, wanted->allow_folds, pose, error)
              : status;
 }
