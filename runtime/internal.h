@@ -74,21 +74,11 @@ static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
 
-/** Replace the positions of rigid parts among vertices begin <= i < end of a target, see rigid.h.
- */
-void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, const supine_target *target);
-
 /** Return the target that begins `count` vertices after this one. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
 /** Compute supine_basis_info.storage_error of the present tiles. */
 double supine_basis_storage_error(const supine_basis *basis);
-
-/** Compute the factors that the kernels multiply by: K weights times the units of the packed
- * coefficients, then the three gains of a lung.
- * @param folded  [K + 3], written */
-void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded);
 
 /** Set the gains of a pose to the one gain for all lungs and axes at which the lungs hold `volume`
  * mL more than the reference surface.

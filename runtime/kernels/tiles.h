@@ -55,11 +55,6 @@ static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
 
-/** Return the byte offset of mode k's words from those of the first mode, in a compact storage. */
-static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
-  return 64 * (k < paired ? k / 2 : (paired + 1) / 2 + (k - paired) / 3);
-}
-
 /** Fill in everything but `bytes` and `reference_unit` for a storage, never AUTO. The function is
  * inline, so that the layout is a constant if the number of modes is. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
@@ -121,15 +116,10 @@ typedef struct supine_target {
   bool add_reference; /**< write positions; false: displacements */
   bool stream;        /**< use stores that bypass the caches */
   supine_prefetch prefetch;
-  /** [16] or NULL. If several calls write one array: the last numbers of one call, which the next
-   * call stores, as both share a cache line. */
-  float *held;
-  bool continues; /**< a call before this one left numbers in `held` */
-  bool continued; /**< leave numbers for a call after this one */
 } supine_target;
 
-/** Evaluate tiles first <= t < first + count of one lung, with the weights and gains of
- * supine_fold, into the first 16 count vertices of the target. */
+/** Evaluate tiles first <= t < first + count of one lung, with its weights and gains [K + 3], into
+ * the first 16 count vertices of the target. */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
 
@@ -144,18 +134,11 @@ static inline void supine_stream_fence(bool stream) {
 #endif
 }
 
-/** Convert tiles first <= t < first + count to floats in the EXACT layout `to`: reference positions
- * in mm, coefficients and directions in their packed units, so that the same folded weights apply.
- */
-typedef void supine_widen_tiles(const supine_tiles *tiles, size_t first, size_t count,
-                                supine_tiles *to);
-
 typedef struct supine_kernels {
   supine_deform_tiles *deform;
   /** Evaluate unit normals from tiles of supine_tiles_layout_lit into one array, with three weights
    * for each word, in the order of the modes. */
   supine_deform_tiles *light;
-  supine_widen_tiles *widen;
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;
