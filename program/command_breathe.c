@@ -335,9 +335,6 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &p.basis, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_options_basis_closed(p.basis, path, error);
-  }
-  if (status == SUPINE_OK) {
     status = play(&p, count, given->made_by, error);
   }
   end(&p);

@@ -195,10 +195,6 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  status = supine_options_basis_closed(basis, path, error);
-  if (status != SUPINE_OK) {
-    return status;
-  }
   if (supine_basis_metadata(basis, "content") != NULL) { /* the basis is from 'supine embed' */
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,

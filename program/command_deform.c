@@ -115,21 +115,19 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   if (status == SUPINE_OK) {
     status = deformed_mesh(basis, &moved->pose, &mesh);
   }
-  if (info->has_volume) {
-    supine_basis_volumes(basis, &moved->pose, volumes);
-  }
+  supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL; /* points have no normals */
   save->expected_error = moved->expected.sigma;
   save->lung = lung == NULL ? NULL : lung->data;
   save->fields = fields;
-  save->field_count = info->has_volume ? 2 : 1;
+  save->field_count = sizeof fields / sizeof *fields;
   if (status == SUPINE_OK) {
     status = supine_mesh_save(path, &mesh, save, error);
   }
   if (status == SUPINE_OK) {
     report(path, gravity, &mesh, &from, moved->from.name,
-           info->has_volume && supine_basis_metadata(basis, "content") == NULL);
+           supine_basis_metadata(basis, "content") == NULL);
     supine_options_expected_print(&moved->expected, stdout);
   }
   free(normals);
@@ -293,7 +291,7 @@ const supine_command supine_command_deform = {
     .notes =
         "Examples:\n"
         "  supine deform lungs.safetensors --posture prone --volume rest+500 -o prone.vtp\n"
-        "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=rest,right=rest+250 "
+        "  supine deform lungs.safetensors --posture 0.6:0:-0.8 --volume left=rest,right=rest+250 "
         "-o out.ply\n"
         "  supine deform nodules.safetensors --posture prone --from supine:rest -o nodules.csv\n"
         "  supine deform grid.safetensors --posture prone --image ct.nii.gz --density -o "

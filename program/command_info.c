@@ -176,7 +176,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_basis *basis = NULL;
   double *energy = NULL;
   json_t *described = NULL;
-  supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error);
+  static const supine_basis_options options = {sizeof options, .without_normals = true};
+  supine_status status = supine_basis_open_with(path, &options, &basis, error);
   if (status == SUPINE_OK) {
     energy = calloc(supine_basis_get_info(basis)->band + 1, sizeof *energy);
     status = energy != NULL ? band_energy(basis, energy, error) : SUPINE_ERROR_MEMORY;

@@ -8,10 +8,10 @@
 #include <supine/locate.h>
 #include <supine/posture.h>
 
+#include "sh/base/csv.h"
 #include "sh/base/output.h"
 
 #include "program/inside.h"
-#include "program/observed.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
@@ -43,6 +43,89 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
+
+typedef struct observations {
+  size_t count;
+  supine_observation *points;
+} observations;
+
+/* Find the vertex of a name that has only one. */
+static supine_status find_vertex(const supine_csv *csv, const char *text,
+                                 const supine_basis *inside, const supine_command_names *names,
+                                 size_t *vertex, supine_error *error) {
+  const size_t n = supine_basis_get_info(inside)->vertex_count;
+  size_t found = 0;
+  for (size_t i = 0; i < n; ++i) {
+    if (strcmp(names->text[names->part[i]], text) == 0) {
+      *vertex = i;
+      ++found;
+    }
+  }
+  if (found == 1) {
+    return SUPINE_OK;
+  }
+  if (found > 1) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s, line %zu: '%s' has %zu vertices, so it is not a point: give "
+                            "names of points",
+                            csv->path, csv->line, text, found);
+  }
+  const char *nearest =
+      supine_options_suggest(text, (const char *const *)names->text, names->count);
+  return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                          "%s, line %zu: no point '%s' in the file of --points%s%s%s", csv->path,
+                          csv->line, text, nearest == NULL ? "" : "; did you mean '",
+                          nearest == NULL ? "" : nearest, nearest == NULL ? "" : "'?");
+}
+
+static supine_status read_rows(supine_csv *csv, const supine_basis *inside,
+                               const supine_command_names *names, double noise,
+                               observations *observed, supine_error *error) {
+  static const char *const axes[] = {"x", "y", "z"};
+  for (bool more = true;;) {
+    supine_status status = supine_csv_next(csv, &more, error);
+    if (status != SUPINE_OK || !more) {
+      return status;
+    }
+    if (observed->count == SUPINE_LOCATE_POINTS_MAX) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s, line %zu: more than %d points; leave some out", csv->path,
+                              csv->line, (int)SUPINE_LOCATE_POINTS_MAX);
+    }
+    supine_observation *point = &observed->points[observed->count];
+    point->noise = noise;
+    status = find_vertex(csv, supine_csv_text(csv, 0), inside, names, &point->vertex, error);
+    for (size_t i = 0; i < 3 && status == SUPINE_OK; ++i) {
+      status = supine_csv_number(csv, 1 + i, axes[i], &point->position[i], error);
+    }
+    if (status != SUPINE_OK) {
+      return status;
+    }
+    ++observed->count;
+  }
+}
+
+/* Read a CSV file with the columns name, x, y, z. */
+static supine_status load_observed(const char *path, const supine_basis *inside,
+                                   const supine_command_names *names, double noise,
+                                   observations *observed, supine_error *error) {
+  static const char *const columns[] = {"name", "x", "y", "z"};
+  supine_csv csv = {0};
+  observed->points = calloc(SUPINE_LOCATE_POINTS_MAX, sizeof *observed->points);
+  if (observed->points == NULL) {
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path);
+  }
+  supine_status status = supine_csv_open(path, columns, 4, 4, &csv, error);
+  if (status == SUPINE_OK) {
+    status = read_rows(&csv, inside, names, noise, observed, error);
+  }
+  if (status == SUPINE_OK && observed->count == 0) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: no observed point: give at least one row name,x,y,z", path);
+  }
+  supine_csv_close(&csv);
+  return status;
+}
 
 enum { POSTURES = 6 };
 static const char *const postures[POSTURES] = {"supine", "prone",   "left",
@@ -219,7 +302,7 @@ static supine_status write_points(const char *path, const supine_basis *inside,
 
 /* Print the state, the motion and the residuals that were found. */
 static void print(const request *wanted, const supine_command_names *names,
-                  const supine_command_observed *observed, size_t n, const lungs_found *located) {
+                  const observations *observed, size_t n, const lungs_found *located) {
   const supine_location *best = located->best;
   const double share = located->share[best - located->location];
   const double *r = best->rotation;
@@ -277,7 +360,7 @@ static void print(const request *wanted, const supine_command_names *names,
 
 static supine_status locate(const request *wanted, const supine_basis *lungs,
                             const supine_basis *inside, const supine_command_names *names,
-                            const supine_command_observed *observed, supine_error *error) {
+                            const observations *observed, supine_error *error) {
   const size_t length = strlen(wanted->output);
   const bool csv = strcasecmp(wanted->output + length - 4, ".csv") == 0;
   const supine_basis *shown = csv ? inside : lungs;
@@ -308,7 +391,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_basis *lungs = NULL;
   supine_basis *inside = NULL;
   supine_command_names names = {0};
-  supine_command_observed observed = {0};
+  observations observed = {0};
   supine_status status = SUPINE_OK;
   if (wanted->orientation.given) {
     status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
@@ -320,13 +403,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     status = supine_command_inside_open(lungs, wanted->points, &inside, &names, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_command_observed_load(given->operand[1], inside, &names, wanted->noise,
-                                          &observed, error);
+    status = load_observed(given->operand[1], inside, &names, wanted->noise, &observed, error);
   }
   if (status == SUPINE_OK) {
     status = locate(wanted, lungs, inside, &names, &observed, error);
   }
-  supine_command_observed_free(&observed);
+  free(observed.points);
   supine_command_names_close(&names);
   supine_basis_close(inside);
   supine_basis_close(lungs);

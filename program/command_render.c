@@ -75,9 +75,6 @@ static void close_studio(studio *s) {
 static supine_status open_studio(studio *s, const char *path, supine_error *error) {
   supine_status status = supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error);
   if (status == SUPINE_OK) {
-    status = supine_options_basis_closed(s->basis, path, error);
-  }
-  if (status == SUPINE_OK) {
     status = supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error);
   }
   if (status == SUPINE_OK) {

@@ -6,12 +6,12 @@
 
 #include "program/export/export.h"
 #include "program/inside.h"
-#include "program/observed.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
 #include "program/options/pv.h"
 #include "program/options/state_options.h"
 #include "program/stream/peer.h"
+#include "program/stream/server.h"
 #include "program/stream/tracked_patient.h"
 #include "sh/base/output.h"
 #include "sh/base/vec3.h"
@@ -172,15 +172,40 @@ typedef struct observed_points {
   supine_stream_observed observed;
 } observed_points;
 
+/* Open the structures of --points, and list the single points, whose positions messages may set, as
+ * not seen yet. */
 static supine_status open_points(const supine_basis *basis, const request *wanted,
                                  observed_points *points, supine_error *error) {
-  points->observed.ras = wanted->space == 1;
+  const supine_command_names *names = &points->names;
+  supine_stream_observed *observed = &points->observed;
   const supine_status status =
       supine_command_inside_open(basis, wanted->points, &points->inside, &points->names, error);
-  return status == SUPINE_OK
-             ? supine_command_observed_names(wanted->points, points->inside, &points->names,
-                                             wanted->noise, &points->observed, error)
-             : status;
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  const size_t n = supine_basis_get_info(points->inside)->vertex_count;
+  size_t count = 0;
+  for (size_t i = 0; i < n; ++i) { /* the vertices of a name are contiguous */
+    const uint32_t part = names->part[names->order[i]];
+    const bool first = i == 0 || names->part[names->order[i - 1]] != part;
+    const bool last = i + 1 == n || names->part[names->order[i + 1]] != part;
+    if (first && last && count++ < SUPINE_LOCATE_POINTS_MAX) {
+      observed->name[count - 1] = names->text[part];
+      observed->last[count - 1] = (supine_observation){
+          .vertex = names->order[i], .position = {(double)NAN}, .noise = wanted->noise};
+    }
+  }
+  if (count == 0 || count > SUPINE_LOCATE_POINTS_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points: give 1 to %d",
+                            wanted->points, count, (int)SUPINE_LOCATE_POINTS_MAX);
+  }
+  observed->ras = wanted->space == 1;
+  observed->inside = points->inside;
+  observed->count = count;
+  observed->space = calloc(supine_locate_space(count), sizeof *observed->space);
+  return observed->space != NULL
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", wanted->points);
 }
 
 static void close_points(observed_points *points) {
@@ -336,9 +361,6 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_basis *basis = NULL;
   supine_status status =
       supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_basis_closed(basis, given->operand[0], error);
-  }
   if (status == SUPINE_OK) {
     status = stream(basis, given->operand[0], wanted, error);
   }

@@ -46,13 +46,11 @@ static supine_status deform(const supine_basis *basis, const supine_pose *pose, 
                                 supine_basis_get_info(basis)->vertex_count);
 }
 
-/* Compute the volume of all lungs in a pose, mL; 0 for an open surface. */
+/* Compute the volume of all lungs in a pose, mL. */
 static double held(const supine_basis *basis, const supine_pose *pose) {
-  double volumes[SUPINE_LUNGS_MAX] = {0.0};
+  double volumes[SUPINE_LUNGS_MAX];
   double sum = 0.0;
-  if (supine_basis_get_info(basis)->has_volume) {
-    supine_basis_volumes(basis, pose, volumes);
-  }
+  supine_basis_volumes(basis, pose, volumes);
   for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
     sum += volumes[lung];
   }

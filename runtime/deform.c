@@ -4,7 +4,10 @@
 
 #include "runtime/rigid.h"
 
-void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded) {
+/* Compute the factors that the kernels multiply by: K weights times the units of the packed
+ * coefficients, then the three gains of a lung.
+ * @param folded  [K + 3], written */
+static void fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded) {
   const size_t modes = basis->info.mode_count;
   for (size_t k = 0; k < modes; ++k) {
     folded[k] = (float)(pose->weights[k] * basis->mode_scale[k]);
@@ -50,7 +53,8 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
 /* Number of vertices of a rigid part that are evaluated at once. */
 enum { RIGID_BLOCK = 256 };
 
-void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
+/* Replace the positions of rigid parts among vertices begin <= i < end of a target, see rigid.h. */
+static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   for (size_t part = 0; part < basis->rigid_count; ++part) {
     const size_t first = basis->rigid[2 * part];
@@ -64,7 +68,7 @@ void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
     while (first >= basis->lung_begin[lung + 1]) {
       ++lung;
     }
-    supine_fold(basis, pose, lung, folded);
+    fold(basis, pose, lung, folded);
     for (size_t at = first; at < last; at += RIGID_BLOCK) {
       float x[3 * RIGID_BLOCK];
       const size_t next = last - at < RIGID_BLOCK ? last : at + RIGID_BLOCK;
@@ -84,36 +88,64 @@ void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
   }
 }
 
+/* Evaluate vertices begin <= i < end, of any lungs, without regard to rigid parts. */
 static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, supine_target target) {
-  target.stream = basis->stream && end - begin > STREAM_RANGE;
-  target.prefetch = basis->prefetch;
+                         size_t end, const supine_target *target) {
   float folded[SUPINE_MODES_MAX + 3];
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
     if (first < last) {
-      const supine_target here = supine_target_after(&target, first - begin);
-      supine_fold(basis, pose, lung, folded);
+      const supine_target here = supine_target_after(target, first - begin);
+      fold(basis, pose, lung, folded);
       supine_deform_lung(basis->kernels->deform, &basis->tiles, folded, first, last, &here);
     }
   }
+}
+
+static void deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, supine_target target) {
+  target.stream = basis->stream && end - begin > STREAM_RANGE;
+  target.prefetch = basis->prefetch;
+  deform_lungs(basis, pose, begin, end, &target);
   supine_stream_fence(target.stream);
-  supine_deform_rigid(basis, pose, begin, end, &target);
+  deform_rigid(basis, pose, begin, end, &target);
 }
 
 void supine_deform_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, float *xyz) {
-  deform_lungs(basis, pose, begin, end, (supine_target){.xyz = xyz, .add_reference = true});
+  deform_range(basis, pose, begin, end, (supine_target){.xyz = xyz, .add_reference = true});
 }
 
 void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz) {
   supine_deform_range(basis, pose, 0, basis->info.vertex_count, xyz);
 }
 
+void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
+                         size_t begin, size_t end, float *xyz) {
+  enum { BLOCK_BYTES = 1 << 18 }; /* of tiles that stay in the cache for all poses */
+  const size_t block = BLOCK_BYTES / basis->tiles.stride * TILE;
+  const size_t apart = 3 * (end - begin);
+  supine_target target = {.add_reference = true,
+                          .stream =
+                              (double)count * (double)apart * sizeof *xyz > STREAM_BATCH_BYTES};
+  for (size_t at = begin, next; at < end; at = next) {
+    next = (at / block + 1) * block < end ? (at / block + 1) * block : end;
+    for (size_t j = 0; j < count; ++j) {
+      target.xyz = xyz + j * apart + 3 * (at - begin);
+      deform_lungs(basis, &poses[j], at, next, &target);
+    }
+  }
+  supine_stream_fence(target.stream);
+  for (size_t j = 0; j < count; ++j) {
+    target.xyz = xyz + j * apart;
+    deform_rigid(basis, &poses[j], begin, end, &target);
+  }
+}
+
 void supine_displace_range(const supine_basis *basis, const supine_pose *pose, size_t begin,
                            size_t end, float *xyz) {
-  deform_lungs(basis, pose, begin, end, (supine_target){.xyz = xyz});
+  deform_range(basis, pose, begin, end, (supine_target){.xyz = xyz});
 }
 
 void supine_step(size_t count, const float *restrict step, float *restrict xyz) {

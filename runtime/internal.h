@@ -69,25 +69,16 @@ static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
 }
 
-/** Evaluate vertices begin <= i < end, all of one lung, with the weights and gains of supine_fold.
+/** Evaluate vertices begin <= i < end, all of one lung, with the weights and gains of the lung.
  * The target begins at vertex `begin`. */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
-
-/** Move the rigid parts (rigid.h) among vertices begin <= i < end of a target that begins at
- * `begin`. */
-void supine_deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, const supine_target *target);
 
 /** Return a target that begins `count` vertices after another. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
 /** Compute supine_basis_info.storage_error for the current tiles, mm. */
 double supine_basis_storage_error(const supine_basis *basis);
-
-/** Compute the factors of the kernels: K weights times mode_scale, then the three gains of a lung.
- * @param folded  [K + 3], written */
-void supine_fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded);
 
 /** Set all gains of a pose to the one number that adds `volume` mL to the reference volume.
  * @param pose  its weights are read, its gains written

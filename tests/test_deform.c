@@ -422,12 +422,12 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 1, 3, 691);
   check_batch(24000, 16, false, 64, 0, 24000); /* larger than the cache, whole cache lines */
   check_batch(23999, 16, false, 64, 1, 23998); /* shared cache lines */
-  check_batch(90, 16, false, 300, 0, 90);      /* more than one group of weights */
+  check_batch(90, 16, false, 300, 0, 90);
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);
   check_batch(90, 5, true, 5, 0, 90);
   check_batch(90, 255, false, 18, 1, 90);
-  check_batch(90, 256, true, 3, 1, 90); /* one widened tile outgrows the block */
+  check_batch(90, 256, true, 3, 1, 90);
 }
 
 /* Five modes fill two vec4s of each lung; previous content is overwritten. */

@@ -12,13 +12,6 @@ const supine_option supine_options_as_scanned[] = {
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
-supine_status supine_options_basis_open(const char *path, supine_storage storage,
-                                        supine_basis **basis, supine_error *error) {
-  const supine_basis_options options = {sizeof options, .storage = storage,
-                                        .without_normals = true};
-  return supine_basis_open_with(path, &options, basis, error);
-}
-
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
                                           supine_error *error) {
   return supine_basis_get_info(basis)->has_volume
@@ -27,6 +20,14 @@ supine_status supine_options_basis_closed(const supine_basis *basis, const char 
                                 "%s: its surface is open and encloses no volume: close the mesh "
                                 "before 'supine precompute'",
                                 path);
+}
+
+supine_status supine_options_basis_open(const char *path, supine_storage storage,
+                                        supine_basis **basis, supine_error *error) {
+  const supine_basis_options options = {sizeof options, .storage = storage,
+                                        .without_normals = true};
+  const supine_status status = supine_basis_open_with(path, &options, basis, error);
+  return status == SUPINE_OK ? supine_options_basis_closed(*basis, path, error) : status;
 }
 
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,

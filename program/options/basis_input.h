@@ -15,7 +15,10 @@
 /* --as-scanned, into a bool: write outputs in the axes and units of the scan. */
 extern const supine_option supine_options_as_scanned[];
 
-/* Open a basis without its stored normals: commands compute normals from the triangles. */
+/* Open a basis without its stored normals: commands compute normals from the triangles. Close it also
+ * after a failure.
+ * @retval SUPINE_ERROR_OPEN_SURFACE  its surface encloses no volume
+ * @retval those of supine_basis_open_with */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 

@@ -193,8 +193,8 @@ INLINE void writer_put(writer *w, vf v) {
   w->to += LANES;
 }
 
-INLINE void writer_close(const writer *w, const supine_target *target) {
-  (void)w, (void)target;
+INLINE void writer_close(const writer *w) {
+  (void)w;
 }
 #endif
 
@@ -250,7 +250,7 @@ INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t fi
     put_tile(&out, &xyz);
   }
   if (count > 0) {
-    writer_close(&out, target);
+    writer_close(&out);
   }
 }
 
@@ -327,7 +327,7 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
     put_tile(&out, &xyz);
   }
   if (count > 0) {
-    writer_close(&out, target);
+    writer_close(&out);
   }
 }
 
@@ -343,35 +343,4 @@ static void light(const supine_tiles *tiles, const float *w, size_t first, size_
   }
 }
 
-/* Convert the compact coefficients of one axis to floats in packed units. */
-static void widen_coefficients(const supine_tiles *tiles, const unsigned char *at, vf *to) {
-  const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
-  for (size_t k = 0; k < tiles->modes; ++k) {
-    const int shift = k >= paired ? 11 * (int)((k - paired) % 3) : k % 2 == 0 ? 16 : 0;
-    for (size_t q = 0; q < GROUPS; ++q) {
-      *to++ = integers((vu)load(at + supine_tiles_words_begin(paired, k) + sizeof(vf) * q), shift);
-    }
-  }
-}
-
-static void widen(const supine_tiles *tiles, size_t first, size_t count, supine_tiles *to) {
-  for (size_t t = 0; t < count; ++t) {
-    const unsigned char *tile = tiles->bytes + (first + t) * tiles->stride;
-    unsigned char *wide = to->bytes + t * to->stride;
-    if (!supine_tiles_compact(tiles->storage)) {
-      memcpy(wide, tile, tiles->stride); /* the tile is in the EXACT layout already */
-      continue;
-    }
-    for (size_t axis = 0; axis < tiles->axes; ++axis) {
-      widen_coefficients(tiles, tile + axis * tiles->axis_bytes,
-                         (vf *)(void *)(wide + axis * to->axis_bytes));
-    }
-    if (tiles->axes == 1) {
-      *(triples *)(void *)(wide + to->direction_begin) =
-          numbers(tile + tiles->direction_begin, true);
-    }
-    *(triples *)(void *)(wide + to->reference_begin) = reference_positions(tiles, tile, true);
-  }
-}
-
-const supine_kernels KERNELS = {deform, light, widen};
+const supine_kernels KERNELS = {deform, light};

@@ -25,5 +25,5 @@ static inline __attribute__((always_inline)) void stream8(float *to, __m256 v) {
 #define STREAM(to, v) stream8(to, v)
 #include "runtime/kernels/kernel.h"
 #else
-const supine_kernels supine_kernels_avx2 = {NULL, NULL, NULL};
+const supine_kernels supine_kernels_avx2 = {NULL, NULL};
 #endif

@@ -19,15 +19,14 @@ typedef struct writer {
 
 static inline __attribute__((always_inline)) writer writer_open(const supine_target *target) {
   float *to = target->xyz;
-  const bool resume = target->held != NULL && target->continues;
   const size_t offset = (uintptr_t)to / sizeof *to % 16;
   const __m512i count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  return (writer){resume ? _mm512_loadu_ps(target->held) : _mm512_setzero_ps(),
+  return (writer){_mm512_setzero_ps(),
                   _mm512_add_epi32(count, _mm512_set1_epi32(16 - (int)offset)),
                   to,
                   offset,
                   target->stream,
-                  !resume && offset != 0};
+                  offset != 0};
 }
 
 static inline __attribute__((always_inline)) void writer_put(writer *w, __m512 next) {
@@ -43,13 +42,9 @@ static inline __attribute__((always_inline)) void writer_put(writer *w, __m512 n
   w->to += 16;
 }
 
-/* Store the end of the last vector, which does not fill a line, or keep the vector in `held` if
- * another call continues the array. */
-static inline __attribute__((always_inline)) void writer_close(const writer *w,
-                                                               const supine_target *target) {
-  if (target->held != NULL && target->continued) {
-    _mm512_storeu_ps(target->held, w->last);
-  } else if (w->stream && w->offset != 0) {
+/* Store the end of the last vector, which does not fill a line. */
+static inline __attribute__((always_inline)) void writer_close(const writer *w) {
+  if (w->stream && w->offset != 0) {
     _mm512_mask_storeu_ps(w->to - 16, (__mmask16)(0xFFFFU << (16 - w->offset)), w->last);
   }
 }
@@ -61,5 +56,5 @@ static inline __attribute__((always_inline)) void writer_close(const writer *w,
 #define OWN_WRITER
 #include "runtime/kernels/kernel.h"
 #else
-const supine_kernels supine_kernels_avx512 = {NULL, NULL, NULL};
+const supine_kernels supine_kernels_avx512 = {NULL, NULL};
 #endif

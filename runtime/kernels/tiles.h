@@ -55,11 +55,6 @@ static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
 
-/** Return the offset in bytes of mode k's words from the words of mode 0, in a compact storage. */
-static inline size_t supine_tiles_words_begin(size_t paired, size_t k) {
-  return 64 * (k < paired ? k / 2 : (paired + 1) / 2 + (k - paired) / 3);
-}
-
 /** Fill in all members but `bytes` and `reference_unit` for a storage other than AUTO. The function
  * is inline, so that the layout is a constant where the number of modes is a constant. */
 static inline void supine_tiles_layout(supine_tiles *tiles, supine_storage storage, size_t modes,
@@ -120,15 +115,10 @@ typedef struct supine_target {
   bool add_reference; /**< write positions; false: displacements */
   bool stream;        /**< use stores that bypass the caches */
   supine_prefetch prefetch;
-  /** [16] or NULL. If consecutive calls write one array: the last numbers of a call, which share a
-   * cache line with the first numbers of the next call and are stored by the next call. */
-  float *held;
-  bool continues; /**< the previous call left numbers in `held` */
-  bool continued; /**< leave numbers in `held` for the next call */
 } supine_target;
 
 /** Evaluate tiles first <= t < first + count of one lung, and write their vertices to the target.
- * @param weights  weights and gains of supine_fold */
+ * @param weights  [K + 3] weights and gains of the lung */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
 
@@ -143,17 +133,11 @@ static inline void supine_stream_fence(bool stream) {
 #endif
 }
 
-/** Convert tiles first <= t < first + count to floats in the EXACT layout `to`: reference positions
- * in mm, coefficients and directions in packed units, as the weights of supine_fold require. */
-typedef void supine_widen_tiles(const supine_tiles *tiles, size_t first, size_t count,
-                                supine_tiles *to);
-
 typedef struct supine_kernels {
   supine_deform_tiles *deform;
   /** Evaluate unit normals from tiles of supine_tiles_layout_lit. `weights` has three numbers for
    * each word of a coordinate, in the order of the modes. */
   supine_deform_tiles *light;
-  supine_widen_tiles *widen;
 } supine_kernels;
 
 extern const supine_kernels supine_kernels_portable;
