@@ -291,7 +291,7 @@ const supine_command supine_command_deform = {
     .notes =
         "Examples:\n"
         "  supine deform lungs.safetensors --posture prone --volume rest+500 -o prone.vtp\n"
-        "  supine deform lungs.safetensors --posture 0.6:0:-0.8 --volume left=rest,right=rest+250 "
+        "  supine deform lungs.safetensors --gravity 0.6,0,-0.8 --volume left=rest,right=rest+250 "
         "-o out.ply\n"
         "  supine deform nodules.safetensors --posture prone --from supine:rest -o nodules.csv\n"
         "  supine deform grid.safetensors --posture prone --image ct.nii.gz --density -o "

@@ -56,8 +56,8 @@ TEST(test_help_every_command_prints_usage) {
 
 TEST(test_deform_all_spellings_of_prone_same_file) {
   static const char *const ways[] = {"--posture prone",    "--posture HFP",
-                                     "--posture ffp",      "--posture 0:-1:0",
-                                     "--posture 0:-7.5:0", "--posture upright-90"};
+                                     "--posture ffp",      "--gravity 0,-1,0",
+                                     "--gravity 0,-7.5,0", "--posture upright-90"};
   static char first[1 << 20];
   static char other[1 << 20];
   EXPECT(0, "from the scan, 2820.14 mL (-3179.86 mL)", "deform lungs.safetensors %s -o way.stl",
@@ -230,14 +230,13 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
 
 TEST(test_orientation_bad_values_refused) {
   EXPECT(1, "did you mean 'prone'", "deform lungs.safetensors --posture pron -o c.ply");
-  EXPECT(1, "not all 0", "deform lungs.safetensors --posture 0:0:0 -o c.ply");
-  EXPECT(1, "three numbers", "deform lungs.safetensors --posture 0:nan:0 -o c.ply");
-  EXPECT(1, "three numbers", "deform lungs.safetensors --posture 0:1 -o c.ply");
-  EXPECT(1, "give --posture once",
-         "deform lungs.safetensors --posture supine --posture 0:1:0 -o c.ply");
+  EXPECT(1, "not all 0", "deform lungs.safetensors --gravity 0,0,0 -o c.ply");
+  EXPECT(1, "three finite numbers", "deform lungs.safetensors --gravity 0,nan,0 -o c.ply");
+  EXPECT(1, "three finite numbers", "deform lungs.safetensors --gravity 0,1 -o c.ply");
+  EXPECT(1, "not both", "deform lungs.safetensors --posture supine --gravity 0,1,0 -o c.ply");
   EXPECT(1, "the posture is missing", "deform lungs.safetensors -o c.ply");
   assert_int_equal(count_files("c."), 0);
-  EXPECT(0, "gravity 0,0.6,0.8", "deform lungs.safetensors --posture 0:3:4 -o d.ply");
+  EXPECT(0, "gravity 0,0.6,0.8", "deform lungs.safetensors --gravity 0,3,4 -o d.ply");
 }
 
 TEST(test_output_impossible_exit_4_no_file_left) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options --posture, --volume and --from, and the poses computed from them. */
+/* Options --posture, --gravity, --volume and --from, and the poses computed from them. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +26,24 @@ static supine_status read_posture(const char *text, void *field, supine_error *e
   return supine_options_posture(text, field, error);
 }
 
+/* Read X,Y,Z as the posture X:Y:Z. */
+static supine_status read_gravity(const char *text, void *field, supine_error *error) {
+  char posture[128];
+  double numbers[3];
+  if (!supine_options_parse_numbers(text, 3, numbers) || strlen(text) >= sizeof posture) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  (void)snprintf(posture, sizeof posture, "%s", text);
+  for (char *comma = posture; (comma = strchr(comma, ',')) != NULL;) {
+    *comma = ':';
+  }
+  return supine_options_posture(posture, field, error);
+}
+
+#define GRAVITY                                                                                    \
+  SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),         \
+      .rivals = "gravity"
+
 static const char *const postures[] = {"supine",  "prone",    "left", "right",
                                        "upright", "inverted", NULL};
 
@@ -33,18 +51,21 @@ const supine_option supine_options_orientation[] = {
     {"posture", 0, "POSTURE",
      "supine, prone, left or right (left or right lateral decubitus), upright, inverted (head "
      "down), or a DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. "
-     "+DEGREES turns gravity from the back towards the head: supine+15 is Trendelenburg. X:Y:Z is "
-     "gravity in body axes, to the left, the back and the head: 0:1:0 is supine",
-     SUPINE_FILLS(supine_orientation, gravity), SUPINE_SAYS_GIVEN(supine_orientation, given),
-     .rivals = "posture", .read = read_posture, .choices = postures},
+     "+DEGREES turns gravity from the back towards the head: supine+15 is Trendelenburg",
+     GRAVITY, .read = read_posture, .choices = postures},
+    {"gravity", 0, "X,Y,Z",
+     "instead of a posture, the direction of gravity in body axes: x to the left, y to the back, z "
+     "to the head; supine is 0,1,0",
+     GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},
     {.name = NULL}};
 
 supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
                                      supine_error *error) {
   memcpy(gravity, orientation->gravity, sizeof orientation->gravity);
-  return orientation->given ? SUPINE_OK
-                            : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                               "the posture is missing: give --posture");
+  return orientation->given
+             ? SUPINE_OK
+             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "the posture is missing: give --posture or --gravity");
 }
 
 supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options --posture, --volume and --from, and the poses computed from them. */
+/* Options --posture, --gravity, --volume and --from, and the poses computed from them. */
 #ifndef SUPINE_OPTIONS_STATE_H
 #define SUPINE_OPTIONS_STATE_H
 
@@ -7,7 +7,7 @@
 
 #include "program/options/command.h"
 
-/* --posture: a table that fills a supine_orientation. */
+/* --posture and --gravity: a table that fills a supine_orientation. */
 extern const supine_option supine_options_orientation[];
 
 typedef struct supine_orientation {
