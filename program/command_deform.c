@@ -48,31 +48,23 @@ static const supine_option table[] = {
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-/* Make the surface of a pose. */
+/* Compute the surface of a pose, and its normals [N, 3] (NULL: not wanted). */
 static supine_status deformed_mesh(const supine_basis *basis, const supine_pose *pose,
-                                   supine_mesh *mesh) {
-  const supine_status status = supine_options_basis_mesh(basis, mesh);
+                                   supine_mesh *mesh, float *normals) {
+  const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
+  float *xyz = malloc(count * sizeof *xyz);
+  supine_status status = xyz == NULL ? SUPINE_ERROR_MEMORY : supine_options_basis_mesh(basis, mesh);
   if (status == SUPINE_OK) {
-    free(mesh->vertices);
-    mesh->vertices = supine_options_basis_positions(basis, pose);
-  }
-  return status == SUPINE_OK && mesh->vertices == NULL ? SUPINE_ERROR_MEMORY : status;
-}
-
-/* Compute the normals of a surface, [N, 3], which the caller frees; NULL: no memory. */
-static float *find_normals(const supine_basis *basis, const supine_pose *pose) {
-  const size_t bytes = 3 * supine_basis_get_info(basis)->vertex_count * sizeof(float);
-  float *xyz = malloc(bytes);
-  float *normals = malloc(bytes);
-  if (xyz != NULL && normals != NULL) {
     supine_deform(basis, pose, xyz);
+    for (size_t i = 0; i < count; ++i) {
+      mesh->vertices[i] = (double)xyz[i];
+    }
+  }
+  if (status == SUPINE_OK && normals != NULL) {
     supine_normals(basis, xyz, normals);
-  } else {
-    free(normals);
-    normals = NULL;
   }
   free(xyz);
-  return normals;
+  return status;
 }
 
 static double largest_displacement(const supine_mesh *rest, const supine_mesh *mesh) {
@@ -109,11 +101,11 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
                                       {"volume_mL", info->lung_count, volumes}};
   supine_mesh from = {0};
   supine_mesh mesh = {0};
-  float *normals = find_normals(basis, &moved->pose);
+  float *normals = malloc(3 * info->vertex_count * sizeof *normals);
   supine_status status =
-      normals != NULL ? deformed_mesh(basis, &moved->from.pose, &from) : SUPINE_ERROR_MEMORY;
+      normals != NULL ? deformed_mesh(basis, &moved->from.pose, &from, NULL) : SUPINE_ERROR_MEMORY;
   if (status == SUPINE_OK) {
-    status = deformed_mesh(basis, &moved->pose, &mesh);
+    status = deformed_mesh(basis, &moved->pose, &mesh, normals);
   }
   supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;

@@ -58,14 +58,6 @@ static void add_fact(json_t *object, const char *name, const supine_basis *basis
   }
 }
 
-static json_t *list_numbers(const double *values, size_t count) {
-  json_t *list = json_array();
-  for (size_t k = 0; k < count; ++k) {
-    (void)json_array_append_new(list, json_real(values[k]));
-  }
-  return list;
-}
-
 /* Add the number of embedded vertices in each lung and outside, and of rigid parts. */
 static void add_content(json_t *root, const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -120,7 +112,8 @@ static void add_errors(json_t *root, const supine_basis *basis, const char *key)
   const supine_tensor *tensor = supine_basis_tensor(basis, key);
   const bool valid = tensor != NULL && tensor->dtype == SUPINE_F64 && tensor->rank == 1;
   (void)json_object_set_new(root, key,
-                            valid ? list_numbers(tensor->data, tensor->shape[0]) : json_array());
+                            valid ? supine_options_json_numbers(tensor->shape[0], tensor->data)
+                                  : json_array());
 }
 
 static supine_status describe(const char *path, const supine_basis *basis, const double *energy,
@@ -155,8 +148,9 @@ static supine_status describe(const char *path, const supine_basis *basis, const
   }
   (void)json_object_set_new(root, "error", of);
   const supine_status status = add_expected(root, basis, error);
-  (void)json_object_set_new(root, "energy_per_band",
-                            list_numbers(energy, info->triangle_count > 0 ? info->band + 1 : 0));
+  (void)json_object_set_new(
+      root, "energy_per_band",
+      supine_options_json_numbers(info->triangle_count > 0 ? info->band + 1 : 0, energy));
   add_errors(root, basis, "error_harmonics");
   add_errors(root, basis, "error_modes");
   *described = root;

@@ -31,23 +31,15 @@ static const supine_option table[] = {
      .standard = "1", SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
     {.name = NULL}};
 
-/* Make a list of numbers; those that are not finite become null. */
-static json_t *json_numbers(size_t count, const double *numbers) {
-  json_t *list = json_array();
-  for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(list, isfinite(numbers[i]) ? json_real(numbers[i]) : json_null());
-  }
-  return list;
-}
-
 static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *report) {
-  return json_pack("{s:I, s:o, s:o, s:o, s:o, s:o, s:f, s:f}", "samples",
-                   (json_int_t)report->samples, "pressure_cmH2O", json_numbers(2, curve->pressure),
-                   "volume_mL", json_numbers(2, curve->volume), "volume_interval_mL",
-                   json_numbers(2, report->volume_interval), "control",
-                   json_numbers(SUPINE_PV_CONTROLS, curve->control), "control_interval",
-                   json_numbers(SUPINE_PV_CONTROLS, report->control_interval), "rms_mL",
-                   report->rms, "rms_percent", report->rms_percent);
+  return json_pack(
+      "{s:I, s:o, s:o, s:o, s:o, s:o, s:f, s:f}", "samples", (json_int_t)report->samples,
+      "pressure_cmH2O", supine_options_json_numbers(2, curve->pressure), "volume_mL",
+      supine_options_json_numbers(2, curve->volume), "volume_interval_mL",
+      supine_options_json_numbers(2, report->volume_interval), "control",
+      supine_options_json_numbers(SUPINE_PV_CONTROLS, curve->control), "control_interval",
+      supine_options_json_numbers(SUPINE_PV_CONTROLS, report->control_interval), "rms_mL",
+      report->rms, "rms_percent", report->rms_percent);
 }
 
 static supine_status run_fit(const char *path, const request *chosen, supine_error *error) {

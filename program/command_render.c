@@ -31,7 +31,6 @@ typedef struct request {
   size_t width, height; /* pixels; 0: automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
-  unsigned theme; /* 0: light; 1: dark */
   bool turns;
   breath_turn turn;
 } request;
@@ -152,7 +151,6 @@ static supine_picture make_picture(studio *s) {
                           .largest = largest,
                           .beyond = s->ends[1] > largest,
                           .transparency = 1.0 - opacity,
-                          .dark = wanted->theme == 1,
                           .width = wanted->width != 0 ? wanted->width : 20 + 440 * count,
                           .height = wanted->height != 0 ? wanted->height
                                                         : 120 + 480 * wanted->view_count};
@@ -311,8 +309,6 @@ static supine_status read_views(const char *text, void *field, supine_error *err
   }
 }
 
-static const char *const themes[] = {"light", "dark", NULL};
-
 static const supine_option table[] = {
     {"posture", 0, "LIST", "postures to draw, up to 8", SUPINE_FILLS(request, postures)},
     {"turn", 0, "FROM:TO:SECONDS",
@@ -344,8 +340,6 @@ static const supine_option table[] = {
      "opacity of the lungs, 0.05 to 1 (opaque); default 1, with --inside 0.35",
      SUPINE_FILLS(request, opacity), .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1",
      .more = true},
-    {"theme", 0, "light|dark", "colours of the picture", SUPINE_FILLS(request, theme),
-     .choices = themes, .standard = "light", .more = true},
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
@@ -412,7 +406,7 @@ const supine_command supine_command_render = {
         "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone \\\n"
         "      -o inside.png\n"
         "  supine render lungs.safetensors --posture prone --from supine:rest \\\n"
-        "      --view anterior,lateral,posterior --theme dark -o prone.png",
+        "      --view anterior,lateral,posterior -o prone.png",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .begin = begin,

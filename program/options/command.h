@@ -49,6 +49,9 @@ void supine_options_print(json_t *value, bool json);
 /* Return a text from outside, such as a file name, as a JSON string; invalid UTF-8 is replaced. */
 json_t *supine_options_json_text(const char *text);
 
+/* Return numbers as a JSON array; those that are not finite become null. */
+json_t *supine_options_json_numbers(size_t count, const double *numbers);
+
 /* Write the command line into `text` [size], for the metadata of a file; of each path only the part
  * after its last slash. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);

@@ -272,6 +272,14 @@ json_t *supine_options_json_text(const char *text) {
   return json_string(supine_text_make_utf8(printable));
 }
 
+json_t *supine_options_json_numbers(size_t count, const double *numbers) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < count; ++i) {
+    (void)json_array_append_new(list, isfinite(numbers[i]) ? json_real(numbers[i]) : json_null());
+  }
+  return list;
+}
+
 void supine_options_print(json_t *value, bool json) {
   if (json) {
     (void)json_dumpf(value, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));

@@ -354,17 +354,15 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
   if (scene->shell) {
     const float cover = 0.12F + 0.7F * powf(1.0F - facing, 2.5F);
     rgba[3] = (unsigned char)lrintf(255.0F * cover);
-    memset(rgba, (int)lrintf(cover * (scene->dark ? 215.0F : 70.0F)), 3);
+    memset(rgba, (int)lrintf(cover * 70.0F), 3);
     return;
   }
   rgba[3] = 255;
   const float shine = 0.08F * powf(lambert(n, half), 48.0F);
-  const float rim = (scene->dark ? 1.0F : 0.0F) * powf(1.0F - facing, 3.0F);
-  static const float rims[3] = {0.10F, 0.14F, 0.20F};
   const float t = fminf(1.0F, fmaxf(0.0F, value / (float)scene->largest));
   const float *base = c->colours[(size_t)lrintf(t * SHADES)];
   for (int k = 0; k < 3; ++k) {
-    const float lit = base[k] * light + shine + rim * rims[k];
+    const float lit = base[k] * light + shine;
     rgba[k] = c->encode[(size_t)lrintf(fminf(1.0F, fmaxf(0.0F, lit)) * SHADES)];
   }
 }

@@ -33,26 +33,13 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
-typedef struct theme {
-  double top[3], bottom[3]; /* ends of the background gradient */
-  double card[3], edge[3];
-  double text[3], faint[3];
-} theme;
-
-static const theme themes[2] = {
-    {{0.985, 0.988, 0.992},
-     {0.925, 0.941, 0.957},
-     {1, 1, 1},
-     {0.86, 0.885, 0.91},
-     {0.09, 0.13, 0.18},
-     {0.37, 0.43, 0.49}},
-    {{0.075, 0.09, 0.115},
-     {0.045, 0.055, 0.07},
-     {0.105, 0.125, 0.155},
-     {0.17, 0.2, 0.24},
-     {0.94, 0.955, 0.97},
-     {0.6, 0.655, 0.71}},
-};
+/* Colours: the ends of the background's gradient, cells and their edges, text. */
+static const double ground_top[3] = {0.985, 0.988, 0.992};
+static const double ground_bottom[3] = {0.925, 0.941, 0.957};
+static const double card[3] = {1, 1, 1};
+static const double edge[3] = {0.86, 0.885, 0.91};
+static const double ink[3] = {0.09, 0.13, 0.18};
+static const double faint[3] = {0.37, 0.43, 0.49};
 static const double accent[3] = {0.91, 0.33, 0.17}; /* colour of the arrow of gravity */
 
 /* Layout of the picture, pixels. */
@@ -111,10 +98,10 @@ static void rounded(cairo_t *cr, double x, double y, double width, double height
   cairo.close_path(cr);
 }
 
-static void ground(cairo_t *cr, const supine_picture *picture, const theme *style) {
+static void ground(cairo_t *cr, const supine_picture *picture) {
   cairo_pattern_t *fade = cairo.pattern_create_linear(0, 0, 0, (double)picture->height);
-  cairo.pattern_add_color_stop_rgb(fade, 0, style->top[0], style->top[1], style->top[2]);
-  cairo.pattern_add_color_stop_rgb(fade, 1, style->bottom[0], style->bottom[1], style->bottom[2]);
+  cairo.pattern_add_color_stop_rgb(fade, 0, ground_top[0], ground_top[1], ground_top[2]);
+  cairo.pattern_add_color_stop_rgb(fade, 1, ground_bottom[0], ground_bottom[1], ground_bottom[2]);
   cairo.set_source(cr, fade);
   cairo.paint(cr);
   cairo.pattern_destroy(fade);
@@ -161,15 +148,15 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
 
 /* Draw the ball that shows the body's axes and gravity. */
 static void ball(cairo_t *cr, double x, double y, double radius, supine_view view,
-                 const double gravity[3], const theme *style) {
+                 const double gravity[3]) {
   static const char *const ends[3][2] = {{"L", "R"}, {"P", "A"}, {"H", "F"}};
   double axes[3][3];
   double seen[3] = {0, 0, 0};
   supine_render_view_axes(view, axes);
   cairo.arc(cr, x, y, radius, 0, 2 * pi);
-  cairo.set_source_rgba(cr, style->faint[0], style->faint[1], style->faint[2], 0.13);
+  cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.13);
   cairo.fill_preserve(cr);
-  cairo.set_source_rgba(cr, style->faint[0], style->faint[1], style->faint[2], 0.5);
+  cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.5);
   cairo.set_line_width(cr, fmax(0.6, radius * 0.035));
   cairo.stroke(cr);
   font(cr, radius * 0.4, false);
@@ -182,13 +169,13 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
     if (hypot(dx, dy) < 0.3) {
       continue;
     }
-    cairo.set_source_rgba(cr, style->faint[0], style->faint[1], style->faint[2], 0.45);
+    cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.45);
     cairo.move_to(cr, x - 0.62 * radius * dx, y - 0.62 * radius * dy);
     cairo.line_to(cr, x + 0.62 * radius * dx, y + 0.62 * radius * dy);
     cairo.stroke(cr);
     for (int end = 0; end < 2; ++end) {
       const double reach = (end == 0 ? 0.8 : -0.8) * radius;
-      cairo.set_source_rgba(cr, style->text[0], style->text[1], style->text[2], 0.8);
+      cairo.set_source_rgba(cr, ink[0], ink[1], ink[2], 0.8);
       text(cr, x + reach * dx, y + reach * dy + 0.145 * radius, 0.5, ends[axis][end]);
     }
   }
@@ -208,11 +195,10 @@ static void place_name(double (*box)[3], size_t count, double line) {
   }
 }
 
-/* Draw discs and dots at the marks, then the labels over them. Eight parameters: what to draw, and
+/* Draw discs and dots at the marks, then the labels over them. Seven parameters: what to draw, and
  * where: the scene lies at (x, y), and `size` is that of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
-                                const supine_marks *marks, double size, double x, double y,
-                                const theme *style) {
+                                const supine_marks *marks, double size, double x, double y) {
   double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
   double(*box)[3] = malloc((marks->count + 1) * sizeof *box);
   size_t placed = 0;
@@ -237,7 +223,7 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
         colour(cr, rgb);
         cairo.fill_preserve(cr);
         cairo.set_line_width(cr, size * 0.1);
-        colour(cr, mark->point ? style->text : rgb);
+        colour(cr, mark->point ? ink : rgb);
         cairo.stroke(cr);
         continue;
       }
@@ -249,10 +235,10 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
       place_name(box, placed++, size);
       cairo.move_to(cr, x + own[0], y + own[1]);
       cairo.text_path(cr, mark->label);
-      cairo.set_source_rgba(cr, style->card[0], style->card[1], style->card[2], 0.85);
+      cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
       cairo.set_line_width(cr, size * 0.25);
       cairo.stroke_preserve(cr);
-      colour(cr, style->text);
+      colour(cr, ink);
       cairo.fill(cr);
     }
   }
@@ -289,7 +275,6 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
                               .line_step = bar->step,
                               .colours = picture->colours,
                               .view = view,
-                              .dark = picture->dark,
                               .shell = picture->transparency > 0,
                               .width = (size_t)width,
                               .height = (size_t)height,
@@ -301,8 +286,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
     cairo.paint_with_alpha(cr, picture->transparency > 0 ? fmin(1, 2 * (1 - picture->transparency))
                                                          : 1);
     if (panel->marks != NULL) {
-      status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y),
-                          &themes[picture->dark ? 1 : 0]);
+      status = draw_marks(cr, renderer, &scene, panel->marks, size, floor(x), floor(y));
     }
   }
   cairo.surface_destroy(image);
@@ -314,7 +298,6 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
-  const theme *style = &themes[picture->dark ? 1 : 0];
   const supine_panel *panel = &picture->panel[column];
   const supine_view view = picture->view[row];
   const double gap = at->margin / 2;
@@ -324,17 +307,17 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
   const double words = x + 2 * radius + at->font * 1.5;
   const double room = x + at->cell_width - words - at->font;
   rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
-  colour(cr, style->card);
+  colour(cr, card);
   cairo.fill_preserve(cr);
-  colour(cr, style->edge);
+  colour(cr, edge);
   cairo.set_line_width(cr, 1);
   cairo.stroke(cr);
   ball(cr, x + radius + at->font * 0.7, y + at->strip / 2 + at->font * 0.2, radius, view,
-       panel->gravity, style);
-  colour(cr, style->text);
+       panel->gravity);
+  colour(cr, ink);
   fitted_text(cr, words, y + at->strip / 2 - at->font * 0.25, at->font * 1.3, true, room,
               panel->title);
-  colour(cr, style->faint);
+  colour(cr, faint);
   fitted_text(cr, words, y + at->strip / 2 + at->font * 0.95, at->font * 0.82, false, room,
               panel->subtitle);
   fitted_text(cr, words, y + at->strip / 2 + at->font * 2.0, at->font * 0.82, false, room,
@@ -347,7 +330,6 @@ static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_p
 static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout *at,
                        const bar_scale *bar) {
   enum { STOPS = 64 };
-  const theme *style = &themes[picture->dark ? 1 : 0];
   const double width = fmin((double)picture->width - 2 * at->margin, 34 * at->font);
   const double x = ((double)picture->width - width) / 2;
   const double y = (double)picture->height - at->bar + at->font * 1.65;
@@ -368,9 +350,9 @@ static void colour_bar(cairo_t *cr, const supine_picture *picture, const layout 
   cairo.fill(cr);
   cairo.pattern_destroy(fade);
   font(cr, at->font * 0.85, false);
-  colour(cr, style->text);
+  colour(cr, ink);
   text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
-  colour(cr, style->faint);
+  colour(cr, faint);
   cairo.set_line_width(cr, 1);
   for (int i = 0; i * bar->step <= bar->largest * (1 + 1e-9); ++i) {
     char number[32];
@@ -401,27 +383,21 @@ static layout make_layout(const supine_picture *picture) {
   return at;
 }
 
-/* Enlarge an extent to contain all postures of a picture in one view. */
-static void widen(supine_renderer *renderer, const supine_picture *picture, size_t row,
-                  double extent[4]) {
-  for (size_t column = 0; column < picture->panel_count; ++column) {
-    const supine_scene scene = {.pose = picture->panel[column].pose, .view = picture->view[row]};
-    supine_render_extent(renderer, &scene, extent);
-  }
-}
-
 void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
                                   double (*extent)[4]) {
   for (size_t row = 0; row < picture->view_count; ++row) {
-    widen(renderer, picture, row, extent[row]);
+    for (size_t column = 0; column < picture->panel_count; ++column) {
+      const supine_scene scene = {.pose = picture->panel[column].pose, .view = picture->view[row]};
+      supine_render_extent(renderer, &scene, extent[row]);
+    }
   }
 }
 
 static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                              supine_error *error) {
-  const theme *style = &themes[picture->dark ? 1 : 0];
   const layout at = make_layout(picture);
   const bar_scale bar = {picture->largest, supine_render_bar_step(picture->largest)};
+  double own[SUPINE_VIEWS_MAX][4];
   supine_status status = SUPINE_OK;
   if (at.font < 4) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -431,16 +407,17 @@ static supine_status compose(cairo_t *cr, supine_renderer *renderer, const supin
                             picture->panel_count == 1 ? "" : "s", picture->view_count,
                             picture->view_count == 1 ? "" : "s");
   }
-  ground(cr, picture, style);
-  for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
-    double extent[4] = SUPINE_EXTENT_NONE;
-    if (picture->extent != NULL) {
-      memcpy(extent, picture->extent[row], sizeof extent);
-    } else {
-      widen(renderer, picture, row, extent);
+  ground(cr, picture);
+  if (picture->extent == NULL) {
+    for (size_t row = 0; row < picture->view_count; ++row) {
+      memcpy(own[row], (const double[])SUPINE_EXTENT_NONE, sizeof own[row]);
     }
+    supine_render_picture_extent(renderer, picture, own);
+  }
+  for (size_t row = 0; row < picture->view_count && status == SUPINE_OK; ++row) {
     for (size_t column = 0; column < picture->panel_count && status == SUPINE_OK; ++column) {
-      status = cell(cr, renderer, picture, &at, &bar, column, row, extent, error);
+      status = cell(cr, renderer, picture, &at, &bar, column, row,
+                    picture->extent != NULL ? picture->extent[row] : own[row], error);
     }
   }
   colour_bar(cr, picture, &at, &bar);

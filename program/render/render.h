@@ -65,7 +65,6 @@ typedef struct supine_scene {
   double line_step;   /**< distance between contour lines, mm; 0: none */
   supine_colours colours;
   supine_view view;
-  bool dark;            /**< shade for a dark background */
   bool shell;           /**< draw a grey, transparent shell with a dark outline, without colours */
   size_t width, height; /**< pixels */
   const double *extent; /**< [4] by supine_render_extent; NULL: that of this scene */
@@ -133,7 +132,6 @@ typedef struct supine_picture {
                                   picture */
   supine_colours colours;
   bool beyond; /**< some values exceed `largest`: draw the bar with a pointed end */
-  bool dark;
   size_t width, height; /**< pixels */
 } supine_picture;
 
