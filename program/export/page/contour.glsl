@@ -8,7 +8,7 @@ float contour(float value, float spacing) {
   return (1.0 - smoothstep(0.3, 1.2, away)) * (1.0 - smoothstep(0.3, 0.8, width)) * step(0.5, steps);
 }
 
-/** Darken a colour where a contour line is; a spacing of 0 means no lines. */
+/** Darken a colour on contour lines of a value; no lines if `spacing` is 0. */
 vec3 lined(vec3 colour, float value, float spacing) {
   return spacing > 0.0 ? mix(colour, colour * 0.45, 0.5 * contour(value, spacing)) : colour;
 }

@@ -3,9 +3,9 @@
 
 const $ = (id) => document.getElementById(id);
 
-/** Call drag(dx, dy, shifts) when one pointer moves, where `shifts` means to shift instead of turn;
- * pinch(ratio, dx, dy, x, y) when two do; tap(event) when one is released without having moved. Distances
- * are CSS pixels. Return a function that tells whether a drag is under way. */
+/** Call drag(dx, dy, shifts) when one pointer moves, with `shifts` true if the shift key or another button is
+ * down; pinch(ratio, dx, dy, x, y) when two pointers move; tap(event) when a pointer is released where it was
+ * pressed. Distances are CSS pixels. Return a function that returns whether a drag is under way. */
 function onDrag(element, drag, pinch, tap) {
   const pointers = new Map();
   let far = 0; // CSS pixels that the pointers have moved since the first came down
@@ -46,7 +46,7 @@ function fill(slider) {
   slider.style.setProperty('--filled', `${(100 * (slider.value - slider.min)) / (slider.max - slider.min)}%`);
 }
 
-/** Set a text if it has changed. */
+/** Set the text of an element if it has changed. */
 function write(id, text) {
   const element = $(id);
   if (element.written === text) return; // reading textContent is slower

@@ -20,12 +20,12 @@ window.supineLive = (() => {
 
   let socket = null;
   let moments = 0;
-  let posed = NaN; // when the newest pose was received, ms of performance.now(); NaN: none
+  let posed = NaN; // time of the newest pose, ms of performance.now(); NaN: no pose yet
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  /** Return orientation q (x, y, z, w) turned by the least angle that makes gravity `gravity`. */
+  /** Return the orientation q (x, y, z, w), rotated by the least angle that gives gravity the direction `gravity`. */
   function turned(q, gravity) {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
@@ -37,8 +37,8 @@ window.supineLive = (() => {
     return all.map((x) => x / length);
   }
 
-  /** Show a state: gravity in the patient's axes (x left, y back, z head), volume above rest in mL,
-   * age of the newest pose in s, below 0 where there is none. */
+  /** Show a state: gravity in the patient's axes (x left, y back, z head), the volume above rest, mL, and the age of
+   * the newest pose, s, below 0 if there is no pose. */
   function show({ gravity, above, age }) {
     posed = age < 0 ? NaN : performance.now() - 1000 * age;
     tellAge();
@@ -58,9 +58,9 @@ window.supineLive = (() => {
   }
   setInterval(tellAge, 500);
 
-  /** Return the direction of gravity in the patient's axes from the tilt of a phone on the
-   * breastbone. Its axes are x right, y up and z out of the screen: left, head, front. DeviceOrientation turns it
-   * by alpha about z, beta about x, gamma about y; the world's z is up. */
+  /** Return the direction of gravity in the patient's axes from the tilt of a phone on the breastbone, degrees. The
+   * phone's axes, x right, y up and z out of the screen, point to the patient's left, head and front.
+   * DeviceOrientation rotates it by alpha about z, beta about x and gamma about y in a world whose z is up. */
   function gravityOfTilt(beta, gamma) {
     const [b, c] = [beta, gamma].map((degrees) => (degrees * Math.PI) / 180);
     return [Math.cos(b) * Math.sin(c), Math.cos(b) * Math.cos(c), -Math.sin(b)];
@@ -71,7 +71,7 @@ window.supineLive = (() => {
     socket.addEventListener('open', () => { said.textContent = 'live'; });
     socket.addEventListener('message', (event) => show(JSON.parse(event.data)));
     socket.addEventListener('close', () => {
-      said.textContent = 'waiting for the server'; // the age on the page keeps growing
+      said.textContent = 'waiting for the server';
       setTimeout(connect, 1000);
     });
   }
