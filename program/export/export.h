@@ -8,16 +8,16 @@
 
 #include <supine/runtime.h>
 
-enum { EXPORT_RESTING_TERMS = 9 }; /* Y_lm of bands 0 to 2 */
+enum { EXPORT_RESTING_TERMS = 9 }; /* spherical harmonics of bands 0 to 2 */
 
 /** An open basis to export. */
 typedef struct export_source {
   supine_basis *basis;
   const supine_basis_info *info;
   size_t terms;          /**< number of spherical harmonics of bands 0 to info->band */
-  const double *resting; /**< [resting_rows, EXPORT_RESTING_TERMS] coefficients in Y_lm of the
-                            volume at rest minus the volume of the reference surface, mL; NULL
-                            without info->has_rest */
+  const double *resting; /**< [resting_rows, EXPORT_RESTING_TERMS] coefficients of the harmonics
+                            whose sum is the volume at rest minus the volume of the reference
+                            surface, mL; NULL if rest is unknown */
   size_t resting_rows;   /**< number of lungs, or 1 if the volume is that of all lungs together */
 } export_source;
 
@@ -36,8 +36,8 @@ void supine_export_box(const export_source *source, double low[3], double high[3
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
 /** Compute the pose at a fraction of a breath of `breath` mL for gravity along the unit vector `g`.
- * Fraction 0 is rest, or the scan where rest is unknown; 1 is the end of inspiration.
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it holds that volume */
+ * Fraction 0 is rest, or the scan if rest is unknown; 1 is the end of inspiration.
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it reaches that volume */
 supine_status supine_export_breath_pose(const export_source *source, double breath,
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error);
@@ -45,7 +45,7 @@ supine_status supine_export_breath_pose(const export_source *source, double brea
 /** Names of the parts inside the lungs, from 'supine embed'. */
 typedef struct export_parts {
   size_t count;       /**< number of names, > 0 */
-  char *const *name;  /**< [count] */
+  char *const *name;  /**< [count] names */
   const uint32_t *of; /**< [N] index of the part that each vertex belongs to */
 } export_parts;
 
@@ -66,7 +66,7 @@ typedef struct export_glb_options {
  *
  * The `extras` of the file and of each lung's mesh say how weights follow from gravity and volume.
  * Targets deform normals too. The colour of a vertex shows its largest displacement from supine in
- * the other lying postures, without a breath. The node "patient" lies on a table and rotates about
+ * the other lying postures before the breath. The node "patient" lies on a table and rotates about
  * the centre of the lungs; an arrow shows gravity. Units are metres, and y points up.
  * @param bytes  size of the file; output
  * @retval SUPINE_ERROR_MESH         the basis has no triangles
@@ -86,7 +86,7 @@ typedef struct export_page {
   double breath;           /**< tidal volume, mL */
   const supine_pose *from; /**< pose from which displacements are measured */
   const char *from_name;   /**< name of `from`, for example "supine at rest" */
-  const char *title;       /**< UTF-8 */
+  const char *title;       /**< title of the page, UTF-8 */
   const export_source
       *inside; /**< content of the same lungs, a vector basis with the same modes; NULL: none */
   const export_parts *parts; /**< names of the parts of `inside`; unused if that is NULL */

@@ -12,8 +12,8 @@
 
 static const double step_mm = 0.045; /* smallest unit of quantized positions */
 
-/* Compute the largest displacement of each vertex from supine in the other lying postures, without
- * a breath, mm; return the largest of all vertices. glb.xyz and glb.normals are overwritten. */
+/* Compute the largest displacement of each vertex from supine in the other lying postures before
+ * the breath, mm; return the largest of all vertices. glb.xyz and glb.normals are overwritten. */
 static double find_displacements(const glb *g, float *displacement) {
   static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
   float *from = g->normals;

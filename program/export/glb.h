@@ -22,7 +22,7 @@ typedef enum glb_kind {
   GLB_ROTATIONS /**< float [4]: quaternions x, y, z, w */
 } glb_kind;
 
-/** A file while it is built. */
+/** State of a file while it is built. */
 typedef struct glb {
   const export_source *source;
   const export_glb_options *options;
@@ -31,7 +31,7 @@ typedef struct glb {
   float *xyz;         /**< [N, 3] workspace */
   float *normals;     /**< [N, 3] unit normals of the base mesh */
   float *added;       /**< [targets, N, 3] vectors that targets add to the normals at weight 1 */
-  uint8_t *colours;   /**< [N, 4] RGBA */
+  uint8_t *colours;   /**< [N, 4] linear RGBA of vertices */
   double step;        /**< unit of GLB_PLACES, mm; 1 if options->plain */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
   FILE *numbers;        /**< binary chunk, in memory */

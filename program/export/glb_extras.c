@@ -7,7 +7,8 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-enum { FORMS_MAX = 32 }; /* more targets have no volume formula: it would exceed the mesh in size */
+/* Largest number of targets with volume formulas; those of more targets would exceed the mesh. */
+enum { FORMS_MAX = 32 };
 
 static const char frame_text[] =
     "Vertices of a lung's mesh are in the patient's axes, LPS (x left, y back, z head), from "
@@ -63,7 +64,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* modes are stored as integers, half as long as fractions */
+  const double unit = 1e-7; /* unit of modes: integers are half as long as fractions */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Append the patient's surroundings to a glTF file: a table and an arrow that shows gravity, y up.
- */
+/* Append a table and an arrow that shows gravity to a glTF file. */
 #include <math.h>
 
 #include "program/export/glb.h"

@@ -51,7 +51,7 @@ static void place_base(const glb *g, size_t lung, const double *rest, size_t ver
   }
 }
 
-/* Append those rows of an array over all vertices that belong to a lung; return the accessor. */
+/* Append a lung's rows of an array over all vertices; return the index of the accessor. */
 static json_int_t put(glb *g, size_t lung, glb_kind kind, const void *rows) {
   const size_t *begin = g->source->info->lung_begin + lung;
   return supine_export_glb_put(g, kind, rows, g->order.vertex + begin[0], begin[1] - begin[0]);

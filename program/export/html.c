@@ -11,7 +11,7 @@
 #include "program/export/template.h"
 #include "program/render/render.h"
 
-extern const supine_asset supine_export_assets[]; /* files of the folder page, in the program */
+extern const supine_asset supine_export_assets[]; /* the files of program/export/page */
 
 enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORMAL_BIAS = 128 };
 
@@ -22,7 +22,7 @@ typedef struct page {
   const export_page *shown;
   double middle[3];   /* origin of stored positions: centre of the box of all vertices, mm */
   double place_unit;  /* unit of positions, mm */
-  double unit;        /* unit of the lungs' coefficients, mm along a direction of length 1 */
+  double unit;        /* unit of the lungs' coefficients, for directions of length 1, mm */
   double inside_unit; /* unit of the coefficients of the content, mm */
   export_order order; /* order in which the lungs' vertices and triangles are written */
   supine_status *status;
@@ -84,7 +84,7 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* Round a signed number, below 1 << bits in size, to a multiple of 1 << shift; return the multiple
+/* Divide a number between plus and minus 1 << bits by 1 << shift and round it; return the quotient
  * plus NORMAL_BIAS, so that numbers near 0 have the same high byte, which compresses well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
@@ -166,7 +166,7 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* Write the tensors of doubles, without compression; the basis may lack some. */
+/* Write those tensors of doubles that the basis has, without compression. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -201,7 +201,7 @@ static json_t *colours(void) {
   return maps;
 }
 
-/* Return the first index of each lung, then the end, [lungs + 1], as JSON. */
+/* Return `begin` as JSON: the first index of each lung, then the end. */
 static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
   for (size_t i = 0; i <= s->info->lung_count; ++i) {
@@ -218,8 +218,8 @@ static json_t *describe_inside(const page *p) {
   const supine_basis_info *info = p->shown->inside->info;
   json_t *names = json_array();
   for (size_t i = 0; i < p->shown->parts->count; ++i) {
-    json_t *name = json_string(p->shown->parts->name[i]);
-    (void)json_array_append_new(names, name != NULL ? name : json_string("?")); /* not UTF-8 */
+    json_t *name = json_string(p->shown->parts->name[i]); /* NULL if it is not UTF-8 */
+    (void)json_array_append_new(names, name != NULL ? name : json_string("?"));
   }
   const supine_tensor *rigid = supine_basis_tensor(p->shown->inside->basis, "rigid");
   json_t *parts = json_array();

@@ -26,7 +26,7 @@ void supine_export_pack_direction(const float direction[3], size_t size, void *n
 supine_status supine_export_pack_rows(const void *rows, size_t count, size_t stride,
                                       export_packed *packed);
 
-/** Compress triangles: `count` vertex indices below `vertices`.
+/** Compress triangles, given as `count` vertex indices below `vertices`.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, size_t vertices,
                                          export_packed *packed);

@@ -180,7 +180,7 @@ static void make_unit(const export_source *source, const export_targets *targets
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
-  static const float near = 2; /* largest difference, in units of a byte */
+  static const float near = 2; /* largest difference that is near, in units of a byte */
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];

@@ -88,8 +88,8 @@ static void write_named(const supine_template *t, const tag *named, const scope 
   if (value != NULL) {
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
-    const size_t size =
-        asset->size - (asset->bytes[asset->size - 1] == '\n'); /* one newline follows the tag */
+    /* Omit the last newline: one follows the tag. */
+    const size_t size = asset->size - (asset->bytes[asset->size - 1] == '\n');
     fill(t, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {
     (void)fwrite(asset->bytes, 1, asset->size, file);

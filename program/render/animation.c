@@ -7,7 +7,7 @@
 
 #include "program/render/render.h"
 
-/* WebP quality, 0 to 100. At 90 letters are sharp and files a third of the lossless size. */
+/* WebP quality, 0 to 100. At 90, letters are sharp and files take a third of the lossless size. */
 static const float quality = 90.0F;
 enum { EFFORT = 2, SIDE_MAX = 16383 };
 

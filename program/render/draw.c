@@ -43,7 +43,7 @@ static const float gamma_exponent = 2.2F;
 
 typedef struct corner {
   float x, y;      /* position, samples from the left and upper edges of the picture */
-  float nearness;  /* reciprocal of the depth before the viewer, 1/mm; 0: too near to be drawn */
+  float nearness;  /* reciprocal of the distance along the view, 1/mm; 0: too near to be drawn */
   float normal[3]; /* unit normal in the viewer's axes: right, up, towards the viewer */
   float eye[3];    /* vector from the vertex to the viewer, mm, in the viewer's axes */
   float value;
@@ -183,7 +183,7 @@ typedef struct canvas {
   const supine_scene *scene;
   size_t width, height;             /* size of the picture, samples */
   uint32_t *nearest;                /* [height, width] triangle nearest to the viewer, or NOTHING */
-  float *nearness;                  /* [height, width] reciprocal of that triangle's depth, 1/mm */
+  float *nearness;                  /* [height, width] nearness of that triangle, 1/mm */
   float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
   unsigned char encode[SHADES + 1]; /* encoded value, 0 to 255, of linear light i / SHADES */
   uint32_t *pixels;
@@ -300,7 +300,7 @@ static float value_at(const face *f, float x, float y) {
          nearness_at(f, share);
 }
 
-/* Return the share of a sample that contour lines cover, 0 to 1 (as contour.glsl, but wider). */
+/* Return the share of a sample that contour lines cover, 0 to 1; contour.glsl has thinner lines. */
 static float contour(const face *f, float x, float y, float value, float spacing) {
   const float steps = value / spacing;
   const float width =

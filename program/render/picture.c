@@ -34,7 +34,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 static const double pi = 3.14159265358979323846;
 
 typedef struct theme {
-  double top[3], bottom[3]; /* background, which changes from top to bottom */
+  double top[3], bottom[3]; /* colours of the background, at its ends */
   double card[3], edge[3];
   double text[3], faint[3];
 } theme;
@@ -197,7 +197,7 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
 }
 
 /* Move the name at index `count` down until it overlaps no earlier name. `box` holds the left end,
- * the baseline and the width of each name, and `line` is the height of all, pixels. */
+ * the baseline and the width of each name, and `line` is the height of a line, pixels. */
 static void place_name(double (*box)[3], size_t count, double line) {
   double *own = box[count];
   for (size_t i = 0; i < count; ++i) {
@@ -210,7 +210,7 @@ static void place_name(double (*box)[3], size_t count, double line) {
 }
 
 /* Draw discs and dots at the marks, then the labels over them. The scene lies at (x, y); `size` is
- * that of the font, pixels. Its eight parameters are what to draw, and where. */
+ * that of the font, pixels. The eight parameters say what to draw, and where. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y,
                                 const theme *style) {
@@ -278,7 +278,7 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
 }
 
 /* Draw the lungs and the marks of a panel in a box of `width` x `height` pixels at (x, y); `size`
- * is that of the font, pixels. Its 13 parameters are what to draw, and where. */
+ * is that of the font, pixels. The 13 parameters say what to draw, and where. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -309,7 +309,7 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   return status;
 }
 
-/* Draw the cell of the posture `column` from the view `row`. Its nine parameters are the picture,
+/* Draw the cell of the posture `column` from the view `row`. The nine parameters are the picture,
  * its layout and scales, and the cell. */
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,

@@ -36,7 +36,7 @@ typedef struct supine_comparison {
   supine_compare *compare;
   supine_compared_posture *posture; /* [postures.count] results */
   size_t directions;                /* number of sampled directions that reach the volume */
-  double farthest[3];               /* unit vector of gravity with the largest RMS distance */
+  double farthest[3];               /* unit vector of gravity farthest from supine */
   double farthest_rms;              /* RMS distance of `farthest` from supine, mm */
 } supine_comparison;
 

@@ -11,8 +11,7 @@
 #include "program/options/basis_input.h"
 #include "program/report/comparison_parts.h"
 
-extern const supine_asset
-    supine_report_assets[]; /* .html and .css files of this folder, in the program */
+extern const supine_asset supine_report_assets[]; /* the .html and .css files of program/report */
 
 static json_t *lungs(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);

@@ -80,7 +80,7 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
 }
 
 json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) {
-  enum { PER_ROW = 6 }; /* fit on a printed page */
+  enum { PER_ROW = 6 }; /* pictures side by side on a printed page */
   const size_t count = c->postures.count;
   const size_t rows = (count + PER_ROW - 1) / PER_ROW;
   double extent[4] = SUPINE_EXTENT_NONE;

@@ -101,12 +101,12 @@ function readBasis() {
   return basis;
 }
 
-const recurrences = new Map(); // factors by band
+const recurrences = new Map(); // results of recurrenceOf, by band
 /** Return the factors of the recurrence in harmonics() up to a band, computed once. */
 function recurrenceOf(band) {
   if (!recurrences.has(band)) {
     const tops = new Float64Array(band + 1);
-    const steps = new Float64Array((band + 1) ** 2); // at l * l + l + m
+    const steps = new Float64Array((band + 1) ** 2); // factor of (l, m) at l * l + l + m
     for (let m = 0; m <= band; ++m) {
       tops[m] = m === 0 ? Math.sqrt(1 / (4 * Math.PI)) : tops[m - 1] * (m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m)));
       for (let l = m; l <= band; ++l) steps[l * l + l + m] = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compute the coverage by contour lines, 0 to 1, at multiples of `spacing` above 0, as in pictures and reports
-// (program/render/draw.c). Lines too close to be told apart are faded out.
+// Return the coverage by contour lines, 0 to 1, at multiples of `spacing` above 0. Lines too close to be told apart
+// fade out. Pictures and reports have similar lines (program/render/draw.c).
 float contour(float value, float spacing) {
   float steps = value / spacing;
   float width = fwidth(steps);

@@ -8,7 +8,7 @@ const $ = (id) => document.getElementById(id);
  * pressed. Distances are CSS pixels. Return a function that returns whether a drag is under way. */
 function onDrag(element, drag, pinch, tap) {
   const pointers = new Map();
-  let far = 0; // CSS pixels that the pointers have moved since the first came down
+  let far = 0; // CSS pixels that the pointers have moved since the first of them was pressed
   const spread = () => {
     const [a, b] = [...pointers.values()];
     return { size: Math.hypot(a.x - b.x, a.y - b.y), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
@@ -76,7 +76,7 @@ function onSlider(id, act) {
   $(id).addEventListener('input', () => take($(id)));
   for (const [type, then] of [['change', take], ['blur', () => {}]]) {
     $(`${id}-number`).addEventListener(type, () => {
-      $(id).written = ''; // the typed text may be no number, or out of range
+      $(id).written = ''; // writes the value again: the typed text may be no number, or out of range
       then($(`${id}-number`));
     });
   }

@@ -51,7 +51,7 @@ function drawFigure(context, q, x, y, scale, tones) {
     xx: a * ex[0] * ex[0] + b * ey[0] * ey[0] + c * ez[0] * ez[0],
     xy: a * ex[0] * ex[1] + b * ey[0] * ey[1] + c * ez[0] * ez[1],
     yy: a * ex[1] * ex[1] + b * ey[1] * ey[1] + c * ez[1] * ez[1],
-    // Depth by which the parts are sorted: that of the centre plus half of the extent towards the viewer.
+    // Parts are sorted by the depth of the centre plus half of the extent towards the viewer.
     front: at[0] * ex[2] + at[1] * ey[2] + at[2] * ez[2] + 0.5 * Math.sqrt(a * ex[2] * ex[2] + b * ey[2] * ey[2] + c * ez[2] * ez[2]),
   })).sort((a, b) => a.front - b.front);
   context.save();
@@ -220,7 +220,7 @@ function lowestPart(q) {
 function drawIcon(canvas, bodyToRoom) {
   const context = freshContext(canvas);
   const { width, height } = sizeOf(canvas);
-  const camera = compose(turn([1, 0, 0], -1.45), turn([0, 0, 1], 0.35)); // room -> eye
+  const camera = compose(turn([1, 0, 0], -1.45), turn([0, 0, 1], 0.35)); // rotation from the room to the eye's axes
   const q = compose(camera, bodyToRoom);
   const along = rotate(q, [0, 0, 0.86]);
   const scale = Math.min(width / 2 / (Math.abs(along[0]) + 0.12), height / 2 / (Math.abs(along[1]) + 0.2));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Read and show the content of the lungs: named points and meshes, which move by the weights and gains of
-// their lung and a displacement field of their own, [vertex][axis][mode].
+// Read and show the content of the lungs: named points and meshes. They follow the weights and gains of their lung
+// with a displacement field of their own, [vertex][axis][mode].
 
-const BALL_RADIUS = 4; // mm, of the ball drawn at a point
+const BALL_RADIUS = 4; // radius of the ball drawn at a point, mm
 
 /** Read the content of the lungs from the page, and sort points before meshes, so that each needs one draw call. */
 function takeInside({ inside, modes: k, placeUnit, middle }) {

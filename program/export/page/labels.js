@@ -20,7 +20,7 @@ const placed = (element, at, shown) => {
   if (shown) element.style.transform = where;
 };
 
-const LETTER_RADIUS = 12; // radius of a letter with the space around it, CSS pixels
+const LETTER_RADIUS = 12; // radius of a letter and the space around it, CSS pixels
 const ARROW_RADIUS = 13;  // radius of the head of gravity's arrow, CSS pixels
 
 /** Return the position of a letter, moved off a plate that it would overlap: up, down, right or left, whichever way

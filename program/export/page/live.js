@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Show the states that the server of this page sends by WebSocket, and send this device's tilt back
-// if the user asks for it.
+// Show the states that the server of this page sends by WebSocket. If the user asks for it, send the tilt of this
+// device to the server.
 
 window.supineLive = (() => {
   const said = document.createElement('p');
@@ -29,7 +29,7 @@ window.supineLive = (() => {
   function turned(q, gravity) {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
-    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite: turn about the long axis
+    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite directions: turn about the long axis
     const u = cross(q, axis); // part of the quaternion product q * (axis, w)
     const product = [0, 1, 2].map((i) => q[3] * axis[i] + w * q[i] + u[i]);
     const all = [...product, q[3] * w - dot(q, axis)];
@@ -60,7 +60,7 @@ window.supineLive = (() => {
 
   /** Return the direction of gravity in the patient's axes from the tilt of a phone on the breastbone, degrees. The
    * phone's axes, x right, y up and z out of the screen, point to the patient's left, head and front.
-   * DeviceOrientation rotates it by alpha about z, beta about x and gamma about y in a world whose z is up. */
+   * DeviceOrientation rotates the phone by alpha about z, beta about x and gamma about y in a world whose z is up. */
   function gravityOfTilt(beta, gamma) {
     const [b, c] = [beta, gamma].map((degrees) => (degrees * Math.PI) / 180);
     return [Math.cos(b) * Math.sin(c), Math.cos(b) * Math.cos(c), -Math.sin(b)];

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Draw the outlines of the lungs in an axial and a coronal plane over those in the state that displacements
-// are measured from, turned so that gravity points down unless it is nearly normal to the plane.
+// Draw the outlines of the lungs in an axial and a coronal plane, over the outlines in the state from which
+// displacements are measured. Gravity points down in the pictures unless it is nearly normal to the plane.
 
 /** Return the closed lines along which the surface crosses the plane at `at` mm on an axis. A line is a list of
  * points [u, v] on the other two axes, mm; it stays open if it meets a hole of the surface. */
 function linesAcross({ corners, vertices }, places, axis, at) {
   const [first, second] = [0, 1, 2].filter((i) => i !== axis);
-  const links = new Map(); // from an edge to the next edges across its triangles
-  const points = new Map(); // from an edge to where it crosses the plane
+  const links = new Map(); // for each edge, the edges that cross the plane in the same triangles
+  const points = new Map(); // for each edge, the point where it crosses the plane
   for (let t = 0; t < corners.length; t += 3) {
     const over = [0, 1, 2].map((i) => places[3 * corners[t + i] + axis] > at);
     if (over[0] === over[1] && over[1] === over[2]) continue;
@@ -106,7 +106,7 @@ class Outlines {
     const { scale } = this;
     const along = [gravity[others[0]], sign * gravity[others[1]]];
     const size = Math.hypot(...along);
-    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size); // direction of down, in the plane
+    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size); // unit vector in the plane that points down in the picture
     const turned = (u, v) => [u * b - sign * v * a, u * a + sign * v * b];
     const place = ([u, v]) => {
       const [x, y] = turned(u - middle[0], v - middle[1]);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Connect the state, the picture and the controls of the page.
 
-const CHECKBOXES = [...SHOWN, 'inside']; // ids, and the fields of State that they set
+const CHECKBOXES = [...SHOWN, 'inside']; // ids of checkboxes, which are also the fields of State that they set
 const VIEW_ANGLE = 0.5; // vertical field of view of the camera, radians
 const KIND_TEXT = {
   displacement: 'Distance of each point from its position FROM.',
@@ -97,7 +97,7 @@ function start() {
     const pivot = state.camera.pivot ?? centre;
     const toRoom = compose(cameraTurn(), modelTurn(q));
     const away = rotate(toRoom, pivot);
-    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // raised, to show the table
+    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // raises the lungs, to show the table
     const { gravity } = moment;
     const lowestAt = pane_lowest(name, moment);
     const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
@@ -115,7 +115,7 @@ function start() {
       arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
       pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
-      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // translucent from below
+      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // a table seen from below is translucent
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), low[axis] + at * (high[axis] - low[axis])],
     };
   }
@@ -438,7 +438,7 @@ function start() {
       deform();
     }
     if (state.moment) draw();
-    if (state.moment && now - tabled > 250) { // not in every frame of a breath
+    if (state.moment && now - tabled > 250) { // writing in every frame of a breath would be slow
       if (inside) insideTable.show(state.moment, originMoment());
       tellFinding(Math.ceil(basis.vertices / 3000));
       tabled = now;
@@ -501,7 +501,7 @@ function start() {
     try {
       history.replaceState(null, '', `#${linkOf(state)}`);
     } catch {
-      // some browsers refuse this on pages from disk
+      // Some browsers refuse to change the address of a page from disk.
     }
   }
 
@@ -512,7 +512,7 @@ function start() {
     redraw();
   };
   const boxSize = () => ({ width: sizeOf(canvas).width / (state.beside ? 2 : 1), height: sizeOf(canvas).height });
-  const shift = (dx, dy) => { // CSS pixels
+  const shift = (dx, dy) => { // distances in CSS pixels
     const { width, height } = boxSize();
     const mm = (2 * tangent * distanceNow(width / height)) / height;
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
@@ -570,7 +570,7 @@ function start() {
     if (arrow) event.preventDefault();
   });
   const lookFrom = (letter) => {
-    const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // to the viewer
+    const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // direction to the viewer in the room
     Object.assign(state.camera, { azimuth: Math.atan2(0 - x, 0 - y), elevation: Math.asin(Math.max(-1, Math.min(1, z))), pan: [0, 0] });
     redraw();
   };
@@ -610,7 +610,7 @@ function start() {
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
-  $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // the typed text may be no posture
+  $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // writes the posture again: the typed text may be invalid
   const play = () => {
     state.playing = !state.playing;
     remeasure();

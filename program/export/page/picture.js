@@ -443,7 +443,7 @@ class Picture {
     gl.uniform2f(content.at.range, pane.range.begin, pane.range.end);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
     gl.uniform1f(content.at.opacity, 1);
-    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // at least 4 pixels
+    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // balls of at least 4 pixels
   }
 
   /** Draw arrows at some vertices, from the state from which colours measure to the state shown. */

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Project the arrow of gravity, the table, or the arrows from where the surface was to where it is.
+// Project the arrow of gravity, the table, or the arrows that show displacements of the surface.
 layout(location = 0) in vec3 position; // on an arrow of length 1 from the origin along -z, or on the table's box
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 tail;     // start of each arrow, mm

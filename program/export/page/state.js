@@ -80,11 +80,11 @@ class State {
     this.ghost = true;
     this.arrows = false;
     this.wires = false;
-    this.beside = false;                           // whether the other posture is shown beside this one
+    this.beside = false;                           // whether the other posture is shown beside the chosen one
     this.inside = Boolean(basis.inside);           // whether the content is shown
     this.named = [];                               // parts of the content whose names are kept in the picture
     this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
-    this.cut = { axis: -1, at: 0.5 };              // a plane normal to an axis, -1 for none, at a fraction of the lungs' extent
+    this.cut = { axis: -1, at: 0.5 };              // plane of the cut: its axis, or -1 for no cut, and its position as a fraction of the lungs' extent
     this.ownRanges = {};                           // ranges of the colours that the user typed: {begin, end} by kind
     this.probes = [];                              // marked vertices
     this.room = true;

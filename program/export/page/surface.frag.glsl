@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colour by value, shaded softly so that the colours stay readable.
+// Colour the surface by value, with soft shading so that the colours can be read from the bar.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

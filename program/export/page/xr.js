@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Show the lungs in a headset, at life size, if the browser has WebXR.
 
-const XR_AWAY = 0.7; // metres in front of the viewer's first position
+const XR_AWAY = 0.7; // distance of the lungs from the viewer's first position, m
 
 /** Return the product of column-major 4 x 4 matrices. */
 const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
