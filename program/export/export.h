@@ -53,7 +53,7 @@ typedef struct export_parts {
 typedef struct export_glb_options {
   bool plain;    /**< true: positions, normals and weights as float32, vertices in the basis' order.
                     false: positions as 16-bit multiples of 0.045 mm (more for lungs beyond 1.4 m),
-                    within 0.1 mm of the library's for breaths of up to 500 mL, normals as bytes
+                    within 0.1 mm of the library's up to 500 mL above rest, normals as bytes
                     (KHR_mesh_quantization), arrays compressed (EXT_meshopt_compression) */
   bool animate;  /**< add an animation of breathing while the patient turns, and one of breathing in
                     each of the four lying postures */

@@ -9,8 +9,9 @@
 #include "program/export/packed.h"
 #include "program/export/targets.h"
 
-/** Kinds of array, with the type in memory. Unless export_glb_options.plain is set, the file holds
- * positions and weights as 16-bit integers and normals as bytes, and meshes are compressed. */
+/** Kinds of array, with their types in memory. Unless export_glb_options.plain is set, the file
+ * holds positions and weights as 16-bit integers and normals as bytes, and meshes are compressed.
+ */
 typedef enum glb_kind {
   GLB_CORNERS,  /**< uint32_t: vertex indices, three for each triangle */
   GLB_PLACES,   /**< float [3]: positions or displacements in units of glb.step */

@@ -20,8 +20,8 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the roll at a time, radians: the patient stays in each posture for half of SECONDS, then
- * turns to the next one in the other half. */
+/* Return the roll at a time of the animation, radians: the patient stays in each posture for half
+ * of SECONDS, then turns to the next one in the other half. */
 static double roll_at(double seconds) {
   const double stage = floor(seconds / SECONDS);
   const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
@@ -45,7 +45,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   }
 }
 
-/* Append an animation of breathing at `roll` radians; if it is NAN, the patient turns meanwhile. */
+/* Append an animation of breathing at `roll` radians, or while the patient turns if that is NAN. */
 static void add(glb *g, const char *name, double roll, size_t seconds) {
   const size_t count = g->source->info->lung_count;
   const size_t frames = RATE * seconds + 1;

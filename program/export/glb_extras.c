@@ -7,7 +7,7 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-/* Largest number of targets with volume formulas; those of more targets would exceed the mesh. */
+/* Largest number of targets with volume formulas: for more, these would be larger than the mesh. */
 enum { FORMS_MAX = 32 };
 
 static const char frame_text[] =
@@ -36,7 +36,7 @@ static const char resting_text[] =
     "minus referenceVolume is max(0, -g_z)^2 * fullUprightGain * referenceVolume. Above rest, "
     "all lungs have covered the same fraction of the way from rest to full inflation.";
 
-/* Return the names of the targets: "mode_3", and "bend_3" for the bend of that mode. */
+/* Return the names of the targets: "mode_3" for a mode, "bend_3" for the bend of that mode. */
 static json_t *target_names(const glb *g) {
   const size_t k = g->source->info->mode_count;
   json_t *names = json_array();
@@ -64,7 +64,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* unit of modes: integers are half as long as fractions */
+  const double unit = 1e-7; /* unit of the modes, stored as integers because these are shorter */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();

@@ -251,7 +251,7 @@ static double scan_volume(const export_source *s) {
   return beyond;
 }
 
-/* Return the pose that displacements are measured from as JSON. */
+/* Return the pose from which displacements are measured, as JSON. */
 static json_t *describe_from(const page *p) {
   return json_pack(
       "{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",

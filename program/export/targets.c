@@ -156,7 +156,7 @@ static void find_normals(const export_source *source, const export_targets *targ
  * by the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* smallest divisor, which limits the vectors */
+  static const double least = 0.2; /* smallest divisor, which limits the length of the vectors */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -208,7 +208,7 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2;    /* change of a weight for central differences */
-  static const double least = 0.044; /* smallest RMS change kept, radians (2.5 degrees) */
+  static const double least = 0.044; /* least RMS change of normals kept, radians (2.5 degrees) */
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

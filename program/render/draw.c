@@ -154,8 +154,8 @@ static void find_frame(supine_renderer *r, const supine_scene *scene, double fra
   frame[3] = 1 / tall;
 }
 
-/* Project a point in the viewer's axes, mm, to `at`: pixels (or samples, as `size`) from the left
- * and upper edges of a picture of that size. */
+/* Project a point `p` in the viewer's axes, mm, to a position `at` in a picture of `size` pixels or
+ * samples, from its left and upper edges. */
 static void project(const camera *c, const double frame[4], const double p[3], const double size[2],
                     double at[2]) {
   for (int side = 0; side < 2; ++side) {

@@ -34,7 +34,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 static const double pi = 3.14159265358979323846;
 
 typedef struct theme {
-  double top[3], bottom[3]; /* colours of the background, at its ends */
+  double top[3], bottom[3]; /* colours at both ends of the background */
   double card[3], edge[3];
   double text[3], faint[3];
 } theme;
@@ -91,8 +91,7 @@ static void text(cairo_t *cr, double x, double y, double align, const char *word
   cairo.show_text(cr, words);
 }
 
-/* Draw text with its left end at x, smaller than `size` if it would be wider than `room`, pixels.
- */
+/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. */
 static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
                         const char *words) {
   font(cr, size, bold);
@@ -204,7 +203,7 @@ static void place_name(double (*box)[3], size_t count, double line) {
     const bool beside = own[0] > box[i][0] + box[i][2] || box[i][0] > own[0] + own[2];
     if (!beside && fabs(own[1] - box[i][1]) < line * 0.999) {
       own[1] = box[i][1] + line;
-      i = SIZE_MAX; /* ++i makes it 0: compare with all names again */
+      i = SIZE_MAX; /* the loop continues with the first name */
     }
   }
 }
@@ -511,7 +510,7 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
   }
   if (status == SUPINE_OK) {
     status = write_png(surface, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* commit reports errors of the file */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* commit reports write errors */
       status = supine_output_commit(&output, error);
     }
   }

@@ -129,8 +129,8 @@ typedef struct supine_picture {
   const supine_view *view;
   size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
-  double largest;      /**< value that the last colour shows, mm */
-  double transparency; /**< 0: lungs in colours; above, up to 1: grey shells, fading from 0.5 */
+  double largest;            /**< value that the last colour shows, mm */
+  double transparency;       /**< 0: coloured lungs; up to 1: grey shells, which fade above 0.5 */
   const double (*extent)[4]; /**< [view_count] extents to show, by supine_render_picture_extent;
                                   NULL: those of this picture */
   supine_colours colours;
@@ -152,7 +152,7 @@ void supine_render_picture_extent(supine_renderer *renderer, const supine_pictur
 
 /** Compose a picture.
  * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; output
- * @retval SUPINE_ERROR_ARGUMENT  too large, or too small for the number of panels and views
+ * @retval SUPINE_ERROR_ARGUMENT  the picture is too large, or too small for its panels and views
  * @retval others as supine_render_draw */
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);

@@ -149,7 +149,7 @@ void supine_report_free(supine_comparison *c) {
 void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   char whole[160];
   (void)supine_state_describe(&c->state, whole, sizeof whole);
-  const char *space = strchr(whole, ' '); /* after the name of the posture */
+  const char *space = strchr(whole, ' '); /* end of the posture's name */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
 }
 

@@ -19,7 +19,7 @@ typedef struct supine_compared_posture {
   double expected_error;           /* expected error of the displacement, mm RMS; 0 if unknown */
   double volume[SUPINE_LUNGS_MAX]; /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];   /* volume that each lung gains in the breath, mL */
-  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* slabs of all lungs, the uppermost first */
+  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* slabs of all lungs together, uppermost first */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
@@ -35,7 +35,7 @@ typedef struct supine_comparison {
   supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;
   supine_compared_posture *posture; /* [postures.count] results */
-  size_t directions;                /* number of sampled directions that reach the volume */
+  size_t directions;                /* number of sampled directions, without those out of reach */
   double farthest[3];               /* unit vector of gravity farthest from supine */
   double farthest_rms;              /* RMS distance of `farthest` from supine, mm */
 } supine_comparison;

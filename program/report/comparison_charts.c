@@ -80,7 +80,7 @@ json_t *supine_report_profiles(const supine_comparison *c) {
                    profile(c, "share of the volume gained, %", true, share));
 }
 
-/* Numbers of cells of the map, and its position and side of a cell in map.html, SVG units. */
+/* Numbers of cells of the map; side of a cell and position of the map in map.html, SVG units. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
 /* Compute the position of a direction of gravity on the map, SVG units. From left to right: roll,
@@ -135,7 +135,7 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    if (cosine > nearest + 1e-9) { /* among equals the first: names precede DICOM codes */
+    if (cosine > nearest + 1e-9) { /* not for a DICOM code, which follows the name it repeats */
       nearest = cosine;
       name = supine_posture_name(i);
     }

@@ -13,7 +13,7 @@ window.supineLive = (() => {
   said.setAttribute('role', 'status');
   tilt.type = 'button';
   tilt.textContent = "Use this device's tilt";
-  tilt.title = 'Lay the phone on the breastbone, screen out, its top towards the head';
+  tilt.title = 'Lay the phone on the breastbone, screen outwards, top towards the head';
   tilt.hidden = typeof DeviceOrientationEvent === 'undefined' || !window.isSecureContext;
   bar.append(said, aged, tilt);
   (document.querySelector('#title > :last-child') ?? document.body).append(bar);

@@ -308,7 +308,7 @@ function start() {
     answered = { depth: state.depth, most: 0 };
     for (const { posture, answer } of buttons) {
       const moment = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), state.depth);
-      answer.textContent = moment.folds ? 'would fold' : answerOf(basis, moment);
+      answer.textContent = moment.folds ? 'out of reach' : answerOf(basis, moment);
       answered.most = Math.max(answered.most, ...(moment.folds ? [] : moment.held));
     }
   }
@@ -604,7 +604,7 @@ function start() {
     const found = postureFrom($('posture-name').value);
     $('posture-trouble').hidden = Boolean(found);
     if (!found) {
-      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, a tilt as supine+15, or gravity as 0.6:0:-0.8`);
+      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, a tilt such as supine+15, or gravity such as 0.6:0:-0.8.`);
       return;
     }
     state.settle(found.q, found.tilt, 0.7);
