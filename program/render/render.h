@@ -59,7 +59,7 @@ void supine_render_destroy(supine_renderer *renderer);
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
   const supine_pose *pose;
-  const float *value; /**< [N] value of each vertex that its colour shows, mm */
+  const float *value; /**< [N] values that the colours of vertices show, mm */
   double largest;     /**< value that the last colour shows, mm, > 0 */
   double line_step;   /**< difference of the value between contour lines, mm; 0: no lines */
   supine_colours colours;
@@ -134,7 +134,7 @@ typedef struct supine_picture {
   const double (*extent)[4]; /**< [view_count] extents to show, by supine_render_picture_extent;
                                   NULL: those of this picture */
   supine_colours colours;
-  bool beyond; /**< draw the colour bar with a pointed end, as some values exceed `largest` */
+  bool beyond; /**< values exceed `largest`: draw the colour bar with a pointed end */
   bool dark;
   size_t width, height; /**< size of the picture, pixels */
 } supine_picture;

@@ -135,7 +135,8 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    if (cosine > nearest + 1e-9) { /* not for a DICOM code, which follows the name it repeats */
+    /* Of equally near postures, keep the first: names precede their DICOM codes. */
+    if (cosine > nearest + 1e-9) {
       nearest = cosine;
       name = supine_posture_name(i);
     }
