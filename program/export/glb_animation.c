@@ -45,7 +45,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   }
 }
 
-/* Append an animation of breathing at `roll` radians, or while the patient turns if that is NAN. */
+/* Append an animation of breathing at `roll` radians; NAN means while the patient turns around. */
 static void add(glb *g, const char *name, double roll, size_t seconds) {
   const size_t count = g->source->info->lung_count;
   const size_t frames = RATE * seconds + 1;

@@ -7,7 +7,7 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-/* Largest number of targets with volume formulas. Those of more targets would exceed the mesh. */
+/* Largest number of targets with volume formulas. Those of more would be larger than the mesh. */
 enum { FORMS_MAX = 32 };
 
 static const char frame_text[] =

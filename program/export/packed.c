@@ -22,7 +22,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 supine_status supine_export_pack_begin(supine_error *error) {
   const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error);
   if (status == SUPINE_OK) {
-    meshopt.encodeIndexVersion(1); /* EXT_meshopt_compression requires it */
+    meshopt.encodeIndexVersion(1); /* EXT_meshopt_compression requires version 1 */
   }
   return status;
 }

@@ -87,7 +87,7 @@ enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
  * from prone over the right side, supine and the left side to prone. From top to bottom: tilt, from
  * head down to feet down. */
 static void place(const double g[3], double *x, double *y) {
-  const double roll = atan2(g[0], g[1]) / pi; /* half turns: supine 0, left 1/2 */
+  const double roll = atan2(g[0], g[1]) / pi; /* in half turns: 0 supine, 1/2 left side */
   const double tilt = asin(fmin(1.0, fmax(-1.0, g[2]))) / pi;
   *x = MAP_LEFT + COLUMNS * CELL * (0.5 + roll / 2.0);
   *y = MAP_TOP + ROWS * CELL * (0.5 - tilt);

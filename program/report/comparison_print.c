@@ -55,8 +55,8 @@ static json_t *encode_postures(const supine_comparison *c) {
   return list;
 }
 
-/* Append a row to the table `heading` of an object: `value` in the column `name`, then `members`,
- * which it releases. */
+/* Append a row to the table `heading` of `tables`: `value` in the column `name`, then the columns
+ * `members`, which are freed. */
 static void add_row(json_t *tables, const char *heading, const char *name, const char *value,
                     json_t *members) {
   json_t *row = json_pack("{s:s}", name, value);
