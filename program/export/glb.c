@@ -12,9 +12,9 @@
 
 static const double step_mm = 0.045; /* smallest unit of quantized positions */
 
-/* Compute the largest displacement of each vertex from supine over the lying postures, at rest, mm;
- * return the largest of all. glb.xyz and glb.normals are workspace. */
-static double find_moves(const glb *g, float *move) {
+/* Compute the largest displacement of each vertex from supine in the other lying postures before
+ * the breath, mm; return the largest of all vertices. glb.xyz and glb.normals are overwritten. */
+static double find_displacements(const glb *g, float *displacement) {
   static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
   float *from = g->normals;
   double largest = 0;
@@ -28,18 +28,18 @@ static double find_moves(const glb *g, float *move) {
     for (size_t i = 0; p > 0 && i < g->source->info->vertex_count; ++i) {
       const float *to = g->xyz + 3 * i;
       const float away[3] = {to[0] - from[3 * i], to[1] - from[3 * i + 1], to[2] - from[3 * i + 2]};
-      move[i] = fmaxf(move[i], hypotf(hypotf(away[0], away[1]), away[2]));
-      largest = fmax(largest, (double)move[i]);
+      displacement[i] = fmaxf(displacement[i], hypotf(hypotf(away[0], away[1]), away[2]));
+      largest = fmax(largest, (double)displacement[i]);
     }
   }
   return largest;
 }
 
 /* Colour vertices by displacement, 0 to `end` mm; glTF's vertex colours are linear RGBA. */
-static void colour(const float *move, size_t count, double end, uint8_t *colours) {
+static void colour(const float *displacement, size_t count, double end, uint8_t *colours) {
   for (size_t i = 0; i < count; ++i) {
     double rgb[3];
-    supine_render_colour(SUPINE_COLOURS_DISPLACEMENT, fmin(1, (double)move[i] / end), rgb);
+    supine_render_colour(SUPINE_COLOURS_DISPLACEMENT, fmin(1, (double)displacement[i] / end), rgb);
     for (size_t k = 0; k < 3; ++k) {
       const double linear = rgb[k] <= 0.04045 ? rgb[k] / 12.92 : pow((rgb[k] + 0.055) / 1.055, 2.4);
       colours[4 * i + k] = (uint8_t)lrint(255 * linear);
@@ -48,32 +48,33 @@ static void colour(const float *move, size_t count, double end, uint8_t *colours
   }
 }
 
-/* Compute the arrays of the lungs' vertices; set the displacement at the end of the colours, mm. */
+/* Compute the colours and normals of the lungs' vertices; set `end` to the displacement that the
+ * last colour shows, mm. */
 static supine_status prepare(glb *g, double *end, supine_error *error) {
   const size_t n = g->source->info->vertex_count;
-  float *move = calloc(n, sizeof *move);
+  float *displacement = calloc(n, sizeof *displacement);
   g->xyz = malloc(3 * n * sizeof *g->xyz);
   g->normals = malloc(3 * n * sizeof *g->normals);
   g->added = malloc(3 * n * g->targets.count * sizeof *g->added);
   g->colours = malloc(4 * n);
   supine_status status = supine_export_order_make(g->source, !g->options->plain, &g->order, error);
-  if (status == SUPINE_OK && (move == NULL || g->xyz == NULL || g->normals == NULL ||
+  if (status == SUPINE_OK && (displacement == NULL || g->xyz == NULL || g->normals == NULL ||
                               g->added == NULL || g->colours == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   if (status == SUPINE_OK) {
-    *end = supine_render_bar_end(find_moves(g, move));
-    colour(move, n, *end, g->colours);
+    *end = supine_render_bar_end(find_displacements(g, displacement));
+    colour(displacement, n, *end, g->colours);
     status = supine_export_targets_normals(g->source, g->options->breath, &g->targets,
                                            g->options->plain ? NULL : g->order.vertex, g->normals,
                                            g->added, error);
   }
-  free(move);
+  free(displacement);
   return status;
 }
 
-/* Append the patient with the lungs, the animations, the table and the arrow; set the scene's root
- * nodes and the displacement at the end of the colours, mm. */
+/* Append the patient with the lungs, the animations, the table and the arrow; set `roots` to the
+ * root nodes of the scene, and `end` to the displacement that the last colour shows, mm. */
 static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
   float q[4];
   const supine_status status = prepare(g, end, error);
@@ -95,8 +96,8 @@ static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *
   return g->status == SUPINE_OK ? SUPINE_OK : supine_error_set(error, g->status, "out of memory");
 }
 
-/* Build the file's JSON. The second buffer of a compressed file is a fallback without data: its
- * size is that of the decoded arrays. */
+/* Build the file's JSON. A compressed file has a second buffer without data, as large as the
+ * decoded arrays: the fallback that EXT_meshopt_compression describes. */
 static json_t *make_root(glb *g, size_t bytes, double end, json_t *roots) {
   static const char packed[] = "EXT_meshopt_compression";
   json_t *root =
@@ -129,7 +130,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   *total = 12 + 8 + length + padding + 8 + bytes;
   if (*total > UINT32_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s: %zu bytes exceed the 4 GiB of glTF binary: use fewer modes or "
+                            "%s: %zu bytes exceed glTF's limit of 4 GiB: use fewer modes or "
                             "vertices",
                             path, *total);
   }
@@ -151,7 +152,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   return status;
 }
 
-/* Build all parts in memory, then write the file. */
+/* Build the chunks in memory, then write the file; set `total` to its size, bytes. */
 static supine_status make_and_write(glb *g, const char *path, size_t *total, supine_error *error) {
   char *numbers = NULL;
   size_t bytes = 0;

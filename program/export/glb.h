@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * State of a glTF binary file while it is built, shared by glb.c and glb_*.c. */
+ * Build a glTF binary file: the state and functions that glb.c and glb_*.c share. */
 #ifndef SUPINE_EXPORT_GLB_H
 #define SUPINE_EXPORT_GLB_H
 
@@ -9,20 +9,21 @@
 #include "program/export/packed.h"
 #include "program/export/targets.h"
 
-/** Kinds of array. Unless the file is plain, positions and weights are stored as 16-bit integers
- * and normals as bytes, and arrays of meshes are compressed. */
+/** Kinds of array, with their types in memory. Unless export_glb_options.plain is set, the file
+ * holds positions and weights as 16-bit integers and normals as bytes, and meshes are compressed.
+ */
 typedef enum glb_kind {
-  GLB_CORNERS,  /**< uint32_t: vertex indices of triangles */
+  GLB_CORNERS,  /**< uint32_t: vertex indices, three for each triangle */
   GLB_PLACES,   /**< float [3]: positions or displacements in units of glb.step */
   GLB_NORMALS,  /**< float [3]: unit normals */
-  GLB_CHANGES,  /**< float [3]: what a target adds to normals */
+  GLB_CHANGES,  /**< float [3]: vectors that a target adds to normals */
   GLB_COLOURS,  /**< uint8_t [4]: RGBA, linear */
-  GLB_TIMES,    /**< float: times of animations, s */
-  GLB_WEIGHTS,  /**< float: weights of targets in animations, 0 to 1 */
-  GLB_ROTATIONS /**< float [4]: quaternions X, Y, Z, W */
+  GLB_TIMES,    /**< float: times of an animation's frames, s */
+  GLB_WEIGHTS,  /**< float: weights of targets in an animation, 0 to 1 */
+  GLB_ROTATIONS /**< float [4]: quaternions x, y, z, w */
 } glb_kind;
 
-/** Parts of the file that are built so far. */
+/** State of a file while it is built. */
 typedef struct glb {
   const export_source *source;
   const export_glb_options *options;
@@ -30,26 +31,26 @@ typedef struct glb {
   export_order order; /**< order in which vertices and triangles are written */
   float *xyz;         /**< [N, 3] workspace */
   float *normals;     /**< [N, 3] unit normals of the base mesh */
-  float *added;       /**< [targets, N, 3] what each target adds to the normals at weight 1 */
-  uint8_t *colours;   /**< [N, 4] RGBA */
-  double step;        /**< unit of GLB_PLACES, mm; 1 in plain files */
+  float *added;       /**< [targets, N, 3] vectors that targets add to the normals at weight 1 */
+  uint8_t *colours;   /**< [N, 4] linear RGBA of vertices */
+  double step;        /**< unit of GLB_PLACES, mm; 1 if options->plain */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
-  FILE *numbers;        /**< contents of the binary chunk, in memory */
-  size_t unpacked;      /**< bytes of the compressed arrays once decoded */
+  FILE *numbers;        /**< binary chunk, in memory */
+  size_t unpacked;      /**< size of the compressed arrays after decoding, bytes */
   supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */
 } glb;
 
-/** Append an array of `count` rows and return its accessor's index.
+/** Append an array of `count` rows and return the index of its accessor.
  * @param order  [count] index in `rows` of each row to write; NULL: 0, 1, 2, ... */
 json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
                                  size_t count);
 
-/** Append an accessor of `count` rows that are 0, which takes no space, and return its index. */
+/** Append an accessor of `count` rows of zeros, which the file does not store; return its index. */
 json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 
-/** Append a mesh and a node that shows it; return the node's index. The mesh is in units of
- * glb.step, LPS, from the centre of the lungs; the node converts it to metres, y up.
- * @param mesh  the file takes ownership */
+/** Append a mesh and a node that shows it; return the node's index. Positions of the mesh are LPS
+ * from the centre of the lungs, in units of glb.step; the node converts them to metres, y up.
+ * @param mesh  becomes part of `g`, which frees it */
 json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
 
 /** Append the mesh of a lung, with morph targets; return its node's index. */
@@ -58,18 +59,18 @@ json_int_t supine_export_glb_add(glb *g, size_t lung);
 /** Append a material and return its index. */
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
-/** Return the extras of the file: how weights follow from gravity and volume.
- * @param end  displacement at the end of the colours, mm */
+/** Return the extras of the file, which say how weights follow from gravity and volume.
+ * @param end  displacement that the last colour shows, mm */
 json_t *supine_export_glb_extras(const glb *g, double end);
 
-/** Return the extras of a lung's mesh. */
+/** Return the extras of a lung's mesh: its numbers in the formulas of the file's extras. */
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
 
-/** Compute the rotation X, Y, Z, W of the node "patient", lying down and turned about the body's
- * long axis by `roll` radians: 0 is supine, pi / 2 the left side. */
+/** Compute the rotation of the node "patient" as a quaternion x, y, z, w: lying down, and turned
+ * about the body's long axis by `roll` radians: 0 is supine, pi / 2 is on the left side. */
 void supine_export_glb_rotation(double roll, float q[4]);
 
-/** Append the animations. The node of lung i is 1 + i, that of the patient 0. */
+/** Append the animations. The patient must be node 0, and lung i node 1 + i. */
 void supine_export_glb_animate(glb *g);
 
 /** Append a table and an arrow that shows gravity; return the root nodes of the scene: the patient,

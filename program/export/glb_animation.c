@@ -9,8 +9,8 @@
 static const double pi = 3.14159265358979323846;
 enum { RATE = 6 /* frames per second */, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
 
-/* Gravity in the body is (sin t, cos t, 0) at roll t. In glTF's axes the patient turns by t about
- * y, the body's long axis, then by -90 degrees about x to lie down. */
+/* At roll t, gravity in the patient's axes is (sin t, cos t, 0). In glTF's axes the patient turns
+ * by t about y, the body's long axis, then by -90 degrees about x to lie down. */
 void supine_export_glb_rotation(double roll, float q[4]) {
   const double c = cos(roll / 2) * sqrt(0.5);
   const double s = sin(roll / 2) * sqrt(0.5);
@@ -20,22 +20,22 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the roll at a time, radians: each posture is held for half of SECONDS, then the patient
- * turns to the next. */
+/* Return the roll at a time of the animation, radians: the patient stays in each posture for half
+ * of SECONDS, then turns to the next one in the other half. */
 static double roll_at(double seconds) {
   const double stage = floor(seconds / SECONDS);
   const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
   return pi / 2 * (stage + x * x * (3 - 2 * x));
 }
 
-/* Compute the weights of all lungs for one frame, `seconds` into the breath. `rows` points to the
- * frame of the first lung in an array [lungs, frames, targets]. */
+/* Compute the weights of all lungs in one frame, `seconds` after the start of a breath. `rows`
+ * points to the frame's row of the first lung in an array [lungs, frames, targets]. */
 static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
   const double gravity[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
   double weights[EXPORT_TARGETS_MAX];
   supine_pose pose;
-  /* This succeeds: supine_export_targets_choose has posed all directions at both ends. */
+  /* No failure is expected: supine_export_targets_choose reached both ends of the breath. */
   (void)supine_export_breath_pose(g->source, g->options->breath, gravity, fraction, &pose, NULL);
   for (size_t i = 0; i < g->source->info->lung_count; ++i) {
     supine_export_targets_weights(g->source, &g->targets, &pose, i, weights);
@@ -45,7 +45,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   }
 }
 
-/* Append an animation at `roll` radians; NAN turns the patient through all lying postures. */
+/* Append an animation of breathing at `roll` radians; NAN means while the patient turns around. */
 static void add(glb *g, const char *name, double roll, size_t seconds) {
   const size_t count = g->source->info->lung_count;
   const size_t frames = RATE * seconds + 1;

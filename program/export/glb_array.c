@@ -8,14 +8,14 @@
 #include "program/export/packed.h"
 #include "program/export/template.h"
 
-/* How a kind of array is stored. */
+/* Format in which the file stores a kind of array. */
 typedef struct layout {
   const char *type;
   size_t columns;
   size_t stride; /* bytes per row */
-  int component; /* glTF's code for the type of a column */
-  int limit;     /* largest stored integer; 0: rows are stored as given */
-  int target;    /* glTF's code for the use of the buffer view; 0: none */
+  int component; /* componentType of the accessor */
+  int limit;     /* largest integer that a column may hold; 0: rows are stored as they are */
+  int target;    /* `target` of the buffer view; 0: none */
 } layout;
 
 static layout layout_of(const glb *g, glb_kind kind) {
@@ -43,7 +43,7 @@ static layout layout_of(const glb *g, glb_kind kind) {
   }
 }
 
-/* Return the rows as they are stored; the caller frees them. Return NULL if out of memory. */
+/* Return the rows in the format of the file, to be freed by the caller; NULL if out of memory. */
 static unsigned char *store(glb_kind kind, const layout *l, const void *rows, const uint32_t *order,
                             size_t count) {
   unsigned char *stored = calloc(count + 1, l->stride);
@@ -63,13 +63,14 @@ static unsigned char *store(glb_kind kind, const layout *l, const void *rows, co
       const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
       const double value = (double)values[k] * (kind == GLB_PLACES ? 1 : l->limit);
       const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
-      memcpy(row + k * bytes, &counts, bytes); /* the low byte is first */
+      memcpy(row + k * bytes, &counts, bytes); /* the low bytes, on a little-endian machine */
     }
   }
   return stored;
 }
 
-/* Write stored rows, compressed unless `mode` is NULL, and return their buffer view. */
+/* Write stored rows and return their buffer view. `mode` is that of EXT_meshopt_compression; NULL
+ * stores the rows without compression. */
 static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned char *stored,
                           size_t count, const char *mode) {
   const size_t bytes = count * l->stride;
@@ -105,7 +106,7 @@ static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned
   return view;
 }
 
-/* Set the accessor's minimum and maximum of each column from the stored rows. */
+/* Set `min` and `max` of an accessor to the extremes of each column of the stored rows. */
 static void set_bounds(json_t *accessor, const layout *l, const unsigned char *stored,
                        size_t count) {
   double low[3] = {INFINITY, INFINITY, INFINITY};

@@ -7,44 +7,36 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-enum { FORMS_MAX = 32 }; /* most targets with volume forms: more would be larger than the mesh */
+/* Largest number of targets with volume formulas. Those of more would be larger than the mesh. */
+enum { FORMS_MAX = 32 };
 
 static const char frame_text[] =
-    "Meshes of lungs are in the patient's axes, LPS (x left, y back, z head), from 'middle', mm: "
-    "position = middle + millimetresPerUnit * vertex. Their nodes turn them to glTF's metres, y to "
-    "the head, z to the front, and the node 'patient' lays the patient down.";
+    "Vertices of a lung's mesh are in the patient's axes, LPS (x left, y back, z head), from "
+    "'middle', mm: position = middle + millimetresPerUnit * vertex. The mesh's node converts "
+    "them to glTF's metres (y head, z front); the node 'patient' lays the patient down.";
 static const char weights_text[] =
-    "weight[j] = (gain v - offset[j]) / unit[j] with the lung's offset and unit, where v = v[k] = "
-    "modeUnit * the sum over i of modes[k][i] * Y[i](g), and the gain is s for j = k < K, t for "
-    "j = K + k. g: unit vector of gravity in the patient's axes (supine 0,1,0). Y: real spherical "
-    "harmonics, orthonormal, no "
-    "Condon-Shortley phase, index l*l+l+m, m < 0 the sine terms: Y[0] = 0.28209479, Y[1..3] = "
-    "0.48860251 * (y, z, x). The displacement along axis a is that of the modes times A[a] = s + t "
-    "* "
-    "bend[a]; s = t = 0 gives the basis' own surface.";
+    "weight[j] = (amount[j] - offset[j]) / unit[j], with the lung's offset and unit. With K "
+    "modes, amount[j] = s v[j] for j < K and amount[K + k] = t v[k]. v[k] = modeUnit * sum over "
+    "i of modes[k][i] * Y[i](g), where g is the unit vector of gravity in the patient's axes "
+    "(supine 0,1,0). Y: real orthonormal spherical harmonics, index l*l+l+m, sine terms at m < "
+    "0, no Condon-Shortley phase: Y[0] = 0.28209479, Y[1..3] = 0.48860251 * (y, z, x). The gain "
+    "along axis a is A[a] = s + t * bend[a]; s = t = 0 is the reference surface.";
 static const char volume_text[] =
-    "mL a lung holds beyond its referenceVolume: L[a] A[a] + Q[0] A[1] A[2] + Q[1] A[0] A[2] + "
-    "Q[2] "
-    "A[0] A[1] + C A[0] A[1] A[2], summed over the axes a, L[a] = sum linear[a][k] v[k], Q[a] = "
-    "sum "
-    "quadratic[a][k][l] v[k] v[l], C = sum cubic[k][l][m] v[k] v[l] v[m]; arrays are flat, last "
-    "index "
-    "fastest; if linear has no axis a, all A are s and the terms L s + Q s^2 + C s^3. For a volume "
-    "with "
-    "a bend, first find r, the s that gives the volume at rest with t = 0; then the q at which s = "
-    "r "
-    "q, t = 2 r e(q) give the volume, where e = (q^3 - q) / 2 for q <= 1, (q - 1) / q^6 above. "
-    "Without "
-    "a bend, find s on the branch through s = 0.";
+    "volume of a lung minus its referenceVolume, mL: sum over axes a of L[a] A[a], plus Q[0] "
+    "A[1] A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] A[1] A[2], where L[a] = sum "
+    "linear[a][k] v[k], Q[a] = sum quadratic[a][k][l] v[k] v[l], C = sum cubic[k][l][m] v[k] "
+    "v[l] v[m]. Arrays are flat, last index fastest. If linear has only K numbers, all gains are "
+    "s and the volume is L s + Q s^2 + C s^3. To reach a volume without bend, solve for s on the "
+    "branch through s = 0. With bend, first find r, the s of the volume at rest with t = 0; then "
+    "find the q at which s = r q, t = 2 r e(q) give the volume, where e = (q^3 - q) / 2 for q <= "
+    "1, else (q - 1) / q^6.";
 static const char resting_text[] =
-    "volume of a lung at rest minus referenceVolume, mL: the sum over l <= 2 and m of "
-    "resting[l*l+l+m] * Y[l*l+l+m](g), of all lungs together if byLung is false. Above rest all "
-    "lungs "
-    "have filled by the same fraction of the way from rest to full inflation, which is "
-    "max(0, -g_z)^2 "
-    "* fullUprightGain * referenceVolume, counted from referenceVolume too.";
+    "volume of a lung at rest minus referenceVolume, mL: sum over l <= 2 and m of "
+    "resting[l*l+l+m] * Y[l*l+l+m](g); of all lungs together if byLung is false. Full inflation "
+    "minus referenceVolume is max(0, -g_z)^2 * fullUprightGain * referenceVolume. Above rest, "
+    "all lungs have covered the same fraction of the way from rest to full inflation.";
 
-/* Return the names of the targets: "mode_3", and "bend_3" for the bend of that mode. */
+/* Return the names of the targets: "mode_3" for a mode, "bend_3" for the bend of that mode. */
 static json_t *target_names(const glb *g) {
   const size_t k = g->source->info->mode_count;
   json_t *names = json_array();
@@ -54,7 +46,7 @@ static json_t *target_names(const glb *g) {
   return names;
 }
 
-/* Return a copy of the metadata that describe how the basis was made. */
+/* Return the metadata that describe how the basis was made, as JSON. */
 static json_t *origin(const export_source *source) {
   static const char *const keys[] = {
       "lungs",       "made_by",          "force", "direction", "direction_constants", "stiffness",
@@ -72,7 +64,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* of stored modes: integers take half the space of fractions */
+  const double unit = 1e-7; /* unit of the modes, stored as integers because these are shorter */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();
@@ -82,12 +74,12 @@ json_t *supine_export_glb_extras(const glb *g, double end) {
     }
     (void)json_array_append_new(modes, row);
   }
-  json_t *supine =
-      json_pack("{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text,
-                "weights", weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit",
-                unit, "bend", supine_template_numbers(s->info->bend, 3), "middle",
-                supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step,
-                "breathVolume", g->options->breath, "largestMoveColoured", end, "basis", origin(s));
+  json_t *supine = json_pack(
+      "{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:f, s:f, s:o}", "frame", frame_text, "weights",
+      weights_text, "band", (int)s->info->band, "modes", modes, "modeUnit", unit, "bend",
+      supine_template_numbers(s->info->bend, 3), "middle",
+      supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step, "breathVolume",
+      g->options->breath, "largestDisplacementColoured", end, "basis", origin(s));
   if (g->targets.count <= FORMS_MAX) {
     (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Append the patient's surroundings to a glTF file: a table and an arrow that shows gravity, y up.
- */
+/* Append a table and an arrow that shows gravity to a glTF file. */
 #include <math.h>
 
 #include "program/export/glb.h"
 
 enum { SIDES = 16, RINGS = 5 };
 
-/* Append a solid of revolution about y, given by a profile of radii and heights, mm, and return its
- * node. It has no normals, so engines shade its facets flat. */
+/* Append a solid of revolution about the vertical axis, given by a profile of radii and heights,
+ * mm, and return its node. It has no normals, so that engines shade each facet flat. */
 static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2], size_t sides,
                         const double rgb[3]) {
   float places[RINGS * SIDES][3];
@@ -17,7 +16,7 @@ static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2]
   for (size_t ring = 0; ring < RINGS; ++ring) {
     for (size_t i = 0; i < sides; ++i) {
       const double angle = 6.28318530717958648 * ((double)i + 0.5) / (double)sides;
-      float *place = places[ring * sides + i]; /* LPS, z up: supine_export_glb_show turns it */
+      float *place = places[ring * sides + i]; /* z up; supine_export_glb_show makes it y up */
       place[0] = (float)(profile[ring][0] * cos(angle) / g->step);
       place[1] = (float)(profile[ring][0] * sin(angle) / g->step);
       place[2] = (float)(profile[ring][1] / g->step);

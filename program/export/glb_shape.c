@@ -26,7 +26,7 @@ json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb
   return (json_int_t)json_array_size(g->materials) - 1;
 }
 
-/* Compute the displacement of a vertex in target `j`, in units of glb.step. */
+/* Compute the displacement of a vertex by target `j` at weight 1, in units of glb.step. */
 static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, double xyz[3]) {
   supine_export_targets_field(g->source, vertex, j, xyz);
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -34,8 +34,8 @@ static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, dou
   }
 }
 
-/* Compute a vertex of the base mesh, in units of glb.step, with a correction that cancels the
- * rounding of the targets at the weights `rest`. */
+/* Compute the position of a vertex of the base mesh, in units of glb.step, corrected so that the
+ * rounding of the targets cancels at the weights `rest`. */
 static void place_base(const glb *g, size_t lung, const double *rest, size_t vertex,
                        double xyz[3]) {
   supine_export_targets_base(g->source, &g->targets, lung, vertex, xyz);
@@ -51,13 +51,13 @@ static void place_base(const glb *g, size_t lung, const double *rest, size_t ver
   }
 }
 
-/* Append the rows of a lung's vertices. */
+/* Append a lung's rows of an array over all vertices; return the index of the accessor. */
 static json_int_t put(glb *g, size_t lung, glb_kind kind, const void *rows) {
   const size_t *begin = g->source->info->lung_begin + lung;
   return supine_export_glb_put(g, kind, rows, g->order.vertex + begin[0], begin[1] - begin[0]);
 }
 
-/* Append the positions of target `j`, or of the base if `j` is the number of targets. */
+/* Append the displacements by target `j`, or the base mesh if `j` is the number of targets. */
 static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) {
   const size_t *begin = g->source->info->lung_begin + lung;
   for (size_t i = begin[0]; i < begin[1]; ++i) {
@@ -74,7 +74,7 @@ static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) 
   return put(g, lung, GLB_PLACES, g->xyz);
 }
 
-/* Append what target `j` adds to the normals. */
+/* Append the vectors that target `j` adds to the normals. */
 static json_int_t put_changes(glb *g, size_t lung, size_t j) {
   const supine_basis_info *info = g->source->info;
   const size_t *begin = info->lung_begin + lung;

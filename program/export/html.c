@@ -11,18 +11,19 @@
 #include "program/export/template.h"
 #include "program/render/render.h"
 
-extern const supine_asset supine_export_assets[]; /* files of page/, embedded by the build */
+extern const supine_asset supine_export_assets[]; /* the files of program/export/page */
 
 enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORMAL_BIAS = 128 };
 
-/* A page being printed. Positions and displacements are stored as 16-bit counts. */
+/* State while a page is printed. Positions and coefficients are stored as 16-bit multiples of a
+ * unit, called counts. */
 typedef struct page {
   const export_source *source;
   const export_page *shown;
   double middle[3];   /* origin of stored positions: centre of the box of all vertices, mm */
-  double place_unit;  /* mm per count of a position */
-  double unit;        /* mm per count of a coefficient, for directions of unit length */
-  double inside_unit; /* mm per count of a coefficient of the content */
+  double place_unit;  /* unit of positions, mm */
+  double unit;        /* unit of the lungs' coefficients, for directions of length 1, mm */
+  double inside_unit; /* unit of the coefficients of the content, mm */
   export_order order; /* order in which the lungs' vertices and triangles are written */
   supine_status *status;
 } page;
@@ -83,17 +84,17 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* Round a number of `bits` bits and a sign to steps of 1 << shift; return the steps plus
- * NORMAL_BIAS: numbers near 0 then have the same high byte, which compresses well. */
+/* Divide a number between plus and minus 1 << bits by 1 << shift and round it; return the quotient
+ * plus NORMAL_BIAS, so that numbers near 0 have the same high byte, which compresses well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
   const int32_t steps = (number + (1 << shift) / 2) >> shift;
   return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
-/* Unpack the words of a vertex' normals, each of which holds three numbers (see supine.glsl): fill
- * the row with the first numbers of all words and axes, then the second ones, then the third ones,
- * without their lowest 2, 2 and 1 bits (see basis.js). */
+/* Fill a row with the normals of a vertex. Each word of supine_gl_pack_normals holds three numbers;
+ * the row holds the first numbers of all words, then the second, then the third, without their
+ * lowest 2, 2 and 1 bits (takeNormals in basis.js reads them). */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
@@ -134,8 +135,8 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
   write_packed(p, file, name, status, packed);
 }
 
-/* Choose the units of the counts: small enough for positions to 0.02 mm, unless a count would
- * exceed COUNT_MAX. */
+/* Choose the origin and the units of the counts: units that keep positions to 0.02 mm, or larger
+ * ones if a count would exceed COUNT_MAX. */
 static void find_units(page *p) {
   static const double step = 0.005;
   const export_source *s = p->source;
@@ -165,7 +166,7 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* Write the tensors of doubles uncompressed; skip those that the basis lacks. */
+/* Write those tensors of doubles that the basis has, without compression. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -200,7 +201,7 @@ static json_t *colours(void) {
   return maps;
 }
 
-/* Return `begin` as JSON: [lungs + 1] index of each lung's first vertex or corner, and the end. */
+/* Return `begin` as JSON: the first index of each lung, then the end. */
 static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
   for (size_t i = 0; i <= s->info->lung_count; ++i) {
@@ -209,7 +210,7 @@ static json_t *begins(const export_source *s, const size_t *begin) {
   return list;
 }
 
-/* Return the description of the content as JSON; null without content. */
+/* Return the description of the content as JSON; null if there is none. */
 static json_t *describe_inside(const page *p) {
   if (p->shown->inside == NULL) {
     return json_null();
@@ -217,8 +218,8 @@ static json_t *describe_inside(const page *p) {
   const supine_basis_info *info = p->shown->inside->info;
   json_t *names = json_array();
   for (size_t i = 0; i < p->shown->parts->count; ++i) {
-    json_t *name = json_string(p->shown->parts->name[i]);
-    (void)json_array_append_new(names, name != NULL ? name : json_string("?")); /* not UTF-8 */
+    json_t *name = json_string(p->shown->parts->name[i]); /* NULL if it is not UTF-8 */
+    (void)json_array_append_new(names, name != NULL ? name : json_string("?"));
   }
   const supine_tensor *rigid = supine_basis_tensor(p->shown->inside->basis, "rigid");
   json_t *parts = json_array();
@@ -232,8 +233,8 @@ static json_t *describe_inside(const page *p) {
                    "unit", p->inside_unit);
 }
 
-/* Return the volume of the scan minus that of the reference surface, all lungs together, mL; 0 if
- * it is unknown. */
+/* Return the volume of all lungs in the scan minus that of the reference surface, mL; 0 if the pose
+ * of the scan cannot be computed. */
 static double scan_volume(const export_source *s) {
   const supine_state scan = supine_basis_scan(s->basis);
   double held[SUPINE_LUNGS_MAX];
@@ -250,7 +251,7 @@ static double scan_volume(const export_source *s) {
   return beyond;
 }
 
-/* Return the pose that displacements are measured from as JSON. */
+/* Return the pose from which displacements are measured, as JSON. */
 static json_t *describe_from(const page *p) {
   return json_pack(
       "{s:s, s:o, s:o}", "name", p->shown->from_name, "weights",
@@ -315,8 +316,8 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
   if (info->vector || info->mode_count > EXPORT_PAGE_MODES_MAX) {
     return supine_error_set(
         error, SUPINE_ERROR_UNSUPPORTED,
-        "a page shows scalar bases of up to %d modes; this is a %s basis of %zu "
-        "mode%s: %sexport .glb",
+        "a page shows a scalar basis of up to %d modes, not a %s basis of %zu mode%s: "
+        "%sexport .glb",
         EXPORT_PAGE_MODES_MAX, info->vector ? "vector" : "scalar", info->mode_count,
         info->mode_count == 1 ? "" : "s", info->vector ? "" : "precompute it with --modes 16, or ");
   }

@@ -22,7 +22,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 supine_status supine_export_pack_begin(supine_error *error) {
   const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error);
   if (status == SUPINE_OK) {
-    meshopt.encodeIndexVersion(1); /* EXT_meshopt_compression requires it */
+    meshopt.encodeIndexVersion(1); /* EXT_meshopt_compression requires version 1 */
   }
   return status;
 }
@@ -54,9 +54,9 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
   return SUPINE_OK;
 }
 
-/* Sort a lung's triangles from feet to head, then in strips: neighbours along a strip around the
- * long axis differ least. `from` [corners] and `level` [N, 3] are workspace; level holds (z, 0, 0).
- */
+/* Sort a lung's triangles from feet to head, then into strips: neighbours along a strip around the
+ * long axis differ least. `level` [N, 3] holds (z, 0, 0) of each vertex; `from` [count] is
+ * workspace. */
 static void sort_triangles(uint32_t *corners, size_t count, const float *level, size_t vertices,
                            uint32_t *from) {
   memcpy(from, corners, count * sizeof *from);
@@ -64,8 +64,8 @@ static void sort_triangles(uint32_t *corners, size_t count, const float *level, 
   meshopt.optimizeVertexCacheStrip(corners, corners, count, vertices);
 }
 
-/* Number the vertices of a lung in the order in which its corners first use them, unused vertices
- * last, and renumber the corners. `place` is workspace, [N]. */
+/* Renumber the vertices of a lung in the order in which its corners first use them, with unused
+ * vertices last. `place` [N] is workspace. */
 static void number_vertices(const export_source *source, size_t lung, uint32_t *place,
                             export_order *order) {
   const size_t *begin = source->info->lung_begin + lung;

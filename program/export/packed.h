@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Compress arrays with meshoptimizer, as the page and EXT_meshopt_compression decode them. */
+ * Compress arrays with meshoptimizer, in the format of EXT_meshopt_compression. */
 #ifndef SUPINE_EXPORT_PACKED_H
 #define SUPINE_EXPORT_PACKED_H
 
@@ -17,7 +17,7 @@ typedef struct export_packed {
 supine_status supine_export_pack_begin(supine_error *error);
 
 /** Encode a unit vector for the decoder's filter OCTAHEDRAL as 4 signed integers; the last is 0.
- * @param size     size of the 4 integers together, bytes: 4 or 8
+ * @param size     total size of the 4 integers, bytes: 4 or 8
  * @param numbers  [size] bytes; output */
 void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
 
@@ -26,21 +26,21 @@ void supine_export_pack_direction(const float direction[3], size_t size, void *n
 supine_status supine_export_pack_rows(const void *rows, size_t count, size_t stride,
                                       export_packed *packed);
 
-/** Compress triangles: `count` vertex indices below `vertices`.
+/** Compress triangles, given as `count` vertex indices below `vertices`.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, size_t vertices,
                                          export_packed *packed);
 
 /** Order in which vertices and triangles are written, lung by lung. */
 typedef struct export_order {
-  uint32_t *vertex;  /**< [N] index in the basis of each vertex written */
-  uint32_t *corners; /**< [M, 3] triangles, as indices of vertices written */
-  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< first corner of each lung, and the end */
+  uint32_t *vertex;                          /**< [N] index in the basis of each written vertex */
+  uint32_t *corners;                         /**< [triangles, 3] indices of written vertices */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< first corner of each lung, then the end */
 } export_order;
 
-/** Choose an order; release it with supine_export_order_free, also after a failure.
- * @param packed  order triangles, and vertices by their first triangle, so that they compress well
- *                (supine_export_pack_begin must have been called); else keep the basis' order
+/** Choose an order; free it with supine_export_order_free, also after a failure.
+ * @param packed  true: sort triangles, and vertices by their first triangle, so that they compress
+ *                well; call supine_export_pack_begin first. false: keep the order of the basis
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_order_make(const export_source *source, bool packed,
                                        export_order *order, supine_error *error);

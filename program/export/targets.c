@@ -7,11 +7,12 @@
 
 #include "sh/base/vec3.h"
 
-enum { DIRECTIONS = 4096 }; /* directions of gravity sampled */
-/* Fraction of each range that is added at both ends, for directions between the samples. */
+enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
+/* Fraction of a weight's range that is added at both ends, for directions between the samples. */
 static const double margin = 0.02;
 
-/* Find s and t of gains s + t bend, from the axes that bend least and most. */
+/* Find `split`, the s and t of the gains s + t bend[axis], from the axes with the least and the
+ * largest bend. */
 static void split_gains(const double bend[3], const double gains[3], double split[2]) {
   size_t low = 0;
   size_t high = 0;
@@ -23,7 +24,7 @@ static void split_gains(const double bend[3], const double gains[3], double spli
   split[0] = gains[low] - split[1] * bend[low];
 }
 
-/* Compute gain times weight for each field of a lung. */
+/* Compute the amount of each of `count` fields of a lung: the field's gain times its weight. */
 static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
                          size_t lung, double *amounts) {
   const size_t k = source->info->mode_count;
@@ -43,9 +44,9 @@ void supine_export_targets_weights(const export_source *source, const export_tar
   }
 }
 
-/* Set the offset of each field to its smallest amount over directions and the breath, and its unit
- * to the range of the amounts. Gains are monotonic in the volume, so both ends of the breath
- * suffice. */
+/* Set the offset of each field to its smallest amount over all directions and volumes of a breath,
+ * and its unit to the range of the amounts. Gains are monotonic in the volume, so that both ends of
+ * the breath suffice. */
 static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {
   double amounts[EXPORT_TARGETS_MAX];
@@ -108,7 +109,7 @@ void supine_export_targets_field(const export_source *source, size_t vertex, siz
   }
 }
 
-/* Add the sum over j of amount_j field_j at a vertex to `xyz`. */
+/* Add the sum over j of amount[j] times field j at a vertex to `xyz`, mm. */
 static void add_fields(const export_source *source, size_t count, const double *amount,
                        size_t vertex, double xyz[3]) {
   for (size_t j = 0; j < count; ++j) {
@@ -128,8 +129,8 @@ void supine_export_targets_base(const export_source *source, const export_target
   add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
 }
 
-/* Compute the normals of the surface at the `weights` of each lung, with weight j increased by
- * `step` in every lung. `xyz` is workspace, [N, 3]. */
+/* Compute the normals of the surface, [N, 3], at the given weights of each lung, with weight `j`
+ * increased by `step` in every lung. `xyz` [N, 3] is workspace. */
 static void find_normals(const export_source *source, const export_targets *targets,
                          double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
                          float *normals) {
@@ -151,11 +152,11 @@ static void find_normals(const export_source *source, const export_targets *targ
   supine_normals(source->basis, xyz, normals);
 }
 
-/* Scale the base normals to length 1, which glTF requires, and divide what targets add to them by
- * the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
+/* Scale the base normals to length 1, which glTF requires, and divide the vectors that targets add
+ * by the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* smallest length to divide by; limits what targets add */
+  static const double least = 0.2; /* smallest divisor, which limits the length of the vectors */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -173,13 +174,13 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
-/* Round what targets add to normals to bytes, or to the value of the vertex written before if that
- * is near, because equal rows compress to nearly nothing; correct the base so that the normals at
- * `weights` stay the same. */
+/* Round the vectors that targets add to normals to bytes, or to the vector of the previous vertex
+ * in `order` if that is near, because equal rows compress to almost nothing. Correct the base so
+ * that the normals at `weights` stay the same. */
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
-  static const float near = 2; /* in steps of a byte */
+  static const float near = 2; /* largest difference that is near, in units of a byte */
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
@@ -206,8 +207,8 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             const export_targets *targets, const uint32_t *order,
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
-  static const double step = 0.2;    /* of a weight, for central differences */
-  static const double least = 0.044; /* smallest RMS change that is kept: 2.5 degrees */
+  static const double step = 0.2;    /* change of a weight for central differences */
+  static const double least = 0.044; /* least RMS change of normals kept, radians (2.5 degrees) */
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

@@ -8,48 +8,49 @@
 
 enum { EXPORT_TARGETS_MAX = 2 * SUPINE_MODES_MAX };
 
-/** Offsets and units of one lung's weights. Engines clamp weights to [0, 1], so these are chosen to
- * keep them there for every direction of gravity and every volume up to the end of the breath:
+/** Offsets and units of the weights of one lung's targets. Engines clamp weights to [0, 1]; offsets
+ * and units keep them there for every direction of gravity and every volume of the breath:
  *
  *     base = vertex - middle + sum over j of offset_j field_j        target_j = unit_j field_j
  *     weight_j = (gain v - offset_j) / unit_j
  *
- * The basis has K modes, weights v_k and, along the three axes, gains A = s + t bend. field_k is
- * the displacement of mode k, and its gain is s; where gains differ between axes, field_(K + k) is
- * that displacement times bend, axis by axis, and its gain is t. */
+ * The basis has K modes with weights v_k; the gains along the three axes are s + t bend[axis].
+ * field_k is the displacement by mode k, and its gain is s. If bend is not 0, field_(K + k) is the
+ * same displacement times bend[axis] along each axis; its gain is t and its weight v_k. */
 typedef struct export_weights {
   double offset[EXPORT_TARGETS_MAX];
   double unit[EXPORT_TARGETS_MAX];
 } export_weights;
 
 typedef struct export_targets {
-  size_t count;     /**< number of targets of a lung: K or 2 K */
+  size_t count;     /**< number of targets of a lung: one or two for each mode */
   double middle[3]; /**< centre of the box of the vertices, mm */
   double reach;     /**< half of the longest edge of the box, mm */
   export_weights lung[SUPINE_LUNGS_MAX];
 } export_targets;
 
 /** Choose the targets of every lung.
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the breath's volume */
+ * @param breath  tidal volume, mL
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before the end of the breath */
 supine_status supine_export_targets_choose(const export_source *source, double breath,
                                            export_targets *targets, supine_error *error);
 
-/** Compute a lung's weights [count] in a pose. */
+/** Compute the weights of a lung's targets, [count], in a pose. */
 void supine_export_targets_weights(const export_source *source, const export_targets *targets,
                                    const supine_pose *pose, size_t lung, double *weights);
 
 /** Compute the displacement of field `j` at a vertex, mm. */
 void supine_export_targets_field(const export_source *source, size_t vertex, size_t j, double u[3]);
 
-/** Compute a vertex of the base mesh, mm from the middle. */
+/** Compute the position of a vertex of the base mesh, mm from the middle. */
 void supine_export_targets_base(const export_source *source, const export_targets *targets,
                                 size_t lung, size_t vertex, double xyz[3]);
 
-/** Compute unit normals of the base, [N, 3], and what each target adds to them at weight 1, [count,
- * N, 3], by linearising the surface's normals at supine, at rest.
- * @param order  [N] order in which vertices are written: round what targets add so that it
- *               compresses well in this order, and to 0 where it is below 2.5 degrees (RMS over a
- *               lung); NULL: do not round
+/** Compute the normals `base` of the base mesh, [N, 3], and the vectors `added` that each target
+ * adds to them at weight 1, [count, N, 3], by linearising the surface's normals about supine.
+ * @param order  [N] order in which vertices are written: round `added` so that it compresses well
+ *               in this order, and to 0 where a target turns the normals of a lung by less than
+ *               2.5 degrees (RMS); NULL: do not round
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_targets_normals(const export_source *source, double breath,
                                             const export_targets *targets, const uint32_t *order,

@@ -14,18 +14,18 @@ const supine_asset *supine_template_asset(const supine_asset *assets, const char
   return NULL;
 }
 
-/* A value of the data, and the scope around it. */
+/* A value of the data in which names are looked up, and the scope around it. */
 typedef struct scope {
   const json_t *value;
   const struct scope *outer;
 } scope;
 
-/* A tag: {{...}}. */
+/* A tag of a template: {{...}}. */
 typedef struct tag {
-  char kind; /* '#', '/' or 0 */
+  char kind; /* '#' begins a section, '/' ends one, 0 is a value */
   const char *name;
   size_t length;
-  const char *begin, *end; /* of the tag with its braces; both NULL if there is no further tag */
+  const char *begin, *end; /* the tag with its braces; NULL if there is no further tag */
 } tag;
 
 static tag next_tag(const char *at, const char *end) {
@@ -88,8 +88,8 @@ static void write_named(const supine_template *t, const tag *named, const scope 
   if (value != NULL) {
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
-    const size_t size =
-        asset->size - (asset->bytes[asset->size - 1] == '\n'); /* the tag precedes one */
+    /* Omit the last newline: one follows the tag. */
+    const size_t size = asset->size - (asset->bytes[asset->size - 1] == '\n');
     fill(t, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {
     (void)fwrite(asset->bytes, 1, asset->size, file);

@@ -2,14 +2,14 @@
 /** @file
  * Fill the templates of the page and the report:
  *
- *     {{name}}                a string or number of the data, escaped; else the asset of that name,
- *                             a .html filled with the same data, any other file unchanged
+ *     {{name}}                a string or number of the data, escaped; or the asset of that name:
+ *                             .html is filled with the same data, any other file is copied
  *     {{#name}} ... {{/name}} repeated for each element of a list; once for an object, a string, a
  *                             number or true; omitted for false, null or an unknown name
- *     {{.}}                   the element itself
+ *     {{.}}                   the element of the list, or the value of the section
  *
- * Inside a section, names are looked up in its element first, then in those around it. A newline
- * right after the tag of a section is omitted. */
+ * Inside a section, names are looked up in its element first, then in the sections around it. A
+ * newline right after the tag of a section is omitted. */
 #ifndef SUPINE_TEMPLATE_H
 #define SUPINE_TEMPLATE_H
 
@@ -17,10 +17,10 @@
 
 #include <jansson.h>
 
-/** A file embedded in the program by supine_embed; an array of them ends with a NULL name. */
+/** A file that supine_embed puts into the program. The last element of an array has name NULL. */
 typedef struct supine_asset {
-  const char *name;  /**< file name, as "page.css" */
-  const char *bytes; /**< ends with a 0 that `size` does not count */
+  const char *name;  /**< name of the file, for example "page.css" */
+  const char *bytes; /**< content, followed by a zero that `size` does not count */
   size_t size;
 } supine_asset;
 
@@ -32,20 +32,19 @@ const supine_asset *supine_template_asset(const supine_asset *assets, const char
 typedef struct supine_template {
   const supine_asset *assets;
   const json_t *data;
-  /** Write what is too large for JSON in place of a name that is neither data nor an asset; or
-   * NULL. */
+  /** Write the text of a tag whose name is neither data nor an asset; NULL: write nothing. */
   void (*write)(const void *context, const char *name, FILE *file);
   const void *context;
 } supine_template;
 
-/** Write the asset `name` with its tags filled. Unknown names write nothing; supine_embed refuses
- * them when the program is built. Write errors stay in the stream. */
+/** Write the asset `name` with its tags filled. An unknown name writes nothing; supine_embed
+ * refuses unknown names when the program is built. Write errors stay in the stream. */
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
 
-/** Return numbers as a JSON array. */
+/** Return `count` numbers as a JSON array. */
 json_t *supine_template_numbers(const double *values, size_t count);
 
-/** Write text with the reserved characters of HTML, & < > ", replaced. */
+/** Write text with HTML's reserved characters & < > " replaced by entities. */
 void supine_template_escape(const char *text, FILE *file);
 
 #endif

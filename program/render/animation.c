@@ -7,7 +7,7 @@
 
 #include "program/render/render.h"
 
-/* WebP quality, 0 to 100: letters stay sharp, and files are a third of the lossless size. */
+/* WebP quality, 0 to 100. At 90, letters are sharp and files take a third of the lossless size. */
 static const float quality = 90.0F;
 enum { EFFORT = 2, SIDE_MAX = 16383 };
 
@@ -15,7 +15,7 @@ struct supine_animation {
   WebPAnimEncoder *encoder;
   WebPConfig config;
   size_t width, height;
-  int time; /* duration so far, ms */
+  int time; /* total duration of the pictures so far, ms */
   uint32_t *pixels;
 };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the colour maps: paths through OKLab, divided into equal distances, on which lightness
- * rises, so that the colours can be ordered in grey and with any colour vision. B. Ottosson, "A
- * perceptual color space for image processing", 2020. */
+/* Compute the colour maps: colours at equal distances along curves in OKLab. Lightness rises along
+ * each curve, so that colours keep their order in grey copies and for any colour vision.
+ * [Ottosson2020] B. Ottosson, "A perceptual color space for image processing". */
 #include <math.h>
 #include <pthread.h>
 #include <string.h>
@@ -12,8 +12,8 @@
 
 enum { KNOTS = 6, FINE = 4096, COLOURS = 256 };
 
-/* Lightness, chroma and hue (degrees) at the knots of the paths. */
-static const double paths[SUPINE_COLOURS_COUNT][KNOTS][3] = {
+/* Lightness, chroma and hue (degrees) at the knots of the curves. */
+static const double curves[SUPINE_COLOURS_COUNT][KNOTS][3] = {
     {{0.42, 0.14, 288},
      {0.51, 0.125, 258},
      {0.61, 0.098, 218},
@@ -46,17 +46,17 @@ static double encode(double x) {
   return clipped <= 0.0031308 ? 12.92 * clipped : 1.055 * pow(clipped, 1 / 2.4) - 0.055;
 }
 
-/* Compute the colour of a path at 0 <= t <= 1: Catmull-Rom interpolation between the knots. */
-static void path_at(const double path[KNOTS][3], double t, double lab[3]) {
+/* Compute the OKLab colour of a curve at 0 <= t <= 1 by Catmull-Rom interpolation. */
+static void curve_at(const double curve[KNOTS][3], double t, double lab[3]) {
   const double at = t * (KNOTS - 1);
   const int k = (int)fmin(floor(at), KNOTS - 2);
   const double u = at - k;
   double polar[3];
   for (int j = 0; j < 3; ++j) {
-    const double p = path[k > 0 ? k - 1 : 0][j];
-    const double q = path[k][j];
-    const double r = path[k + 1][j];
-    const double s = path[k + 2 < KNOTS ? k + 2 : KNOTS - 1][j];
+    const double p = curve[k > 0 ? k - 1 : 0][j];
+    const double q = curve[k][j];
+    const double r = curve[k + 1][j];
+    const double s = curve[k + 2 < KNOTS ? k + 2 : KNOTS - 1][j];
     polar[j] = 0.5 * (2 * q + (r - p) * u + (2 * p - 5 * q + 4 * r - s) * u * u +
                       (3 * q - p - 3 * r + s) * u * u * u);
   }
@@ -66,11 +66,11 @@ static void path_at(const double path[KNOTS][3], double t, double lab[3]) {
   lab[2] = polar[1] * sin(hue);
 }
 
-static void make_map(const double path[KNOTS][3], double map[COLOURS][3]) {
+static void make_map(const double curve[KNOTS][3], double map[COLOURS][3]) {
   double lab[FINE + 1][3];
   double length[FINE + 1] = {0};
   for (int i = 0; i <= FINE; ++i) {
-    path_at(path, i / (double)FINE, lab[i]);
+    curve_at(curve, i / (double)FINE, lab[i]);
     if (i > 0) {
       const double *a = lab[i - 1];
       const double *b = lab[i];
@@ -91,7 +91,7 @@ static void make_map(const double path[KNOTS][3], double map[COLOURS][3]) {
 
 static void make_colours(void) {
   for (int map = 0; map < SUPINE_COLOURS_COUNT; ++map) {
-    make_map(paths[map], colours[map]);
+    make_map(curves[map], colours[map]);
   }
 }
 

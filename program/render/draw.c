@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Draw the lungs: project the vertices, find the nearest triangle at each sample, shade it. */
+/* Draw the lungs: project the vertices, find the nearest triangle at each sample, and shade it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,10 +7,10 @@
 #include "program/render/render.h"
 #include "sh/base/parallel.h"
 
-/* Names of the views, and rotations from body axes (LPS) to the viewer's. */
+/* Names of the views, and rotations from the body's axes (LPS) to the viewer's axes. */
 static const struct {
   const char *name;
-  double axes[3][3]; /* right, up, towards the viewer */
+  double axes[3][3]; /* rows: right, up, towards the viewer */
 } views[SUPINE_VIEW_COUNT] = {
     {"anterior", {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}},
     {"posterior", {{-1, 0, 0}, {0, 0, 1}, {0, 1, 0}}},
@@ -18,7 +18,7 @@ static const struct {
     {"right", {{0, -1, 0}, {0, 0, 1}, {-1, 0, 0}}},
     {"head", {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},
     {"feet", {{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
-    /* from the front, 35 degrees to the patient's left and 18 degrees up */
+    /* The viewer stands 35 degrees to the patient's left of the front, and 18 degrees above. */
     {"oblique",
      {{0.8191520442889918, 0.57357643635104605, 0},
       {-0.17724486640549356, 0.25313190266227803, 0.95105651629515353},
@@ -36,24 +36,24 @@ void supine_render_view_axes(supine_view view, double axes[3][3]) {
 /* Each pixel is the mean of 2 x 2 samples. */
 enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GRAIN = 16 };
 
-static const double distance_in_radii = 5.0; /* from the viewer to the centre of the lungs */
-static const double depth_in_radii = 3.0;    /* depth range on either side of the centre */
-static const double margin = 1.03;           /* size of the frame relative to the extent */
+static const double distance_in_radii = 5.0; /* distance from the viewer to the lungs' centre */
+static const double depth_in_radii = 3.0;    /* depth drawn in front of the lungs' centre */
+static const double margin = 1.03;           /* ratio of the picture's size to the extent shown */
 static const float gamma_exponent = 2.2F;
 
 typedef struct corner {
-  float x, y;      /* samples, from the left and upper edge */
-  float nearness;  /* 1 / distance from the viewer along the view, 1/mm; 0: not drawn */
-  float normal[3]; /* unit normal: right, up, towards the viewer */
-  float eye[3];    /* from the vertex to the viewer, mm */
+  float x, y;      /* position, samples from the left and upper edges of the picture */
+  float nearness;  /* reciprocal of the distance along the view, 1/mm; 0: too near to be drawn */
+  float normal[3]; /* unit normal in the viewer's axes: right, up, towards the viewer */
+  float eye[3];    /* vector from the vertex to the viewer, mm, in the viewer's axes */
   float value;
 } corner;
 
 struct supine_renderer {
   const supine_basis *basis;
   const supine_basis_info *info;
-  float *scratch;  /* [2, N, 3] positions, mm, and unit normals */
-  corner *corners; /* [N] */
+  float *scratch;  /* [2, N, 3] positions, mm, then unit normals */
+  corner *corners; /* [N] vertices */
 };
 
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
@@ -81,7 +81,7 @@ void supine_render_destroy(supine_renderer *renderer) {
   }
 }
 
-/* A viewer in front of the centre of the reference surface, the same for every state drawn. */
+/* A viewer who looks at the centre of the reference surface: the same for every state. */
 typedef struct camera {
   double axes[3][3];
   double centre[3];
@@ -106,14 +106,14 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   return c;
 }
 
-/* Rotate a vector to the viewer's axes: right, up, towards the viewer. */
+/* Rotate a vector `v` of the body's axes to the viewer's axes. */
 static void turn(const camera *c, const double v[3], double seen[3]) {
   for (size_t row = 0; row < 3; ++row) {
     seen[row] = c->axes[row][0] * v[0] + c->axes[row][1] * v[1] + c->axes[row][2] * v[2];
   }
 }
 
-/* Transform a position to the viewer's axes, with the centre as the origin. */
+/* Transform a position, mm, to the viewer's axes, with the lungs' centre as the origin. */
 static void place(const camera *c, const float xyz[3], double seen[3]) {
   const double from[3] = {(double)xyz[0] - c->centre[0], (double)xyz[1] - c->centre[1],
                           (double)xyz[2] - c->centre[2]};
@@ -135,8 +135,8 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   }
 }
 
-/* Fit the extent into the picture: compute its centre, mm, and the scales in x and y, half sides of
- * the picture per mm. */
+/* Fit the extent into the picture: set `frame` to x and y of its centre, mm, then to the scales of
+ * x and y, in half widths and half heights of the picture per mm. */
 static void find_frame(supine_renderer *r, const supine_scene *scene, double frame[4]) {
   double extent[4] = SUPINE_EXTENT_NONE;
   if (scene->extent != NULL) {
@@ -154,7 +154,8 @@ static void find_frame(supine_renderer *r, const supine_scene *scene, double fra
   frame[3] = 1 / tall;
 }
 
-/* Project a point in the viewer's axes to a picture of `size` pixels or samples, y downwards. */
+/* Project a point `p` in the viewer's axes, mm, to a position `at` in a picture of `size` pixels or
+ * samples, from its left and upper edges. */
 static void project(const camera *c, const double frame[4], const double p[3], const double size[2],
                     double at[2]) {
   for (int side = 0; side < 2; ++side) {
@@ -180,11 +181,11 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 typedef struct canvas {
   supine_renderer *renderer;
   const supine_scene *scene;
-  size_t width, height;             /* samples */
+  size_t width, height;             /* size of the picture, samples */
   uint32_t *nearest;                /* [height, width] triangle nearest to the viewer, or NOTHING */
-  float *nearness;                  /* [height, width] its nearness, 1/mm */
+  float *nearness;                  /* [height, width] nearness of that triangle, 1/mm */
   float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
-  unsigned char encode[SHADES + 1]; /* table from linear, 0 to 1, to encoded, 0 to 255 */
+  unsigned char encode[SHADES + 1]; /* encoded value, 0 to 255, of linear light i / SHADES */
   uint32_t *pixels;
 } canvas;
 
@@ -217,11 +218,9 @@ static void find_corners(const canvas *c) {
   }
 }
 
-/* A projected triangle: its corners, and twice its area, samples^2, negative if seen from behind.
- */
 typedef struct face {
   const corner *at[3];
-  float area;
+  float area; /* twice the area, samples^2, negative if seen from inside the lung */
 } face;
 
 static face face_of(const canvas *c, size_t triangle) {
@@ -233,7 +232,7 @@ static face face_of(const canvas *c, size_t triangle) {
   return f;
 }
 
-/* Compute the barycentric coordinates of a position in the picture, samples. */
+/* Compute the barycentric coordinates in a triangle of the position (x, y), samples. */
 static void shares_at(const face *f, float x, float y, float share[3]) {
   for (int k = 0; k < 3; ++k) {
     const corner *a = f->at[(k + 1) % 3];
@@ -247,7 +246,7 @@ static float nearness_at(const face *f, const float share[3]) {
          share[2] * f->at[2]->nearness;
 }
 
-/* Draw the part of a triangle in the sample rows from `begin` up to `end`. */
+/* Record a triangle at the samples where it is nearest, in rows `begin` to `end` - 1. */
 static void draw_face(const canvas *c, size_t triangle, size_t begin, size_t end) {
   const face f = face_of(c, triangle);
   const float left = fminf(f.at[0]->x, fminf(f.at[1]->x, f.at[2]->x));
@@ -301,7 +300,7 @@ static float value_at(const face *f, float x, float y) {
          nearness_at(f, share);
 }
 
-/* Return the coverage by contour lines at a sample, 0 to 1, much as contour.glsl does. */
+/* Return the share of a sample that contour lines cover, 0 to 1; contour.glsl has thinner lines. */
 static float contour(const face *f, float x, float y, float value, float spacing) {
   const float steps = value / spacing;
   const float width =
@@ -313,15 +312,15 @@ static float contour(const face *f, float x, float y, float value, float spacing
              : (1.0F - smoothstep(0.5F, 1.7F, away)) * (1.0F - smoothstep(0.3F, 0.8F, width));
 }
 
-/* Return the diffuse light from a direction, a vector of any length, on a surface with unit normal
- * n. */
+/* Return the diffuse light, 0 to 1, on a surface with unit normal `n` from the direction `from`, a
+ * vector of any length. */
 static float lambert(const float n[3], const float from[3]) {
   float to[3] = {from[0], from[1], from[2]};
   normalise(to);
   return fmaxf(0.0F, dot(n, to));
 }
 
-/* Compute the premultiplied colour of a triangle at a sample, 0 to 255, with its coverage last. */
+/* Compute the colour of a triangle at a sample: premultiplied RGB and coverage, 0 to 255. */
 static void shade(const canvas *c, size_t triangle, float x, float y, unsigned char rgba[4]) {
   static const float key[3] = {-0.55F, 0.75F, 0.8F};
   static const float fill[3] = {0.9F, -0.1F, 0.5F};
@@ -349,7 +348,7 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
   const float spacing = (float)scene->line_step;
   const float facing = fmaxf(0.0F, dot(n, eye));
   float light = 0.46F + 0.14F * n[1] + 0.58F * lambert(n, key) + 0.16F * lambert(n, fill);
-  light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darker towards the outline */
+  light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darkens the outline */
   light *= spacing > 0.0F ? 1.0F - 0.275F * contour(&f, x, y, value, spacing) : 1.0F;
   if (scene->shell) {
     const float cover = 0.12F + 0.7F * powf(1.0F - facing, 2.5F);
@@ -367,7 +366,7 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
   }
 }
 
-/* Return the mean of a pixel's samples, premultiplied; samples without a triangle are 0. */
+/* Return the mean of a pixel's samples as premultiplied ARGB; samples without lungs count as 0. */
 static uint32_t mean_of(const canvas *c, size_t x, size_t y) {
   enum { COUNT = OVERSAMPLE * OVERSAMPLE };
   uint32_t sum[4] = {COUNT / 2, COUNT / 2, COUNT / 2, COUNT / 2};

@@ -28,7 +28,7 @@
   EACH(cairo_, text_extents) EACH(cairo_, text_path)
 /* clang-format on */
 
-/* Functions of cairo, loaded at the first use because cairo depends on the X11 libraries. */
+/* Functions of cairo. They are loaded at the first use: cairo needs the X11 libraries. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
@@ -40,15 +40,15 @@ static const double card[3] = {1, 1, 1};
 static const double edge[3] = {0.86, 0.885, 0.91};
 static const double ink[3] = {0.09, 0.13, 0.18};
 static const double faint[3] = {0.37, 0.43, 0.49};
-static const double accent[3] = {0.91, 0.33, 0.17}; /* colour of the arrow of gravity */
+static const double gravity_colour[3] = {0.91, 0.33, 0.17};
 
 /* Layout of the picture, pixels. */
 typedef struct layout {
   double font;
   double margin;
   double cell_width, cell_height;
-  double strip; /* height of the head of a cell, above its lungs */
-  double bar;   /* height of the foot, which holds the colour bar */
+  double strip; /* height of a cell's heading, above the lungs */
+  double bar;   /* height of the lowest part of the picture, with the colour bar */
 } layout;
 
 typedef struct bar_scale {
@@ -72,13 +72,13 @@ static double text_width(cairo_t *cr, const char *text) {
   return extents.x_advance;
 }
 
-/* Draw text with its left end, middle or right end (align 0, 0.5, 1) at x. */
+/* Draw text with its left end (align 0), middle (0.5) or right end (1) at x, baseline at y. */
 static void text(cairo_t *cr, double x, double y, double align, const char *words) {
   cairo.move_to(cr, x - align * text_width(cr, words), y);
   cairo.show_text(cr, words);
 }
 
-/* Draw text, scaled down if it is wider than `room`, pixels. */
+/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. */
 static void fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
                         const char *words) {
   font(cr, size, bold);
@@ -107,12 +107,12 @@ static void ground(cairo_t *cr, const supine_picture *picture) {
   cairo.pattern_destroy(fade);
 }
 
-/* Draw gravity, `seen` in the viewer's axes, on the ball: an arrow, or a dot in a circle if it
- * points towards the viewer, or a cross in a circle if it points away. */
+/* Draw gravity, a unit vector `seen` in the viewer's axes, on the ball: an arrow, or a circle with
+ * a dot if it points towards the viewer, or with a cross if it points away. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
   cairo.new_path(cr);
-  colour(cr, accent);
+  colour(cr, gravity_colour);
   cairo.set_line_width(cr, radius * 0.13);
   if (flat < 0.35) {
     const double r = radius * 0.3;
@@ -182,21 +182,21 @@ static void ball(cairo_t *cr, double x, double y, double radius, supine_view vie
   gravity_arrow(cr, x, y, radius * 0.66, seen);
 }
 
-/* Move name `count` down until it overlaps no name before it. `box` holds the left end, the
- * baseline and the width of each name, pixels. */
+/* Move the name at index `count` down until it overlaps no earlier name. `box` holds the left end,
+ * the baseline and the width of each name, and `line` is the height of a line, pixels. */
 static void place_name(double (*box)[3], size_t count, double line) {
   double *own = box[count];
   for (size_t i = 0; i < count; ++i) {
     const bool beside = own[0] > box[i][0] + box[i][2] || box[i][0] > own[0] + own[2];
     if (!beside && fabs(own[1] - box[i][1]) < line * 0.999) {
       own[1] = box[i][1] + line;
-      i = SIZE_MAX; /* start again at the first name: i + 1 is 0 */
+      i = SIZE_MAX; /* the loop continues with the first name */
     }
   }
 }
 
-/* Draw discs and dots at the marks, then the labels over them. Seven parameters: what to draw, and
- * where: the scene lies at (x, y), and `size` is that of the font, pixels. */
+/* Draw discs and dots at the marks, then the labels over them. The scene lies at (x, y); `size` is
+ * that of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y) {
   double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
@@ -247,7 +247,7 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
   return SUPINE_OK;
 }
 
-/* Draw a scene on a new surface, which the caller destroys, also after failure. */
+/* Draw a scene on a new surface, which the caller must destroy, even after a failure. */
 static supine_status draw_scene(supine_renderer *renderer, const supine_scene *scene,
                                 cairo_surface_t **image, supine_error *error) {
   *image = cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
@@ -262,9 +262,8 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
   return status;
 }
 
-/* Draw the lungs of a panel and its marks. Thirteen parameters: what to draw, and where: the box of
- * `width` x `height` pixels at (x, y), which cell() computes; `size` is that of the font, pixels.
- */
+/* Draw the lungs and the marks of a panel in a box of `width` x `height` pixels at (x, y); `size`
+ * is that of the font, pixels. The 13 parameters say what to draw, and where. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -293,8 +292,8 @@ static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_
   return status;
 }
 
-/* Draw the cell of one posture, `column`, from one view, `row`. Nine parameters: the picture, its
- * layout and scales, and the cell. */
+/* Draw the cell of the posture `column` from the view `row`. The nine parameters are the picture,
+ * its layout and scales, and the cell. */
 static supine_status cell(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                           const layout *at, const bar_scale *bar, size_t column, size_t row,
                           const double extent[4], supine_error *error) {
@@ -435,7 +434,6 @@ static supine_status write_png(cairo_surface_t *surface, FILE *file, supine_erro
                                                             cairo.status_to_string(written));
 }
 
-/* Draw the picture on a surface. */
 static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer,
                              const supine_picture *picture, supine_error *error) {
   supine_status status = SUPINE_ERROR_MEMORY;
@@ -450,7 +448,7 @@ static supine_status draw_on(cairo_surface_t *surface, supine_renderer *renderer
   return status;
 }
 
-/* Check the size and load cairo. */
+/* Check the size of a picture and load cairo. */
 static supine_status begin(const supine_picture *picture, supine_error *error) {
   enum { SIZE_MAX_CAIRO = 32767 };
   return picture->width <= SIZE_MAX_CAIRO && picture->height <= SIZE_MAX_CAIRO
@@ -489,7 +487,7 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
   }
   if (status == SUPINE_OK) {
     status = write_png(surface, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* committing reports a failed write */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* commit reports write errors */
       status = supine_output_commit(&output, error);
     }
   }

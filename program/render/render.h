@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Draw pictures of deformed lungs. Functions that compose pictures or write PNG use cairo and
- * return SUPINE_ERROR_UNSUPPORTED if it is not installed. */
+ * Draw pictures of deformed lungs. Functions that compose pictures or write PNG use cairo, and
+ * return SUPINE_ERROR_UNSUPPORTED if cairo is not installed. */
 #ifndef SUPINE_RENDER_H
 #define SUPINE_RENDER_H
 
@@ -14,24 +14,23 @@
 #include <supine/runtime.h>
 #include <supine/status.h>
 
-/** Side from which the lungs are seen. */
+/** Where the viewer stands. */
 typedef enum supine_view {
-  SUPINE_VIEW_ANTERIOR = 0, /**< in front; the patient's left is on the right */
+  SUPINE_VIEW_ANTERIOR = 0, /**< in front; the patient's left is on the right of the picture */
   SUPINE_VIEW_POSTERIOR,
   SUPINE_VIEW_LEFT,
   SUPINE_VIEW_RIGHT,
   SUPINE_VIEW_HEAD,
   SUPINE_VIEW_FEET,
-  SUPINE_VIEW_OBLIQUE, /**< in front, to the patient's left and above */
+  SUPINE_VIEW_OBLIQUE, /**< in front, to the patient's left, and higher than the lungs */
   SUPINE_VIEW_COUNT
 } supine_view;
 
-/** Return the name of a view, or NULL beyond the last. */
+/** Return the name of a view; NULL for SUPINE_VIEW_COUNT and above. */
 const char *supine_render_view_name(supine_view view);
 
-/** Compute the rotation from body axes (LPS) to the viewer's; its rows are right, up, towards the
- * viewer.
- */
+/** Compute the rotation from the body's axes (LPS) to the viewer's axes: right, up, towards the
+ * viewer. */
 void supine_render_view_axes(supine_view view, double axes[3][3]);
 
 /** Colour maps: for the displacement in one state, and for the difference between two. */
@@ -41,12 +40,12 @@ typedef enum supine_colours {
   SUPINE_COLOURS_COUNT
 } supine_colours;
 
-/** Compute a colour of a map, sRGB 0 to 1, at 0 <= t <= 1. Colours lie at equal distances in OKLab
- * [Ottosson2020] and their lightness rises, so that grey copies keep the order. Pictures, report
- * and page use the same maps. */
+/** Compute a colour of a map, sRGB 0 to 1, at 0 <= t <= 1. Equal steps of t are equal distances in
+ * OKLab [Ottosson2020], and lightness rises with t, so that grey copies keep the order. Pictures,
+ * the report and the page use the same maps. */
 void supine_render_colour(supine_colours map, double t, double rgb[3]);
 
-/** Buffers to draw one basis; only one thread at a time may use them. */
+/** Buffers for drawings of one basis. Only one thread at a time may use a renderer. */
 typedef struct supine_renderer supine_renderer;
 
 /** Create a renderer; supine_render_destroy frees it.
@@ -60,25 +59,26 @@ void supine_render_destroy(supine_renderer *renderer);
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
   const supine_pose *pose;
-  const float *value; /**< [N] values that colours show, mm */
-  double largest;     /**< value at the end of the colours, mm, > 0 */
-  double line_step;   /**< distance between contour lines, mm; 0: none */
+  const float *value; /**< [N] values that the colours of vertices show, mm */
+  double largest;     /**< value that the last colour shows, mm, > 0 */
+  double line_step;   /**< difference of the value between contour lines, mm; 0: no lines */
   supine_colours colours;
   supine_view view;
-  bool shell;           /**< draw a grey, transparent shell with a dark outline, without colours */
-  size_t width, height; /**< pixels */
-  const double *extent; /**< [4] by supine_render_extent; NULL: that of this scene */
+  bool shell;           /**< draw a grey, transparent shell with an outline instead of colours */
+  size_t width, height; /**< size of the drawing, pixels */
+  const double *extent; /**< [4] extent to show, by supine_render_extent; NULL: that of the scene */
 } supine_scene;
 
-/** Empty extent, the initial value for supine_render_extent. */
+/** Empty extent, to be enlarged by supine_render_extent. */
 #define SUPINE_EXTENT_NONE                                                                         \
   { INFINITY, -INFINITY, INFINITY, -INFINITY }
 
-/** Enlarge an extent (smallest and largest x, then y, on the picture plane, mm) to contain a scene,
- * so that several states can be drawn at one scale. The scenes must share the view. */
+/** Enlarge an extent to contain a scene, so that several states can be drawn at one scale. The
+ * extent is the smallest and the largest x, then y, on the plane through the lungs' centre that the
+ * viewer faces, mm. All scenes must have the same view. */
 void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
-/** Draw a scene on a transparent background, with all cores.
+/** Draw a scene on a transparent background, using all cores.
  * @param pixels  [height, width] premultiplied ARGB as in cairo, top row first; output
  * @retval SUPINE_ERROR_ARGUMENT  a side of 0 or more than 16384 pixels
  * @retval SUPINE_ERROR_MEMORY */
@@ -86,16 +86,17 @@ supine_status supine_render_draw(supine_renderer *renderer, const supine_scene *
                                  uint32_t *pixels, supine_error *error);
 
 /** Draw a scene and write it as PNG.
- * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
+ * @retval SUPINE_ERROR_WRITE
+ * @retval others as supine_render_draw */
 supine_status supine_render_png(supine_renderer *renderer, const supine_scene *scene, FILE *file,
                                 supine_error *error);
 
 /** A point, or a vertex of a mesh, inside the lungs. */
 typedef struct supine_mark {
   float xyz[3];      /**< position, mm */
-  float value;       /**< value that its colour shows, mm */
-  bool point;        /**< a point, drawn as a disc; else a vertex of a mesh, drawn as a dot */
-  const char *label; /**< written beside it, or NULL */
+  float value;       /**< value that the colour shows, mm */
+  bool point;        /**< true: a point, drawn as a disc; false: a vertex, drawn as a dot */
+  const char *label; /**< name written beside the mark, or NULL */
 } supine_mark;
 
 typedef struct supine_marks {
@@ -103,7 +104,8 @@ typedef struct supine_marks {
   const supine_mark *mark;
 } supine_marks;
 
-/** Project marks to the drawing of a scene: pixels, [count, 2], from its left and upper edge. */
+/** Project marks to the drawing of a scene.
+ * @param pixel  [count, 2] pixels from the left and upper edges; output */
 void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
                            const supine_marks *marks, double (*pixel)[2]);
 
@@ -114,49 +116,48 @@ typedef struct supine_panel {
   double gravity[3];
   const supine_pose *pose;
   const float *value;
-  const supine_marks *marks; /**< drawn over the lungs; or NULL */
+  const supine_marks *marks; /**< marks drawn over the lungs, or NULL */
 } supine_panel;
 
 enum { SUPINE_PANELS_MAX = 8, SUPINE_VIEWS_MAX = 7 };
 
-/** A picture: postures side by side, views below each other, a colour bar at the foot. */
+/** A picture: a column for each posture, a row for each view, and a colour bar below them. */
 typedef struct supine_picture {
   const supine_panel *panel;
   size_t panel_count; /**< 1 to SUPINE_PANELS_MAX */
   const supine_view *view;
   size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
-  double largest;            /**< value at the end of the colours, mm */
-  double transparency;       /**< of the lungs, 0 to 1 */
-  const double (*extent)[4]; /**< [view_count] by supine_render_picture_extent; NULL: that of this
-                                  picture */
+  double largest;            /**< value that the last colour shows, mm */
+  double transparency;       /**< 0: coloured lungs; up to 1: grey shells, which fade above 0.5 */
+  const double (*extent)[4]; /**< [view_count] extents to show, by supine_render_picture_extent;
+                                  NULL: those of this picture */
   supine_colours colours;
-  bool beyond; /**< some values exceed `largest`: draw the bar with a pointed end */
-  size_t width, height; /**< pixels */
+  bool beyond;          /**< values exceed `largest`: draw the colour bar with a pointed end */
+  size_t width, height; /**< size of the picture, pixels */
 } supine_picture;
 
-/** Return the distance between the ticks of a colour bar: a round number that fits 4 to 10 times
- * into `value`. */
+/** Return the interval between ticks of a colour bar: a round number, 1/10 to 1/4 of `value`. */
 double supine_render_bar_step(double value);
-/** Return the end of a colour bar: `value`, below which most values lie, rounded up to a tick. */
+/** Return the end of a colour bar: `value` rounded up to a tick. */
 double supine_render_bar_end(double value);
 
-/** Enlarge an extent for each view, as supine_render_extent does, to contain a picture, so that
- * several pictures can be drawn at one scale.
- * @param extent  [view_count, 4] */
+/** Enlarge the extent of each view by supine_render_extent to contain a picture, so that several
+ * pictures can be drawn at one scale.
+ * @param extent  [view_count, 4] extents, mm */
 void supine_render_picture_extent(supine_renderer *renderer, const supine_picture *picture,
                                   double (*extent)[4]);
 
 /** Compose a picture.
  * @param pixels  [height, width] RGB, 0x00RRGGBB or 0xFFRRGGBB, top row first; output
- * @retval SUPINE_ERROR_ARGUMENT  too large, or too small for so many panels
- * @retval those of supine_render_draw */
+ * @retval SUPINE_ERROR_ARGUMENT  the picture is too large, or too small for its panels and views
+ * @retval others as supine_render_draw */
 supine_status supine_render_picture_draw(supine_renderer *renderer, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error);
 
 /** Compose a picture and write it as a PNG file.
- * @retval SUPINE_ERROR_ARGUMENT  too large, or too small for so many panels
- * @retval SUPINE_ERROR_WRITE, and those of supine_render_draw */
+ * @retval SUPINE_ERROR_WRITE
+ * @retval others as supine_render_picture_draw */
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error);
 
@@ -168,12 +169,13 @@ typedef struct supine_animation supine_animation;
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_render_animation_open(size_t width, size_t height,
                                            supine_animation **animation, supine_error *error);
-/** Append a picture of that size, shown for `milliseconds`.
- * @retval SUPINE_ERROR_MEMORY, and those of supine_render_picture_draw */
+/** Append a picture of the animation's size, to be shown for `milliseconds`.
+ * @retval SUPINE_ERROR_MEMORY
+ * @retval others as supine_render_picture_draw */
 supine_status supine_render_animation_add(supine_animation *animation, supine_renderer *renderer,
                                           const supine_picture *picture, int milliseconds,
                                           supine_error *error);
-/** Write the animation.
+/** Write the animation to a file.
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_render_animation_write(supine_animation *animation, FILE *file,
                                             supine_error *error);

@@ -11,7 +11,7 @@ json_t *supine_report_hex(supine_colours map, double t) {
                       (unsigned)(255.0 * rgb[2] + 0.5) & 255U);
 }
 
-/* Colours distinguishable with any colour vision (M. Okabe and K. Ito, 2008). */
+/* These colours can be told apart with any colour vision (M. Okabe and K. Ito, 2008). */
 const char *supine_report_line(size_t posture) {
   static const char *const lines[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                       "#56b4e9", "#e69f00", "#8c8c8c"};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare postures of a basis, pair by pair and over all directions of gravity. */
+/* Compare postures with a reference state, and every direction of gravity with supine. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,8 @@
 #include "program/report/comparison.h"
 #include "sh/base/vec3.h"
 
-/* Compute how a breath from the comparison's volume is distributed over lungs and slabs. */
+/* Compute the volume that each lung and each slab gains in a breath from the posture's volume.
+ * `xyz` [2][N, 3] is workspace. */
 static supine_status find_breath(const supine_comparison *c, const supine_posture_item *item,
                                  float *xyz[2], supine_compared_posture *posture,
                                  supine_error *error) {
@@ -57,7 +58,7 @@ static supine_status find_posture(const supine_comparison *c, const supine_postu
   return status == SUPINE_OK ? find_breath(c, item, xyz, posture, error) : status;
 }
 
-/* Compute the expected errors of the displacements, mm RMS; 0 where they are unknown. */
+/* Compute the expected error of each posture's displacement, mm RMS; 0 if it is unknown. */
 static supine_status find_errors(supine_comparison *c, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < c->postures.count && status == SUPINE_OK; ++i) {
@@ -85,8 +86,8 @@ double supine_report_from_supine(const supine_comparison *c, const double gravit
   return supine_compare_rms(c->compare, &pose[1], &pose[0]);
 }
 
-/* Find the direction of gravity farthest from supine among 2048 that cover the sphere evenly, about
- * 4.5 degrees apart. */
+/* Find the direction of gravity with the largest RMS distance from supine, among 2048 directions
+ * that cover the sphere evenly, about 4.5 degrees apart. */
 static void find_farthest(supine_comparison *c) {
   enum { DIRECTIONS = 2048 };
   for (size_t i = 0; i < DIRECTIONS; ++i) {
@@ -148,7 +149,7 @@ void supine_report_free(supine_comparison *c) {
 void supine_report_volume(const supine_comparison *c, char *text, size_t size) {
   char whole[160];
   (void)supine_state_describe(&c->state, whole, sizeof whole);
-  const char *space = strchr(whole, ' '); /* behind the name of the posture */
+  const char *space = strchr(whole, ' '); /* end of the posture's name */
   (void)snprintf(text, size, "%s", space == NULL ? "as given" : space + 1);
 }
 

@@ -12,58 +12,59 @@
 
 enum { SUPINE_COMPARISON_SLABS = 10 };
 
-/* Results for one posture at the volume of the comparison. */
+/* Results for one posture. */
 typedef struct supine_compared_posture {
   supine_pose pose;
-  supine_distance_statistics displacement; /* from the comparison's reference, mm */
+  supine_distance_statistics displacement; /* displacement from the reference pose, mm */
   double expected_error;           /* expected error of the displacement, mm RMS; 0 if unknown */
-  double volume[SUPINE_LUNGS_MAX]; /* volume of each lung, tissue included, mL */
+  double volume[SUPINE_LUNGS_MAX]; /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];   /* volume that each lung gains in the breath, mL */
-  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* all lungs together, uppermost first */
+  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* slabs of all lungs together, uppermost first */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
-  const char *path;    /* file of the basis, for output */
-  const char *command; /* name of the running command, for messages */
-  const char *made_by; /* command line that made the report */
+  const char *path;    /* file of the basis */
+  const char *command; /* name of the command, for its messages */
+  const char *made_by; /* whole command line, for the report's last section */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* holds the volume of every posture; its gravity is supine */
+  supine_state state; /* supine at the volume at which all postures are compared */
   supine_from from;
   double breath; /* volume that a breath adds, mL */
   supine_posture_list postures;
-  supine_reference_pose reference; /* displacements are measured from this pose */
+  supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;
-  supine_compared_posture *posture; /* [count] */
-  size_t directions;                /* number of sampled directions that reach the volume */
-  double farthest[3];               /* sampled direction farthest from supine, a unit vector */
-  double farthest_rms;              /* RMS distance of that direction from supine, mm */
+  supine_compared_posture *posture; /* [postures.count] results */
+  size_t directions;                /* number of sampled directions, without those out of reach */
+  double farthest[3];               /* unit vector of gravity farthest from supine */
+  double farthest_rms;              /* RMS distance of `farthest` from supine, mm */
 } supine_comparison;
 
-/* Compute all members after `postures`. Free them with supine_report_free, also after failure. */
+/* Compute `reference` and the members after it. Free them with supine_report_free, also after a
+ * failure. */
 supine_status supine_report_find(supine_comparison *comparison, supine_error *error);
 
-/* Free what supine_report_find allocated. */
+/* Free the members that supine_report_find allocated. */
 void supine_report_free(supine_comparison *comparison);
 
-/* Write the volume of all postures to `text`: "at rest" or "at rest + 300 mL". */
+/* Write the volume of the comparison to `text`, for example "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
-/* Return the RMS distance of a direction of gravity from supine, mm; NaN if the lungs cannot reach
- * the volume of the comparison. */
+/* Return the RMS distance of the surface between a direction of gravity and supine, both at the
+ * volume of the comparison, mm; NaN if the lungs cannot reach that volume. */
 double supine_report_from_supine(const supine_comparison *comparison, const double gravity[3]);
 
-/* Return whether any expected error is known. */
+/* Return whether the expected error of any posture is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* Return the volume that all lungs together gain by the breath in a posture, mL. */
+/* Return the volume that all lungs together gain in the breath in a posture, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);
 
-/* Print the comparison as HTML. If pictures cannot be drawn, print the reason in their place. Write
- * errors stay in the stream.
+/* Print the comparison as HTML. If pictures cannot be drawn, the page states the reason in their
+ * place. Write errors stay in the stream.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
                                  supine_error *error);

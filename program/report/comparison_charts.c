@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build the charts of the report: coordinates of lines, dots and cells for profile.html and
- * map.html.
- */
+/* Build the charts of the report: coordinates of lines, dots and cells for the templates
+ * profile.html and map.html. */
 #include <math.h>
 #include <string.h>
 
@@ -14,7 +13,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Return the value of a profile in a slab, %. */
+/* Return the value that a profile shows for a slab, %. */
 typedef double slab_value(const supine_comparison *c, size_t posture, size_t slab);
 
 static double expansion(const supine_comparison *c, size_t posture, size_t slab) {
@@ -81,14 +80,14 @@ json_t *supine_report_profiles(const supine_comparison *c) {
                    profile(c, "share of the volume gained, %", true, share));
 }
 
-/* Size and place of the map in map.html: cells, and SVG units. */
+/* Numbers of cells of the map; side of a cell and position of the map in map.html, SVG units. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
-/* Compute the position of a direction of gravity on the map. To the right: roll, from prone over
- * the right side, supine and the left side to prone. Downwards: tilt, from head down to feet down.
- */
+/* Compute the position of a direction of gravity on the map, SVG units. From left to right: roll,
+ * from prone over the right side, supine and the left side to prone. From top to bottom: tilt, from
+ * head down to feet down. */
 static void place(const double g[3], double *x, double *y) {
-  const double roll = atan2(g[0], g[1]) / pi; /* in half turns: supine 0, left 1/2 */
+  const double roll = atan2(g[0], g[1]) / pi; /* in half turns: 0 supine, 1/2 left side */
   const double tilt = asin(fmin(1.0, fmax(-1.0, g[2]))) / pi;
   *x = MAP_LEFT + COLUMNS * CELL * (0.5 + roll / 2.0);
   *y = MAP_TOP + ROWS * CELL * (0.5 - tilt);
@@ -136,8 +135,8 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    if (cosine >
-        nearest + 1e-9) { /* of equally near postures, the first: a name, not its DICOM code */
+    /* Of equally near postures, keep the first: names precede their DICOM codes. */
+    if (cosine > nearest + 1e-9) {
       nearest = cosine;
       name = supine_posture_name(i);
     }

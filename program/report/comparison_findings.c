@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build the findings of a comparison: the first sentences and table, and the titles of the
- * profiles. */
+/* Build the first sentences and the first table of the report, and the titles of its profiles. */
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -8,7 +7,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* Published measurements, shown in the row of their posture; report.html names their sources. */
+/* Published values for the rows of their postures; report.html names the sources. */
 static const struct {
   const char *posture, *words;
 } published[] = {
@@ -16,7 +15,7 @@ static const struct {
     {"left", "0 and +25 %"},
 };
 
-/* Compute the change of each lung's volume from the reference state, in % and mL. */
+/* Compute the change of each lung's volume from the reference pose, in % and in mL. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
   double held[SUPINE_LUNGS_MAX];
   supine_basis_volumes(c->basis, &c->reference.pose, held);
@@ -51,7 +50,8 @@ static void print_where(const char *name, FILE *to) {
   }
 }
 
-/* Print the change of each lung, the largest first, and the mean displacement. */
+/* Print a sentence on a posture: the change of volume of each lung, the largest first, and the mean
+ * and the largest displacement. */
 static void print_finding(const supine_comparison *c, size_t posture, FILE *to) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   double percent[SUPINE_LUNGS_MAX];
@@ -104,7 +104,7 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a profile: the posture's name and its number, for postures 0 to `last`. */
+/* Print the title of a profile: a heading, then name and value of the postures 0 to `last`. */
 static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
   (void)fputs(share ? "Share of the lower half in a breath:"
                     : "Expansion of the lowest 30 % of the height over that of the uppermost:",

@@ -11,8 +11,7 @@
 #include "program/options/basis_input.h"
 #include "program/report/comparison_parts.h"
 
-extern const supine_asset
-    supine_report_assets[]; /* the .html and .css files, embedded by the build */
+extern const supine_asset supine_report_assets[]; /* the .html and .css files of program/report */
 
 static json_t *lungs(const supine_comparison *c) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
@@ -23,7 +22,7 @@ static json_t *lungs(const supine_comparison *c) {
   return list;
 }
 
-/* Return today's date, or that of SOURCE_DATE_EPOCH, which makes reports reproducible. */
+/* Return today's date, or the date of SOURCE_DATE_EPOCH, which makes reports reproducible. */
 static json_t *date(void) {
   const char *epoch = getenv("SOURCE_DATE_EPOCH");
   const time_t now = epoch != NULL ? (time_t)strtoll(epoch, NULL, 10) : time(NULL);
@@ -39,7 +38,7 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
   (void)json_array_append_new(list, json_pack("{s:s, s:o}", "name", name, "value", value));
 }
 
-/* Return {{provenance}}: the command, the program, the basis and its metadata. */
+/* Return the value of {{provenance}}: the command, the program, the basis and its metadata. */
 static json_t *provenance(const supine_comparison *c, json_t *file) {
   static const char *const keys[] = {"made_by", "assumed",           "scanned",     "law",
                                      "patient", "error_rms_percent", "attribution", "checksum"};
@@ -53,14 +52,14 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
     const char *value = supine_basis_metadata(c->basis, keys[i]);
     json_t *text = value == NULL ? NULL : json_string(value);
-    if (text != NULL) { /* NULL also if the value is not UTF-8 */
+    if (text != NULL) { /* a value that is not UTF-8 gives NULL */
       add_fact(list, keys[i], text);
     }
   }
   return list;
 }
 
-/* Return the data of the report's header, of its section on all directions, and its provenance. */
+/* Return the data of the report's heading, of its section on all directions, and {{provenance}}. */
 static json_t *facts(const supine_comparison *c) {
   const char *slash = strrchr(c->path, '/');
   json_t *file = supine_options_json_text(slash != NULL ? slash + 1 : c->path);

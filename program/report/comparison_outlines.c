@@ -1,19 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build the outlines of the lungs in slices for the HTML report, each posture over the reference.
- */
+/* Build the outlines of the lungs in four slices for the HTML report. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "program/report/comparison_parts.h"
 
-/* A slice normal to `axis` at a fraction of the lungs' extent, seen from the feet or the front. In
- * its picture, x points right, and the axis `down` points down if `sign` is 1, up if it is -1. */
+/* A slice, seen from the feet or from the front: the patient's x points right in its picture. */
 typedef struct slice {
   const char *name;
-  size_t axis;
-  double share;
-  size_t down; /* an axis */
-  double sign; /* 1 or -1 */
+  size_t axis;     /* axis normal to the slice */
+  double share;    /* position along `axis`, as a fraction of the lungs' extent */
+  size_t vertical; /* axis that is vertical in the picture */
+  double sign;     /* 1 if `vertical` points down, -1 if it points up */
 } slice;
 
 static const slice slices[] = {{"Axial, upper third", 2, 2.0 / 3, 1, 1},
@@ -21,19 +19,20 @@ static const slice slices[] = {{"Axial, upper third", 2, 2.0 / 3, 1, 1},
                                {"Coronal, front third", 1, 1.0 / 3, 2, -1},
                                {"Coronal, back third", 1, 2.0 / 3, 2, -1}};
 
-/* Compute where an edge crosses the plane, in the axes of the picture, mm. */
+/* Compute where the edge from `a` to `b` crosses the plane at `at`, in the picture's axes, mm. */
 static void cross(const slice *s, double at, const float *a, const float *b, double point[2]) {
   const double t = (at - (double)a[s->axis]) / ((double)b[s->axis] - (double)a[s->axis]);
   point[0] = (double)a[0] + t * ((double)b[0] - (double)a[0]);
-  point[1] = s->sign * ((double)a[s->down] + t * ((double)b[s->down] - (double)a[s->down]));
+  const size_t v = s->vertical;
+  point[1] = s->sign * ((double)a[v] + t * ((double)b[v] - (double)a[v]));
 }
 
-/* Print the outline as an SVG path, one line for each triangle; return the enclosed area, mm^2. */
+/* Print the outline as an SVG path, a line for each triangle; return the area inside it, mm^2. */
 static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
                     FILE *path) {
   double twice = 0;
   for (size_t t = 0; t < info->triangle_count; ++t) {
-    double up[2] = {NAN, NAN}; /* where the triangle's boundary crosses the plane upwards */
+    double up[2] = {NAN, NAN}; /* where the triangle's boundary rises through the plane */
     double down[2] = {0, 0};
     for (size_t i = 0; i < 3; ++i) {
       const float *a = xyz + 3 * (size_t)info->triangles[3 * t + i];
@@ -51,7 +50,7 @@ static double trace(const supine_basis_info *info, const slice *s, double at, co
   return fabs(twice) / 2;
 }
 
-/* Return the outline in a pose as an SVG path; set the enclosed area, mm^2. */
+/* Return the outline in a pose as an SVG path; set `area` to the area inside it, mm^2. */
 static json_t *outline(const supine_comparison *c, const slice *s, double at,
                        const supine_pose *pose, float *xyz, double *area) {
   char *text = NULL;
@@ -75,10 +74,10 @@ static json_t *letter(double x, double y, const char *name) {
 /* Return the chart of a slice; its title states how each posture changes the area. */
 static json_t *chart(const supine_comparison *c, const slice *s, const double low[3],
                      const double high[3], float *xyz) {
-  enum { MARGIN = 18, SCALE = 50 /* mm */ };
+  enum { MARGIN = 18, SCALE_BAR = 50 }; /* mm */
   const double at = low[s->axis] + s->share * (high[s->axis] - low[s->axis]);
-  const double top = s->sign > 0 ? low[s->down] : -high[s->down];
-  const double bottom = s->sign > 0 ? high[s->down] : -low[s->down];
+  const double top = s->sign > 0 ? low[s->vertical] : -high[s->vertical];
+  const double bottom = s->sign > 0 ? high[s->vertical] : -low[s->vertical];
   const double middle = (top + bottom) / 2;
   double before = 0;
   json_t *path = outline(c, s, at, &c->reference.pose, xyz, &before);
@@ -100,14 +99,15 @@ static json_t *chart(const supine_comparison *c, const slice *s, const double lo
     json_decref(title);
     title = longer;
   }
-  return json_pack("{s:o, s:o, s:o, s:o, s:o, s:[o, o, o, o]}", "title", title, "box",
-                   json_sprintf("%.0f %.0f %.0f %.0f", low[0] - MARGIN, top - MARGIN,
-                                high[0] - low[0] + 2 * MARGIN, bottom - top + 2 * MARGIN + 10),
-                   "before", path, "lines", lines, "mark",
-                   json_sprintf("M%.0f %.0fh%d", low[0] - MARGIN + 2, bottom + MARGIN + 6, SCALE),
-                   "letters", letter(high[0] + 10, middle, "L"), letter(low[0] - 10, middle, "R"),
-                   letter((low[0] + high[0]) / 2, top - 10, s->axis == 2 ? "A" : "H"),
-                   letter((low[0] + high[0]) / 2, bottom + 10, s->axis == 2 ? "P" : "F"));
+  return json_pack(
+      "{s:o, s:o, s:o, s:o, s:o, s:[o, o, o, o]}", "title", title, "box",
+      json_sprintf("%.0f %.0f %.0f %.0f", low[0] - MARGIN, top - MARGIN,
+                   high[0] - low[0] + 2 * MARGIN, bottom - top + 2 * MARGIN + 10),
+      "before", path, "lines", lines, "mark",
+      json_sprintf("M%.0f %.0fh%d", low[0] - MARGIN + 2, bottom + MARGIN + 6, SCALE_BAR), "letters",
+      letter(high[0] + 10, middle, "L"), letter(low[0] - 10, middle, "R"),
+      letter((low[0] + high[0]) / 2, top - 10, s->axis == 2 ? "A" : "H"),
+      letter((low[0] + high[0]) / 2, bottom + 10, s->axis == 2 ? "P" : "F"));
 }
 
 json_t *supine_report_outlines(const supine_comparison *c) {

@@ -20,7 +20,7 @@ static supine_scene make_scene(const supine_comparison *c, size_t posture, const
 
 /* Draw a scene and return it as PNG in base64, or NULL on failure. */
 static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine_error *error) {
-  char *bytes[2] = {NULL, NULL}; /* PNG, base64 */
+  char *bytes[2] = {NULL, NULL}; /* the PNG, and its base64 */
   size_t size[2] = {0, 0};
   FILE *file[2] = {open_memstream(&bytes[0], &size[0]), open_memstream(&bytes[1], &size[1])};
   json_t *made = NULL;
@@ -38,8 +38,9 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
   return made;
 }
 
-/* Describe gravity in a picture: an arrow at `along` degrees, clockwise from the right, and the
- * `turn`, degrees, that makes it point down; else `towards` the viewer or `away`. */
+/* Add gravity to the data of a picture. If it lies nearly in the picture: {{along}}, its direction
+ * in degrees clockwise from the right, and {{turn}}, the rotation in degrees that makes it point
+ * down. Else {{towards}} or {{away}}: it points towards the viewer or away. */
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};
@@ -79,7 +80,7 @@ static json_t *picture(const supine_comparison *c, supine_renderer *renderer, si
 }
 
 json_t *supine_report_pictures(const supine_comparison *c, supine_error *error) {
-  enum { PER_ROW = 6 }; /* a row fits on a printed page */
+  enum { PER_ROW = 6 }; /* pictures side by side on a printed page */
   const size_t count = c->postures.count;
   const size_t rows = (count + PER_ROW - 1) / PER_ROW;
   double extent[4] = SUPINE_EXTENT_NONE;

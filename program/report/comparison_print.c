@@ -20,8 +20,8 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
   return list;
 }
 
-/* Return a slab of a posture; its expansion is relative to its volume before the breath, its share
- * to the volume of the breath. */
+/* Return a slab of a posture as JSON. Its expansion is its gain divided by its volume before the
+ * breath, its share the gain divided by the volume of the breath. */
 static json_t *encode_slab(const supine_comparison *c, size_t posture, size_t s) {
   const supine_slab *slab = &c->posture[posture].slab[s];
   const double thickness = 1.0 / SUPINE_COMPARISON_SLABS;
@@ -55,8 +55,8 @@ static json_t *encode_postures(const supine_comparison *c) {
   return list;
 }
 
-/* Append a row to the table `heading` of an object: `value` in the column `name`, then `members`,
- * which it releases. */
+/* Append a row to the table `heading` of `tables`: `value` in the column `name`, then the columns
+ * `members`, which are freed. */
 static void add_row(json_t *tables, const char *heading, const char *name, const char *value,
                     json_t *members) {
   json_t *row = json_pack("{s:s}", name, value);
@@ -67,7 +67,7 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
   (void)json_array_append_new(json_object_get(tables, heading), row);
 }
 
-/* Add tables that compare the postures, for the text. */
+/* Add to `text` the tables that compare the postures. */
 static void add_tables(const supine_comparison *c, json_t *text) {
   char gained[64];
   (void)snprintf(gained, sizeof gained, "gain of each lung in a breath of %.4g mL, mL",

@@ -51,7 +51,7 @@ async function checkControls(page) {
   await changes('a key', () => press(page, '5'));
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'upright');
   await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
-  await changes('pinning', () => page.getByRole('button', { name: 'Take as the other posture' }).click());
+  await changes('pinning', () => page.getByRole('button', { name: 'Use as the other posture' }).click());
   await changes('another key', () => press(page, '3')); /* upright, the room turns nothing */
   await changes('room', async () => {
     await page.locator('[name=frame][value=room]').check({ force: true });

@@ -73,10 +73,10 @@ async function checkTable(page) {
     const from = kind === 'difference' ? deformed('supine', `rest+${depth}`) : rest;
     const rows = await page.evaluate(() => [...document.querySelectorAll('#inside-rows tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
     assert.deepEqual(rows.map(([name]) => name).sort(), PARTS.sort());
-    for (const [name, place, move] of rows) {
+    for (const [name, place, displacement] of rows) {
       const far = mean(now[name].map((p, i) => distance(p, from[name][i])));
       assert.ok(far > 0.5, `${name} does not move`);
-      assert.ok(Math.abs(far - Number(move)) < WRITTEN_MM, `${name}: ${move}, not ${far}`);
+      assert.ok(Math.abs(far - Number(displacement)) < WRITTEN_MM, `${name}: ${displacement}, not ${far}`);
       const middle = [0, 1, 2].map((i) => mean(now[name].map((p) => p[i])));
       const said = [...place.matchAll(/([LRPAHF]) (\d+)/g)].map(([, letter, mm]) => ('LPH'.includes(letter) ? 1 : -1) * Number(mm));
       assert.ok(distance(said, middle) < 0.9, `${name}: ${place}, not ${middle}`);

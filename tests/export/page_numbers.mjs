@@ -31,7 +31,7 @@ async function shown(page, posture) {
   await page.waitForFunction((text) => document.getElementById('posture-name').value === text, posture);
   await settled(page);
   return page.evaluate(() => ({
-    finding: document.getElementById('finding').textContent, move: document.getElementById('finding-move').textContent, error: document.getElementById('finding-error').textContent,
+    finding: document.getElementById('finding').textContent, displacement: document.getElementById('finding-displacement').textContent, error: document.getElementById('finding-error').textContent,
     nodule: Number(document.querySelector('#inside-rows td:last-child').textContent), legend: document.getElementById('legend-title').textContent, table: document.getElementById('inside-text').textContent,
     held: window.supine.state.moment.held, lungs: window.supine.basis.lungNames,
   }));
@@ -48,8 +48,8 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
     assert.equal(program.reported, name);
     assert.equal(seen.legend, `Displacement from ${name}`);
     assert.match(seen.table, new RegExp(`Displacement from ${name.replace('+', '\\+')}`));
-    const [, mean, largest] = /moves ([\d.]+) mm on average and ([\d.]+) mm at most, .* from (.*)\.$/.exec(seen.move).map(Number);
-    assert.ok(seen.move.endsWith(` from ${name}.`));
+    const [, mean, largest] = /moves ([\d.]+) mm on average and ([\d.]+) mm at most, .* from (.*)\.$/.exec(seen.displacement).map(Number);
+    assert.ok(seen.displacement.endsWith(` from ${name}.`));
     near(seen.nodule, program.nodule, `${posture} from ${name}: the nodule on the page and by deform`);
     if (from === 'supine:rest') near(program.pair, program.nodule, `${posture}: the nodule by compare and deform`);
     near(mean, program.mean, `${posture} from ${name}: the mean on the page and by compare`);
@@ -82,14 +82,14 @@ const enclosed = (xyz, lung) => {
 };
 const before = lungs.map((_, lung) => enclosed(places[0], lung));
 for (const [i, g] of directions.entries()) {
-  const { finding, move } = await page.evaluate((gravity) => {
+  const { finding, displacement } = await page.evaluate((gravity) => {
     const { state, postureFrom, basis: b, findingOf } = window.supine;
     const { q } = postureFrom(gravity.join(':'));
     state.depth = 0;
     state.settle(q, 0, 0);
     state.compute();
-    const [finding, move] = findingOf(b, state.moment, state.gravity, '', 1);
-    return { finding, move };
+    const [finding, displacement] = findingOf(b, state.moment, state.gravity, '', 1);
+    return { finding, displacement };
   }, g);
   lungs.forEach((lung, j) => {
     const ml = enclosed(places[i + 1], j) - before[j];
@@ -98,7 +98,7 @@ for (const [i, g] of directions.entries()) {
     if (!words.startsWith('keeps')) assert.ok(Math.abs((words.startsWith('loses') ? -1 : 1) * parseInt(words.split(' ')[1], 10) - ml) < 1, `${finding} and not ${ml} mL`);
   });
   const far = Math.max(...Array.from({ length: places[0].length / 3 }, (_, v) => Math.hypot(...[0, 1, 2].map((k) => places[i + 1][3 * v + k] - places[0][3 * v + k]))));
-  assert.ok(Math.abs(Number(/and ([\d.]+) mm at most/.exec(move)[1]) - far) < 0.1, `${move} and not ${far}`);
+  assert.ok(Math.abs(Number(/and ([\d.]+) mm at most/.exec(displacement)[1]) - far) < 0.1, `${displacement} and not ${far}`);
 }
 assert.deepEqual(complaints, []);
 await page.close();

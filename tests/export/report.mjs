@@ -28,7 +28,7 @@ const cards = await page.evaluate(() => [...document.querySelectorAll('section')
   heading: section.querySelector('h2').textContent,
   first: section.innerText.split('\n').map((line) => line.trim()).filter(Boolean)[1].split(/\s+/)[0],
 })));
-assert.deepEqual(cards.map(({ heading }) => heading).slice(0, 3), ['What changes from supine at rest', 'Outlines by slice', 'Ventilation by height']);
+assert.deepEqual(cards.map(({ heading }) => heading).slice(0, 3), ['Changes from supine at rest', 'Outlines by slice', 'Ventilation by height']);
 /* Whatever is a picture is held together where sheets end. */
 await page.emulateMedia({ media: 'print' });
 const parted = await page.evaluate(() => [...document.querySelectorAll('tr, figure, .scale, .whole')].filter((e) => getComputedStyle(e).breakInside !== 'avoid').length);
@@ -38,7 +38,7 @@ await page.emulateMedia({ media: null });
 const json = JSON.parse(supine('compare', basis, '--postures', postures.join(','), '--volume', 'rest+120', '--json').replace(/^[^{]*/, ''));
 assert.equal(json.displacement_from, 'supine at rest');
 
-/* The first table holds volumes, what they have gained since supine at rest, and moves. */
+/* The first table holds volumes, their changes from supine at rest, and displacements. */
 const supineRest = JSON.parse(supine('compare', basis, '--postures', 'supine', '--json').replace(/^[^{]*/, '')).postures[0].volume_ml;
 const summary = await page.evaluate(() => [...document.querySelectorAll('.summary tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
 assert.deepEqual(summary.map(([name]) => name), postures.map((name) => ({ left: 'left side', right: 'right side' })[name] ?? name));

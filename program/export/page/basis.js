@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Read the basis from the page, and compute what the run-time library computes once a frame: weights from
-// gravity, and the lungs' gains from a volume.
+// Read the basis from the page. Compute, as the run-time library does once for each frame, the weights from
+// gravity and the gains of the lungs from a volume.
 
 /** Decode base64. */
 function fromBase64(text) {
@@ -25,7 +25,7 @@ function takeBytes(name) {
 
 const takeTensor = (name, Numbers) => new Numbers(takeBytes(name).buffer);
 
-/** Take compressed rows of 16-bit counts, padded to an even number of columns. */
+/** Return a compressed tensor of 16-bit integers (counts), in rows padded to an even number of columns. */
 function takeCounts(name, rows, columns, filter) {
   const stride = 4 * Math.ceil(columns / 2);
   const bytes = new Uint8Array(rows * stride);
@@ -33,7 +33,7 @@ function takeCounts(name, rows, columns, filter) {
   return new Int16Array(bytes.buffer);
 }
 
-/** Take rows of `columns` numbers, stored as counts of `unit` from middle[column]. */
+/** Return a tensor of rows of numbers: middle[column] plus `unit` times the stored count. */
 function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)) {
   const counts = takeCounts(name, rows, columns);
   const numbers = new Float32Array(rows * columns);
@@ -42,15 +42,15 @@ function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)
   return numbers;
 }
 
-/** Take the corners of compressed triangles. */
+/** Return the vertex indices of a tensor of compressed triangles. */
 function takeTriangles(name, count) {
   const corners = new Uint32Array(3 * count);
   MeshoptDecoder.decodeIndexBuffer(new Uint8Array(corners.buffer), 3 * count, 4, takeBytes(name));
   return corners;
 }
 
-/** Take the normals and pack them as supine.glsl reads them: numbers of 13, 10 and 9 bits in each word, of which
- * the page holds all but the lowest 2, 2 and 1, plus 128. */
+/** Return the normals in the words that supine.glsl reads, of three numbers of 13, 10 and 9 bits. The page holds
+ * each number without its lowest 2, 2 and 1 bits, plus 128. */
 function takeNormals(vertices, words) {
   const columns = 3 * words;
   const counts = takeCounts('normals', vertices, 3 * columns);
@@ -101,12 +101,12 @@ function readBasis() {
   return basis;
 }
 
-const recurrences = new Map(); // factors by band
-/** Return the factors of the recurrence in harmonics() for a band, computed once. */
+const recurrences = new Map(); // results of recurrenceOf, by band
+/** Return the factors of the recurrence in harmonics() up to a band, computed once. */
 function recurrenceOf(band) {
   if (!recurrences.has(band)) {
     const tops = new Float64Array(band + 1);
-    const steps = new Float64Array((band + 1) ** 2); // at l * l + l + m
+    const steps = new Float64Array((band + 1) ** 2); // factor of (l, m) at l * l + l + m
     for (let m = 0; m <= band; ++m) {
       tops[m] = m === 0 ? Math.sqrt(1 / (4 * Math.PI)) : tops[m - 1] * (m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m)));
       for (let l = m; l <= band; ++l) steps[l * l + l + m] = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));
@@ -116,8 +116,9 @@ function recurrenceOf(band) {
   return recurrences.get(band);
 }
 
-/** Return the real spherical harmonics Y_lm of a unit vector at l*l + l + m, orthonormal, without
- * Condon-Shortley phase: q(l, m)(z) times Re, Im of (x + i y)^m, by the recurrence in l. */
+/** Return the real spherical harmonics of a unit vector up to a band, Y_lm at index l*l + l + m: orthonormal,
+ * without Condon-Shortley phase. Y_lm is a polynomial q in z, from a recurrence in l, times the real (m >= 0) or
+ * imaginary (m < 0) part of (x + i y)^|m|. */
 function harmonics(band, [x, y, z]) {
   const values = new Float64Array((band + 1) ** 2);
   const { tops, steps } = recurrenceOf(band);
@@ -153,8 +154,9 @@ function weightsFor(basis, gravity) {
   });
 }
 
-/** Return the volume of a lung at weights w minus that of its reference surface, mL, as coefficients f of
- * its three gains: f . (x, y, z, yz, xz, xy, xyz). A basis whose gains are equal has one axis. */
+/** Return the form of a lung at weights `w`: coefficients f such that the volume of the lung minus that of its
+ * reference surface, mL, is f . (x, y, z, yz, xz, xy, xyz) at the gains x, y, z. If all gains are equal
+ * (volumeAxes 1), only the terms x, yz and xyz are used. */
 function lungForm(basis, lung, w) {
   const k = basis.modes;
   const dot = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += tensor[at + i] * w[i]; return sum; };
@@ -177,7 +179,8 @@ const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
 const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
 
-/** Return the s nearest to 0 at which cubicAt has an extremum, on one side, 1 or -1; infinite if none. */
+/** Return the s nearest to 0, above (side 1) or below it (side -1), at which cubicAt has an extremum; infinite if
+ * there is none. */
 function cubicTurn(c, side) {
   const discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant < 0) return side * Infinity;
@@ -187,7 +190,7 @@ function cubicTurn(c, side) {
 }
 
 /** Return the gain s at which cubicAt(c, s) is `volume`, mL, on the branch through s = 0; NaN if the surface
- * would fold before. */
+ * folds before it reaches that volume. */
 function scaleForVolume(c, volume) {
   if (volume === 0) return 0;
   const side = volume / c[0] > 0 ? 1 : -1;
@@ -216,16 +219,16 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** Return the three gains, relative to the gain at rest, on the path from full inflation (sigma 0) through
- * rest (sigma 1), as supine_volume_bend does. */
+/** Return the three gains at `sigma`, relative to the gain at rest, on the path from full inflation (sigma 0)
+ * through rest (sigma 1), as supine_volume_bend does. */
 function pathAt(bend, sigma) {
   const cube = sigma * sigma * sigma;
   const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   return bend.map((c) => sigma + 2 * c * e);
 }
 
-/** Return the three gains at which a lung of this form holds `volume` beyond the reference surface, on the
- * path through `rest`, both mL; NaN if the surface would fold before. */
+/** Return the three gains at which a lung of this form has the volume `volume`, on the path through the volume
+ * `rest`, both mL above the reference volume; NaN if the surface folds before it reaches that volume. */
 function gainsForVolume(form, bend, rest, volume) {
   const straight = bend.every((c) => c === 0) || volume === rest;
   const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
@@ -251,9 +254,9 @@ function gainsForVolume(form, bend, rest, volume) {
 
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
-/** Return the volumes of the lungs in a posture, mL beyond the reference surface: `rest` and, at full
- * inflation, `full`, by lung. `rest` is one number for all lungs together where they share one gain, and
- * the scan where the basis does not know rest. */
+/** Return volumes in a posture, mL above the reference volumes: `full`, of each lung at full inflation, and
+ * `rest`, of each lung at rest or, if all lungs share their gains, of all lungs together. If the basis does not
+ * know rest, `rest` is the volume in the scan. */
 function volumesFor(basis, gravity) {
   const y = harmonics(2, gravity);
   const rows = basis.resting ? basis.resting.length / y.length : 1;
@@ -262,11 +265,11 @@ function volumesFor(basis, gravity) {
   return { rest, full: basis.references.map((ml) => (Number(basis.metadata.full_upright_gain) || 0) * up * ml) };
 }
 
-/** Return the volume of all lungs at rest for gravity along a unit vector, mL beyond the reference surface. */
+/** Return the volume of all lungs at rest for gravity along a unit vector, mL above the reference volume. */
 const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
 
-/** Return the share of each lung in a total volume, mL beyond the reference surface: above rest, all have
- * covered the same fraction of the way from rest to full; below rest all shrink in proportion. */
+/** Return the volume of each lung for a volume `total` of all lungs, mL above the reference volumes. Above rest,
+ * all lungs have covered the same fraction of the way from rest to full; below, all shrink by the same factor. */
 function shareOut({ references }, { rest, full }, total) {
   const [all, resting] = [sumOf(references), sumOf(rest)];
   const part = (total - resting) / (sumOf(full) - resting);
@@ -274,16 +277,17 @@ function shareOut({ references }, { rest, full }, total) {
   return references.map((ml, lung) => (total >= resting ? rest[lung] + part * (full[lung] - rest[lung]) : (ml + rest[lung]) * shrunk - ml));
 }
 
-/** Return the gains [x, y, z] of each lung at which all lungs together hold `total` mL beyond the
- * reference surface. */
+/** Return the gains [x, y, z] of each lung at which all lungs together have the volume `total`, mL above the
+ * reference volume. */
 function gainsFor(basis, forms, volumes, total) {
   if (basis.byLung) return shareOut(basis, volumes, total).map((ml, lung) => gainsForVolume(forms[lung], basis.bend, volumes.rest[lung], ml));
   const gains = gainsForVolume(forms[0].map((_, i) => sumOf(forms.map((f) => f[i]))), [0, 0, 0], 0, total);
   return forms.map(() => gains);
 }
 
-/** Compute a moment, that is, the lungs in one state: the weights of the modes, three gains of each lung, and `held`, the volume of each
- * lung with its tissue, mL. `depth` is mL above rest. `folds` is true if the surface would fold before it holds that volume. */
+/** Compute a moment: the lungs at a direction of gravity and a volume `depth` mL above rest. It has the weights of
+ * the modes, three gains of each lung, `held`, the volume of each lung with its tissue, mL, and `folds`, which is
+ * true if the surface folds before it reaches that volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
@@ -293,10 +297,10 @@ function momentFor(basis, gravity, depth) {
   return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
 }
 
-/** Return the uniforms of supine.glsl: the weights, three gains of each lung, and the weights of the
- * normal's modes, three to a word: modes j, j + words and j + 2 words. A weight is a polynomial for each
- * component of the normal with the monomials 1, a w_k, b w_k, a b w_k w_l, where a and b are the gains
- * along the next two axes; a basis whose gains are equal has one for all components, without b w_k. */
+/** Return the uniforms of supine.glsl: the weights w, three gains of each lung, and the weights of the normals'
+ * modes, in words of the modes j, j + words and j + 2 words. The weight of such a mode is a sum over the three
+ * components of the normal of a polynomial with the terms 1, a w_k, b w_k and a b w_k w_l, where a and b are the
+ * gains along the next two axes. If all gains are equal, it is one polynomial, without the terms b w_k. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const weights = new Float32Array(4 * Math.ceil(k / 4));
@@ -352,7 +356,7 @@ function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs },
   return places;
 }
 
-/** Compute the positions of the corners of up to 3000 triangles, mm, for the range of the colours. */
+/** Compute the positions of the corners of up to 3000 triangles, mm, from which the range of the colours follows. */
 function samplePlaces(basis, moment) {
   const stride = 3 * Math.max(1, Math.ceil(basis.corners.length / 3 / 3000));
   const places = [];

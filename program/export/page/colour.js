@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Compute colours, their ranges and ticks, by the same rules as for pictures and reports.
+// Compute colours, their ranges and ticks, by the rules that pictures and reports follow.
 
-/** Return a round number that fits 4 to 10 times into `value`. */
+/** Return the interval between ticks: a round number, 1/10 to 1/4 of `value`. */
 function tickStep(value) {
   if (!(value > 0)) return 0.2;
   const power = 10 ** Math.floor(Math.log10(value / 4));
@@ -9,13 +9,13 @@ function tickStep(value) {
   return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
 }
 
-/** Return the end of a range: `value`, below which most values lie, rounded up to a tick. */
+/** Return the end of a range: `value` rounded up to a tick. */
 function rangeEnd(value) {
   const step = tickStep(value);
   return value > 0 ? step * Math.ceil(value / step - 1e-9) : 5 * step;
 }
 
-/** Quantities to colour by: the shader's `kind`, colour map and unit. */
+/** Quantities that colours can show: the shaders' uniform `kind`, the name of the colour map, and the unit. */
 const KINDS = {
   displacement: { measure: 0, map: 'displacement', unit: 'mm' },
   difference: { measure: 0, map: 'difference', unit: 'mm' },

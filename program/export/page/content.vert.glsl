@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Project the content of the lungs: a ball around each point, or vertices of meshes, whose `ball` is 0.
+// Project the content of the lungs: balls around points, and meshes, for whose vertices `ball` is 0.
 layout(location = 0) in vec3 ball;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 moved;
@@ -10,7 +10,7 @@ uniform mat4 projection;
 uniform vec4 lens;
 uniform int kind;
 uniform vec4 gravity;
-uniform float radius; // of a ball, mm
+uniform float radius; // radius of a ball, mm
 out vec3 eye;
 out vec3 facing;
 out vec3 body;

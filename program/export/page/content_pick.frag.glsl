@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Write the part under the pointer as a NaN that holds the part plus 1 in its low bits, and the position as bits.
+// Write the part under the pointer as a NaN with the index of the part plus 1 in its low bits, and the bits of the
+// position.
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

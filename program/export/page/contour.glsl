@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compute the coverage by contour lines, 0 to 1, at multiples of `spacing` above 0, as in pictures and reports
-// (program/render/draw.c). Lines too close to be told apart are faded out.
+// Return the coverage by contour lines, 0 to 1, at multiples of `spacing` above 0. Lines too close to be told apart
+// fade out. Pictures and reports have similar lines (program/render/draw.c).
 float contour(float value, float spacing) {
   float steps = value / spacing;
   float width = fwidth(steps);
@@ -8,7 +8,7 @@ float contour(float value, float spacing) {
   return (1.0 - smoothstep(0.3, 1.2, away)) * (1.0 - smoothstep(0.3, 0.8, width)) * step(0.5, steps);
 }
 
-/** Darken a colour where a contour line is; a spacing of 0 means no lines. */
+/** Darken a colour on contour lines of a value; no lines if `spacing` is 0. */
 vec3 lined(vec3 colour, float value, float spacing) {
   return spacing > 0.0 ? mix(colour, colour * 0.45, 0.5 * contour(value, spacing)) : colour;
 }

@@ -3,12 +3,12 @@
 
 const $ = (id) => document.getElementById(id);
 
-/** Call drag(dx, dy, shifts) when one pointer moves, where `shifts` means to shift instead of turn;
- * pinch(ratio, dx, dy, x, y) when two do; tap(event) when one is released without having moved. Distances
- * are CSS pixels. Return a function that tells whether a drag is under way. */
+/** Call drag(dx, dy, shifts) when one pointer moves, with `shifts` true if the shift key or another button is
+ * down; pinch(ratio, dx, dy, x, y) when two pointers move; tap(event) when a pointer is released where it was
+ * pressed. Distances are CSS pixels. Return a function that returns whether a drag is under way. */
 function onDrag(element, drag, pinch, tap) {
   const pointers = new Map();
-  let far = 0; // CSS pixels that the pointers have moved since the first came down
+  let far = 0; // CSS pixels that the pointers have moved since the first of them was pressed
   const spread = () => {
     const [a, b] = [...pointers.values()];
     return { size: Math.hypot(a.x - b.x, a.y - b.y), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
@@ -46,7 +46,7 @@ function fill(slider) {
   slider.style.setProperty('--filled', `${(100 * (slider.value - slider.min)) / (slider.max - slider.min)}%`);
 }
 
-/** Set a text if it has changed. */
+/** Set the text of an element if it has changed. */
 function write(id, text) {
   const element = $(id);
   if (element.written === text) return; // reading textContent is slower
@@ -76,7 +76,7 @@ function onSlider(id, act) {
   $(id).addEventListener('input', () => take($(id)));
   for (const [type, then] of [['change', take], ['blur', () => {}]]) {
     $(`${id}-number`).addEventListener(type, () => {
-      $(id).written = ''; // the typed text may be no number, or out of range
+      $(id).written = ''; // writes the value again: the typed text may be no number, or out of range
       then($(`${id}-number`));
     });
   }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Draw the patient as a small figure of ellipsoids on 2-D canvases: in the ball, and as icons of the postures.
 
-// Centres, half axes and tones of the ellipsoids, in the patient's axes (x left, y back, z head). Face,
-// lungs and toes are in front, hair is behind.
+// Centres, half axes and tones of the ellipsoids, in the patient's axes (x left, y back, z head).
 const BODY = [
   { at: [0, 0, 0.2], size: [0.25, 0.145, 0.3], tone: 'body' },
   { at: [0, 0.01, -0.14], size: [0.2, 0.14, 0.17], tone: 'body' },
@@ -22,7 +21,7 @@ const BODY = [
 const AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 for (const part of BODY) part.squares = part.size.map((x) => x * x);
 
-/** The ends of the patient's axes. */
+/** The directions of the ends of the patient's axes, by letter. */
 const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
 const lights = new WeakMap(); // gradients by context
@@ -40,8 +39,8 @@ function lightsOf(context, tones) {
   return fresh;
 }
 
-/** Draw the figure at (x, y), `scale` CSS pixels per unit; q turns it into the eye's axes (x right, y up,
- * z to the viewer). */
+/** Draw the figure at (x, y), with `scale` CSS pixels for each unit of BODY. The quaternion `q` rotates the
+ * patient's axes to the eye's axes (x right, y up, z to the viewer). */
 function drawFigure(context, q, x, y, scale, tones) {
   const [ex, ey, ez] = AXES.map((axis) => rotate(q, axis));
   const light = lightsOf(context, tones);
@@ -52,7 +51,7 @@ function drawFigure(context, q, x, y, scale, tones) {
     xx: a * ex[0] * ex[0] + b * ey[0] * ey[0] + c * ez[0] * ez[0],
     xy: a * ex[0] * ex[1] + b * ey[0] * ey[1] + c * ez[0] * ez[1],
     yy: a * ex[1] * ex[1] + b * ey[1] * ey[1] + c * ez[1] * ez[1],
-    // Depth by which the parts are sorted: that of the centre plus half of the extent towards the viewer.
+    // Parts are sorted by the depth of the centre plus half of the extent towards the viewer.
     front: at[0] * ex[2] + at[1] * ey[2] + at[2] * ez[2] + 0.5 * Math.sqrt(a * ex[2] * ex[2] + b * ey[2] * ey[2] + c * ez[2] * ez[2]),
   })).sort((a, b) => a.front - b.front);
   context.save();
@@ -72,7 +71,7 @@ function drawFigure(context, q, x, y, scale, tones) {
 
 const sizes = new WeakMap();
 const measured = new ResizeObserver((entries) => entries.forEach(({ target }) => sizes.delete(target)));
-/** Return the size of a canvas, CSS pixels. It is measured only after a change, because that forces a layout. */
+/** Return the size of a canvas, CSS pixels. It is measured only after a change, because measuring forces a layout. */
 function sizeOf(canvas) {
   if (!sizes.has(canvas)) {
     sizes.set(canvas, { width: canvas.clientWidth, height: canvas.clientHeight });
@@ -109,8 +108,8 @@ const css = (name) => theme[name.slice(2)];
 const GLYPH = 18; // side of a letter's box, CSS pixels
 
 let glyphsMade = null;
-/** Return a canvas with the ball's letters in two rows, front and back colours, drawn once for a theme
- * because text is slow. */
+/** Return a canvas with the ball's letters, one row for letters in front and one for those behind. They are
+ * drawn once for a theme, because drawing text is slow. */
 function glyphsOf() {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   if (glyphsMade?.tones === theme.tones && glyphsMade.ratio === ratio) return glyphsMade;
@@ -132,7 +131,8 @@ function glyphsOf() {
 
 let drawn = [];   // size, theme, rotation and gravity that the ball shows now
 let glass = null; // gradient of the ball, made once for a size and theme
-/** Draw the ball: the patient inside, gravity as an arrow. `toEye` turns the patient's axes to the eye's. */
+/** Draw the ball: the patient inside, gravity as an arrow. The quaternion `toEye` rotates the patient's axes to
+ * the eye's axes. */
 function drawBall(canvas, toEye, gravity) {
   const { width: size } = sizeOf(canvas);
   const now = [size, window.devicePixelRatio, theme.tones, ...toEye, ...gravity];
@@ -175,7 +175,7 @@ function drawBall(canvas, toEye, gravity) {
     context.lineWidth = 1;
     context.strokeStyle = css('--line');
     context.globalAlpha = front ? 1 : 0.4;
-    context.beginPath(); // one stroke for all three
+    context.beginPath(); // one stroke for all three circles
     for (const n of [ends[0], ends[3], ends[4]]) { // L, P and H
       // The great circle normal to n projects to an ellipse; its near half lies opposite to n.
       const begin = n[2] > 0 === front ? -radius : radius;
@@ -202,7 +202,7 @@ function drawBall(canvas, toEye, gravity) {
   graticule(true);
   letters(true);
   if (down[2] >= 0) arrow();
-  if (down[2] < 0) { // seen through the patient
+  if (down[2] < 0) { // the arrow behind the patient shines through
     context.save();
     context.globalAlpha = 0.6;
     arrow();
@@ -210,17 +210,17 @@ function drawBall(canvas, toEye, gravity) {
   }
 }
 
-/** Return the height of the lowest point of the figure turned by q, where its table is. */
+/** Return the height of the lowest point of the figure rotated by the quaternion `q`. */
 function lowestPart(q) {
   const up = rotate(inverse(q), [0, 1, 0]);
   return Math.min(...BODY.map((part) => dot(up, part.at) - Math.hypot(...part.size.map((s, i) => s * up[i]))));
 }
 
-/** Draw the icon of a posture: the figure in the room, on a table, seen from its side. */
+/** Draw the icon of a posture: the figure in the room, on a table, seen from the side of the table. */
 function drawIcon(canvas, bodyToRoom) {
   const context = freshContext(canvas);
   const { width, height } = sizeOf(canvas);
-  const camera = compose(turn([1, 0, 0], -1.45), turn([0, 0, 1], 0.35)); // room -> eye
+  const camera = compose(turn([1, 0, 0], -1.45), turn([0, 0, 1], 0.35)); // rotation from the room to the eye's axes
   const q = compose(camera, bodyToRoom);
   const along = rotate(q, [0, 0, 0.86]);
   const scale = Math.min(width / 2 / (Math.abs(along[0]) + 0.12), height / 2 / (Math.abs(along[1]) + 0.2));

@@ -3,13 +3,13 @@
 
 const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.abs(value)}`;
 
-/** Published changes of each lung's volume at rest, % of supine: mean and standard deviation. */
+/** Published changes of each lung's volume at rest from supine, %: mean and standard deviation, by posture. */
 const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
 
-/** Return the volume of each lung, mL, tissue included. */
+/** Return the volume of each lung in a moment, gas and tissue, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
-/** Return a weight of each vertex, proportional to the area of the triangles around it. */
+/** Return for each vertex a weight proportional to the area of the triangles around it. */
 function areasOf({ surface, corners, vertices }) {
   const areas = new Float32Array(vertices);
   for (let t = 0; t < corners.length; t += 3) {
@@ -20,9 +20,9 @@ function areasOf({ surface, corners, vertices }) {
   return areas;
 }
 
-/** Return statistics of the displacement between two moments, mm, over every `stride`th vertex: the mean
- * over the area, its 95th percentile (rounded up to a 2000th of the largest) and the largest. */
-function moveBetween(basis, now, from, stride) {
+/** Return statistics of the displacement from the moment `from` to `now`, mm, over every `stride`th vertex: the
+ * mean over the area, the 95th percentile (rounded up to a 2000th of the largest) and the largest. */
+function displacementBetween(basis, now, from, stride) {
   basis.areas ??= areasOf(basis);
   const { modes, coefficients, direction, areas } = basis;
   const far = new Float32Array(Math.ceil(basis.vertices / stride));
@@ -49,7 +49,7 @@ function moveBetween(basis, now, from, stride) {
   return { mean: sum / area, p95: (bin / 2000) * largest, largest };
 }
 
-/** Return how a sentence about a posture begins: "On the left side", "Supine, 15 degrees head down,". */
+/** Return the beginning of a sentence on a posture: "On the left side", "Supine, 15 degrees head down,". */
 function whereWords(gravity) {
   const text = postureText(gravity);
   const [, name, tilt] = /^([a-z]+)([+-]\d+)?$/.exec(text) ?? [];
@@ -65,22 +65,23 @@ function lungWords(basis, held, before) {
     .map(({ name, ml, percent }) => `the ${name} ${Math.abs(percent) < 2 ? 'keeps its volume' : `${ml < 0 ? 'loses' : 'gains'} ${Math.abs(ml)} mL`} (${signed(percent)} %)`);
 }
 
-/** Return two sentences about a moment in a posture, at `volume` ("500 mL above rest", or empty). */
+/** Return two sentences on a moment, one on volumes and one on displacements. `volume` is a phrase such as "500 mL
+ * above rest", or empty. */
 function findingOf(basis, moment, gravity, volume, stride) {
   const { from } = basis;
-  const { mean, p95, largest } = moveBetween(basis, moment, from, stride);
+  const { mean, p95, largest } = displacementBetween(basis, moment, from, stride);
   if (largest < 0.05) return [`This is ${from.name}, from which displacements are measured.`, ''];
   const where = `${whereWords(gravity)}${volume ? `${whereWords(gravity).endsWith(',') ? '' : ','} ${volume},` : ''}`;
-  const move = `the surface moves ${mean.toFixed(1)} mm on average and ${largest.toFixed(1)} mm at most, 95 % of it within ${p95.toFixed(1)} mm, from ${from.name}.`;
-  if (!moment.held) return [`${where} ${move}`, ''];
+  const displacement = `the surface moves ${mean.toFixed(1)} mm on average and ${largest.toFixed(1)} mm at most, 95 % of it within ${p95.toFixed(1)} mm, from ${from.name}.`;
+  if (!moment.held) return [`${where} ${displacement}`, ''];
   basis.fromHeld ??= heldBy(basis, from);
-  return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, move.replace(/^t/, 'T')];
+  return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, displacement.replace(/^t/, 'T')];
 }
 
-/** Return the expected error of the displacement u from one moment to another, mm RMS over the vertices, as
- * the library computes it: sigma^2 = |u| min(constant, RMS of u), plus, where rest is assumed, the square
- * of the effect of 5 % of full inflation more at rest. `fuller` holds both moments with 1 % more; null
- * where rest is known. */
+/** Return the expected error of the displacement u from the moment `from` to `now`, mm RMS over the vertices, as
+ * the library computes it. The square of a vertex' error is |u| min(constant, RMS of u) plus, if the volume at
+ * rest is assumed, the square of the change of u when that volume is larger by 5 % of the reference volume.
+ * `fuller` holds both moments with 1 % more volume; null if the volume at rest is known. */
 function expectedError(basis, now, from, fuller) {
   const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
   const more = fuller?.map((moment) => placesOf(basis, moment));
@@ -100,8 +101,8 @@ function expectedError(basis, now, from, fuller) {
   return Math.sqrt((Math.min(Number(basis.metadata.expected_error_mm), Math.sqrt(squares / n)) * lengths + slopes * (0.05 / 0.01) ** 2) / n);
 }
 
-/** Return the expected error in words for a posture `depth` mL above rest; empty if the basis states no
- * error or displacements are not measured from supine at rest. */
+/** Return a sentence on the expected error of a moment `depth` mL above rest. It is empty if the basis states no
+ * expected error, or if displacements are not measured from supine at rest. */
 function errorWords(basis, moment, depth) {
   const { metadata, from } = basis;
   if (!metadata.expected_error_mm || !moment.held || from.name !== 'supine at rest') return '';
@@ -111,9 +112,9 @@ function errorWords(basis, moment, depth) {
   return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
 }
 
-/** Return the changes of volume and the mean displacement in a moment as text for a card: "L \u22121 %, R +18 %, 6.9 mm". */
+/** Return the changes of volume and the mean displacement in a moment, as on a card: "L \u22121 %, R +18 %, 6.9 mm". */
 function answerOf(basis, moment) {
-  const { mean, largest } = moveBetween(basis, moment, basis.from, 1);
+  const { mean, largest } = displacementBetween(basis, moment, basis.from, 1);
   if (largest < 0.05) return 'reference';
   if (moment.held) basis.fromHeld ??= heldBy(basis, basis.from);
   const lungs = moment.held.map((ml, lung) => `${basis.lungNames[lung].slice(0, 1).toUpperCase()} ${signed(Math.round((100 * ml) / basis.fromHeld[lung] - 100))} %, `);
@@ -132,7 +133,7 @@ function writeFinding(element, text) {
   }));
 }
 
-/** Bars of the volume of each lung: grey for the volume before, then orange for a gain or hatched for a loss. */
+/** Bars of the lungs' volumes: grey for the volume before, then orange for a gain or hatched for a loss. */
 class Holds {
   constructor(parent, { lungNames }) {
     this.rows = lungNames.map(() => {
@@ -150,9 +151,9 @@ class Holds {
     });
   }
 
-  /** Show the volumes `held` and `before` of each lung, mL. `most`, mL, is the largest volume in any posture,
-   * for the scale; `heights`, mm, of the lungs say which is uppermost; `measured` is the entry of PUBLISHED
-   * for this posture, if any. */
+  /** Show the volumes of each lung: `held` now, and `before`, mL. `most` is the largest volume of a lung in any
+   * posture, mL, to which bars are scaled; `heights` of the lungs, mm, say which lung is uppermost; `measured` is
+   * the entry of PUBLISHED for this posture, if there is one. */
   show({ lungNames }, held, before, most, heights, measured) {
     const full = 1.06 * Math.max(most, ...held, ...before.map((ml, lung) => ml * (1 + (measured?.[lungNames[lung]] ?? [0, 0]).reduce((sum, x) => sum + x, 0) / 100)));
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // mm

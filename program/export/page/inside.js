@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Read and show the content of the lungs: named points and meshes, which move by the weights and gains of
-// their lung and a displacement field of their own, [vertex][axis][mode].
+// Read and show the content of the lungs: named points and meshes. They follow the weights and gains of their lung
+// with a displacement field of their own, [vertex][axis][mode].
 
-const BALL_RADIUS = 4; // mm, of the ball drawn at a point
+const BALL_RADIUS = 4; // radius of the ball drawn at a point, mm
 
-/** Take the content out of the page and sort points before meshes, so that each kind is one draw call. */
+/** Read the content of the lungs from the page, and sort points before meshes, so that each needs one draw call. */
 function takeInside({ inside, modes: k, placeUnit, middle }) {
   const { vertices: n } = inside;
   inside.modes = k;
@@ -47,7 +47,7 @@ function normalsOf({ reference, vertices, corners }) {
   return normals;
 }
 
-/** Return the position of a vertex by the displacement field, mm. */
+/** Return the position of a vertex that follows the displacement field, mm. */
 function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
@@ -56,9 +56,9 @@ function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex)
   });
 }
 
-/** Return the rotation, by rows, that best maps positions before to positions after. `h` is the 3 x 3 sum of
- * their products, both centred. The rotation's quaternion is the eigenvector of a symmetric matrix with the
- * largest eigenvalue, found by power iteration (as in runtime/rigid.c). */
+/** Return the rows of the rotation that maps positions before to positions after with the least squares of error.
+ * `h` is the 3 x 3 sum of the products of both, each relative to its mean. The quaternion of the rotation is the
+ * eigenvector of a symmetric matrix with the largest eigenvalue, from a power iteration (as in runtime/rigid.c). */
 function rotationOf(h) {
   const m = [[h[0] + h[4] + h[8], h[5] - h[7], h[6] - h[2], h[1] - h[3]], [h[5] - h[7], h[0] - h[4] - h[8], h[1] + h[3], h[6] + h[2]],
     [h[6] - h[2], h[1] + h[3], h[4] - h[0] - h[8], h[5] + h[7]], [h[1] - h[3], h[6] + h[2], h[5] + h[7], h[8] - h[0] - h[4]]];
@@ -73,8 +73,8 @@ function rotationOf(h) {
     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]];
 }
 
-/** Return the positions of the vertices of a part, mm; a rigid part takes the rigid motion closest to its
- * field. */
+/** Return the positions of the vertices of a part, mm. A rigid part follows the rigid motion closest to the
+ * displacement field. */
 function insidePlaces(inside, moment, part) {
   const members = inside.members[part];
   const to = members.map((vertex) => fieldPlace(inside, moment, vertex));
@@ -87,26 +87,26 @@ function insidePlaces(inside, moment, part) {
   return from.map((p) => rotation.map((row, axis) => after[axis] + row.reduce((sum, x, k) => sum + x * (p[k] - before[k]), 0)));
 }
 
-/** Return the position of a vertex, mm, in a rigid part or not. */
+/** Return the position of a vertex of any part, mm. */
 function insidePlace(inside, moment, vertex) {
   return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
 }
 
-/** Return the mean position of the vertices of a part in one moment and their mean distance from another,
- * mm. */
+/** Return the mean position of the vertices of a part in the moment `now`, and the mean of their displacements from
+ * the moment `from`, mm. */
 function insidePart(inside, part, now, from) {
   const [places, before] = [now, from].map((moment) => insidePlaces(inside, moment, part));
   const place = [0, 0, 0];
-  let move = 0;
+  let displacement = 0;
   places.forEach((a, j) => {
     const b = before[j];
     a.forEach((x, i) => { place[i] += x / places.length; });
-    move += Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / places.length;
+    displacement += Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / places.length;
   });
-  return { place, move };
+  return { place, displacement };
 }
 
-/** Return the vertex of a part nearest to a position. */
+/** Return the vertex of a part nearest to the position `place`, mm, in a moment. */
 function insideNearest(inside, part, moment, place) {
   let [best, least] = [inside.members[part][0], Infinity];
   insidePlaces(inside, moment, part).forEach((at, j) => {
@@ -119,9 +119,9 @@ function insideNearest(inside, part, moment, place) {
 /** Largest number of rows shown; longer tables are searched by name. */
 const ROWS_SHOWN = 200;
 
-/** Table of the content, one row for each part: a button that toggles the part's name in the picture, its
- * position and how far it has moved. `state.named` lists the parts with names in the picture; `redraw`
- * requests a new picture. */
+/** Table of the content with a row for each part: a button that shows or hides the part's name in the picture, the
+ * part's position and its displacement. `state.named` lists the parts with names in the picture; `redraw` requests
+ * a new picture. */
 class InsideTable {
   constructor(inside, state, redraw) {
     Object.assign(this, { inside, state, redraw, rows: [], pointed: -1, written: null });
@@ -144,21 +144,21 @@ class InsideTable {
   }
 
   row(part) {
-    const [row, head, button, place, move] = ['tr', 'th', 'button', 'td', 'td'].map((tag) => document.createElement(tag));
+    const [row, head, button, place, displacement] = ['tr', 'th', 'button', 'td', 'td'].map((tag) => document.createElement(tag));
     head.scope = 'row';
     button.type = 'button';
     button.textContent = this.inside.names[part] || '(no name)';
-    button.title = 'Keep its name in the picture';
+    button.title = 'Show or hide this name in the picture';
     button.addEventListener('click', () => this.keep(part));
     const point = (to) => () => { this.pointed = to; this.redraw(); };
     for (const [type, to] of [['focus', part], ['blur', -1]]) button.addEventListener(type, point(to));
     for (const [type, to] of [['mouseenter', part], ['mouseleave', -1]]) row.addEventListener(type, point(to));
     head.append(button);
-    row.append(head, place, move);
-    return { part, row, button, place, move };
+    row.append(head, place, displacement);
+    return { part, row, button, place, displacement };
   }
 
-  /** Toggle a part's name in the picture. */
+  /** Show a part's name in the picture, or hide it. */
   keep(part) {
     const { state } = this;
     state.named = state.named.includes(part) ? state.named.filter((p) => p !== part) : [...state.named, part];
@@ -170,30 +170,30 @@ class InsideTable {
     this.redraw();
   }
 
-  /** Write the positions now and the distances from another moment, unless the table shows them already. */
+  /** Write the positions in the moment `now` and the displacements from `from`, unless the table shows them. */
   show(now, from) {
     if (this.written?.now === now && this.written.from === from) return;
     this.written = { now, from };
     const of = (part) => insidePart(this.inside, part, now, from);
-    for (const { part, button, place, move } of this.rows) {
-      const { place: at, move: far } = of(part);
+    for (const { part, button, place, displacement } of this.rows) {
+      const { place: at, displacement: far } = of(part);
       const texts = [placeText(at).replace(' mm', ''), far.toFixed(1)];
       if (place.textContent !== texts[0]) place.textContent = texts[0];
-      if (move.textContent !== texts[1]) move.textContent = texts[1];
+      if (displacement.textContent !== texts[1]) displacement.textContent = texts[1];
       const words = `${button.textContent}, moved ${texts[1]} mm, at ${texts[0]} mm`;
       if (button.getAttribute('aria-label') !== words) button.setAttribute('aria-label', words);
     }
   }
 }
 
-/** Labels over the picture, beside their points. */
+/** Names of parts over the picture, beside the parts. */
 class InsideNames {
   constructor(parent) {
     Object.assign(this, { parent, plates: [] });
   }
 
-  /** Show names, {text, at}; `at` is in CSS pixels, and null for a hidden name. If two would overlap, the
-   * lower one moves down. */
+  /** Show names, {text, at}, where `at` is a position in CSS pixels, or null for a hidden name. If two names would
+   * overlap, the lower one moves down. */
   show(names) {
     const taken = [];
     for (const name of names.filter(({ at }) => at).sort((a, b) => a.at.y - b.at.y)) {

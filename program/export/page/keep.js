@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Keep the view: in a link, or in a PNG of the picture.
+// Write the view to a link and read it back; save the picture as PNG.
 
 /** Fields of State that a link lists under `show`. */
 const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside'];
@@ -55,7 +55,8 @@ function takeLink(text, state) {
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
 }
 
-/** Return the picture with its text as a PNG blob. `draw` is called first, so that its pixels can be read. */
+/** Return the picture with its texts as a PNG blob. It calls `draw` first, because the canvas keeps its pixels only
+ * until the end of the frame. */
 function savePicture(canvas, draw, title, lines, range, colours, labels) {
   draw();
   const ratio = canvas.width / canvas.clientWidth;

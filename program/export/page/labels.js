@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Place labels over the picture: the ends of the body's axes, probes, and names.
 
-/** Return where a point of the body, mm, is on the canvas, in CSS pixels; null behind the viewer. */
+/** Return the position on the canvas, CSS pixels, of a point in the patient's axes, mm; null if it is behind the
+ * viewer. `ratio` is the number of pixels of the canvas for each CSS pixel. */
 function project(pane, [x, y, z], ratio) {
   const m = pane.toEye;
   const eye = [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
@@ -19,11 +20,11 @@ const placed = (element, at, shown) => {
   if (shown) element.style.transform = where;
 };
 
-const LETTER_RADIUS = 12; // radius of a letter with the space around it, CSS pixels
+const LETTER_RADIUS = 12; // radius of a letter and the space around it, CSS pixels
 const ARROW_RADIUS = 13;  // radius of the head of gravity's arrow, CSS pixels
 
-/** Move a letter off a plate that it would overlap: up, down, right or left, whichever is shortest and
- * stays in the picture. */
+/** Return the position of a letter, moved off a plate that it would overlap: up, down, right or left, whichever way
+ * is shortest and stays in the picture. */
 function offPlate(at, plate, box) {
   const r = LETTER_RADIUS;
   if (at.x < plate.left - r || at.x > plate.right + r || at.y < plate.top - r || at.y > plate.bottom + r) return at;
@@ -33,7 +34,7 @@ function offPlate(at, plate, box) {
   return candidates.reduce((best, place) => (far(place) < far(best) ? place : best), candidates[0] ?? at);
 }
 
-/** Move a letter to the side of an arrow, [from, to], that it would overlap. */
+/** Return the position of a letter, moved to the side of an arrow, [from, to], that it would overlap. */
 function offArrow(at, [from, to], box) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   const along = Math.max(0, Math.min(1, ((at.x - from.x) * dx + (at.y - from.y) * dy) / Math.max(dx * dx + dy * dy, 1e-9)));
@@ -47,8 +48,8 @@ function offArrow(at, [from, to], box) {
   return inside(beside(side)) ? beside(side) : beside(-side);
 }
 
-/** The letters L, R, A, P, H and F around the lungs of each pane, kept within the picture and off the
- * plates and the arrow; hidden on axes that point towards the viewer or away. */
+/** The letters L, R, A, P, H and F around the lungs of each pane. They stay in the picture, off the plates and the
+ * arrow, and are hidden on axes that point towards the viewer or away. */
 class Letters {
   constructor(parent, panes) {
     this.sets = Array.from({ length: panes }, () => Object.keys(ENDS).map((letter) => {
@@ -75,7 +76,7 @@ class Letters {
           at.x = Math.max(box.left + 15, Math.min(box.right - 15, at.x));
           at.y = Math.max(15, Math.min(box.bottom - 15, at.y));
           const off = () => { for (const plate of plates) at = offPlate(at, plate, box); };
-          off(); // this may move it onto the arrow, and moving off that onto a plate again
+          off(); // and again below, because offArrow may move the letter onto a plate
           if (arrow[0] && arrow[1]) at = offArrow(at, arrow, box);
           off();
         }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Show the states that the server of this page sends by WebSocket, and send this device's tilt back
-// if the user asks for it.
+// Show the states that the server of this page sends by WebSocket. If the user asks for it, send the tilt of this
+// device to the server.
 
 window.supineLive = (() => {
   const said = document.createElement('p');
@@ -13,23 +13,23 @@ window.supineLive = (() => {
   said.setAttribute('role', 'status');
   tilt.type = 'button';
   tilt.textContent = "Use this device's tilt";
-  tilt.title = 'Lay the phone on the breastbone, screen out, its top towards the head';
+  tilt.title = 'Lay the phone on the breastbone, screen outwards, top towards the head';
   tilt.hidden = typeof DeviceOrientationEvent === 'undefined' || !window.isSecureContext;
   bar.append(said, aged, tilt);
   (document.querySelector('#title > :last-child') ?? document.body).append(bar);
 
   let socket = null;
   let moments = 0;
-  let posed = NaN; // when the newest pose was received, ms of performance.now(); NaN: none
+  let posed = NaN; // time of the newest pose, ms of performance.now(); NaN: no pose yet
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  /** Return orientation q (x, y, z, w) turned by the least angle that makes gravity `gravity`. */
+  /** Return the orientation q (x, y, z, w), rotated by the least angle that gives gravity the direction `gravity`. */
   function turned(q, gravity) {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
-    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite: turn about the long axis
+    if (w < 1e-9) [axis, w] = [Math.abs(now[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], 0]; // opposite directions: turn about the long axis
     const u = cross(q, axis); // part of the quaternion product q * (axis, w)
     const product = [0, 1, 2].map((i) => q[3] * axis[i] + w * q[i] + u[i]);
     const all = [...product, q[3] * w - dot(q, axis)];
@@ -37,8 +37,8 @@ window.supineLive = (() => {
     return all.map((x) => x / length);
   }
 
-  /** Show a state: gravity in the patient's axes (x left, y back, z head), volume above rest in mL,
-   * age of the newest pose in s, below 0 where there is none. */
+  /** Show a state: gravity in the patient's axes (x left, y back, z head), the volume above rest, mL, and the age of
+   * the newest pose, s, below 0 if there is no pose. */
   function show({ gravity, above, age }) {
     posed = age < 0 ? NaN : performance.now() - 1000 * age;
     tellAge();
@@ -58,9 +58,9 @@ window.supineLive = (() => {
   }
   setInterval(tellAge, 500);
 
-  /** Return the direction of gravity in the patient's axes from the tilt of a phone on the
-   * breastbone. Its axes are x right, y up and z out of the screen: left, head, front. DeviceOrientation turns it
-   * by alpha about z, beta about x, gamma about y; the world's z is up. */
+  /** Return the direction of gravity in the patient's axes from the tilt of a phone on the breastbone, degrees. The
+   * phone's axes, x right, y up and z out of the screen, point to the patient's left, head and front.
+   * DeviceOrientation rotates the phone by alpha about z, beta about x and gamma about y in a world whose z is up. */
   function gravityOfTilt(beta, gamma) {
     const [b, c] = [beta, gamma].map((degrees) => (degrees * Math.PI) / 180);
     return [Math.cos(b) * Math.sin(c), Math.cos(b) * Math.cos(c), -Math.sin(b)];
@@ -71,7 +71,7 @@ window.supineLive = (() => {
     socket.addEventListener('open', () => { said.textContent = 'live'; });
     socket.addEventListener('message', (event) => show(JSON.parse(event.data)));
     socket.addEventListener('close', () => {
-      said.textContent = 'waiting for the server'; // the age on the page keeps growing
+      said.textContent = 'waiting for the server';
       setTimeout(connect, 1000);
     });
   }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Draw the outlines of the lungs in an axial and a coronal plane over those in the state that displacements
-// are measured from, turned so that gravity points down unless it is nearly normal to the plane.
+// Draw the outlines of the lungs in an axial and a coronal plane, over the outlines in the state from which
+// displacements are measured. Gravity points down in the pictures unless it is nearly normal to the plane.
 
-/** Return the closed lines, [[u, v], ...] each, where the surface crosses the plane at `at` mm along an
- * axis; u and v are along the other two axes, mm. A line that meets a hole of the surface stays open. */
+/** Return the closed lines along which the surface crosses the plane at `at` mm on an axis. A line is a list of
+ * points [u, v] on the other two axes, mm; it stays open if it meets a hole of the surface. */
 function linesAcross({ corners, vertices }, places, axis, at) {
   const [first, second] = [0, 1, 2].filter((i) => i !== axis);
-  const links = new Map(); // from an edge to the next edges across its triangles
-  const points = new Map(); // from an edge to where it crosses the plane
+  const links = new Map(); // for each edge, the edges that cross the plane in the same triangles
+  const points = new Map(); // for each edge, the point where it crosses the plane
   for (let t = 0; t < corners.length; t += 3) {
     const over = [0, 1, 2].map((i) => places[3 * corners[t + i] + axis] > at);
     if (over[0] === over[1] && over[1] === over[2]) continue;
@@ -36,15 +36,16 @@ function linesAcross({ corners, vertices }, places, axis, at) {
   return lines;
 }
 
-/** The two planes: the axis normal to it; the sign, 1 if its second axis points down in the picture and -1
- * if up; and the letters at the ends of its axes. A drag in one picture moves the plane of the other. */
+/** The two planes. `axis` is normal to the plane; `sign` is 1 if the plane's second axis points down in the picture,
+ * -1 if it points up; `ends` are the letters at the ends of the plane's axes. A drag in the picture of one plane
+ * moves the other plane. */
 const PLANES = [
   { name: 'axial', axis: 2, sign: 1, ends: { L: [1, 0], R: [-1, 0], P: [0, 1], A: [0, -1] } },
   { name: 'coronal', axis: 1, sign: -1, ends: { L: [1, 0], R: [-1, 0], H: [0, 1], F: [0, -1] } },
 ];
 
 class Outlines {
-  /** Make the canvases; `redraw` requests that they be drawn again. */
+  /** Make the canvases. `redraw` requests a new drawing. */
   constructor(parent, basis, state, redraw) {
     Object.assign(this, { basis, state, kept: {} });
     this.canvases = PLANES.map((plane, i) => {
@@ -68,16 +69,16 @@ class Outlines {
       parent.append(canvas);
       return canvas;
     });
-    this.across = [[0, 1], [0, 1]]; // direction of each picture's second axis, unit vector
+    this.across = [[0, 1], [0, 1]]; // unit vector on each canvas along the plane's second axis
   }
 
   /** Return the position of a plane as text. */
   placeWords(i) {
     const { state: { slices, body } } = this;
-    return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm from the apex` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from front`;
+    return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm from the apex` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from the front`;
   }
 
-  /** Draw the outlines in the moment `now` and, dashed, in `from`. */
+  /** Draw the outlines in the moment `now`, and dashed outlines in the moment `from`. */
   show(now, from) {
     const { basis, state, kept } = this;
     if (kept.from !== from) Object.assign(kept, { from, before: placesOf(basis, from) });
@@ -86,7 +87,7 @@ class Outlines {
       this.draw(i, linesAcross(basis, kept.before, plane.axis, state.slices[i]), linesAcross(basis, kept.places, plane.axis, state.slices[i]), now.gravity);
       const { axis } = PLANES[1 - i];
       const canvas = this.canvases[i];
-      canvas.setAttribute('aria-label', `Outlines, ${this.placeWords(i)}; moves the ${PLANES[1 - i].name} plane`);
+      canvas.setAttribute('aria-label', `Outlines, ${this.placeWords(i)}; a drag or the arrow keys move the ${PLANES[1 - i].name} plane`);
       canvas.setAttribute('aria-valuemin', state.body.low[axis].toFixed(0));
       canvas.setAttribute('aria-valuemax', state.body.high[axis].toFixed(0));
       canvas.setAttribute('aria-valuenow', state.slices[1 - i].toFixed(0));
@@ -105,7 +106,7 @@ class Outlines {
     const { scale } = this;
     const along = [gravity[others[0]], sign * gravity[others[1]]];
     const size = Math.hypot(...along);
-    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size); // direction of down, in the plane
+    const [a, b] = size < 0.3 ? [0, 1] : along.map((x) => x / size); // unit vector in the plane that points down in the picture
     const turned = (u, v) => [u * b - sign * v * a, u * a + sign * v * b];
     const place = ([u, v]) => {
       const [x, y] = turned(u - middle[0], v - middle[1]);
@@ -132,7 +133,7 @@ class Outlines {
     path(before);
     context.stroke();
     context.setLineDash([]);
-    context.strokeStyle = css('--accent'); // where the other plane is
+    context.strokeStyle = css('--accent'); // the line of the other plane
     context.globalAlpha = 0.8;
     context.beginPath();
     for (const side of [-1, 1]) context[side < 0 ? 'moveTo' : 'lineTo'](...place([middle[0] + side * body.half[0] * 1.12, slices[1 - i]]));

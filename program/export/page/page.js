@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Connect the state, the picture and the controls of the page.
 
-const CHECKBOXES = [...SHOWN, 'inside']; // ids, and the fields of State that they set
+const CHECKBOXES = [...SHOWN, 'inside']; // ids of checkboxes, which are also the fields of State that they set
 const VIEW_ANGLE = 0.5; // vertical field of view of the camera, radians
 const KIND_TEXT = {
   displacement: 'Distance of each point from its position FROM.',
@@ -21,7 +21,7 @@ function boundsOf(places) {
   return { centre, low, high, half: low.map((x, i) => (high[i] - x) / 2), radius: radius || 1 };
 }
 
-/** Return the rotation that turns -z to a direction, a unit vector. */
+/** Return the rotation that turns the direction -z to a unit vector. */
 function arrowTurn(direction) {
   const axis = cross([0, 0, -1], direction);
   const w = 1 - direction[2];
@@ -46,17 +46,17 @@ function start() {
   const { inside } = basis;
   const fromWhere = basis.from.name.replace(/^the /, 'in the '); // "supine at rest", "in the scan"
   const restOrScan = basis.resting ? 'rest' : 'scan';
-  const redraw = () => { unseen = true; }; // draws the picture again in the next frame
+  const redraw = () => { unseen = true; };
   const tangent = Math.tan(VIEW_ANGLE / 2);
-  let stale = true;     // whether the vertices must be moved to the state
-  let unseen = true;    // whether the picture must be drawn again
+  let stale = true;     // whether the vertices are out of date
+  let unseen = true;    // whether the picture is out of date: the next frame draws it
   let pointer = null;   // position of the pointer on the canvas, CSS pixels
-  let asked = true;     // whether the value under the pointer was requested since it or the picture changed
+  let asked = true;     // whether the value under the pointer was requested since the pointer or the picture changed
   let wanted = null;    // {at, then}: position of a click, and the callback for the result
   let question = null;  // {pane, then} of the request that the graphics card is working on
-  let before = null;    // time of the last frame, ms; null if that was not drawn
+  let before = null;    // time of the last frame, ms; null if the last frame was not drawn
   let streak = 0;       // number of frames drawn without a pause
-  let frameTime = NaN;  // ms, smoothed
+  let frameTime = NaN;  // smoothed time between frames, ms
   let idle = null;      // timer that writes the link
   let panes = [];
   const marks = [];
@@ -68,8 +68,8 @@ function start() {
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-  /** Return the largest coordinate of the lungs along a direction, mm, over all vertices where heights are
-   * shown; some 400 are enough to place the arrow and the table. */
+  /** Return the largest coordinate of the lungs along a direction, mm: over all vertices if colours show heights,
+   * else over some 400, which are enough to place the arrow and the table. */
   function reachAlong(moment, towards) {
     const { surface, direction, coefficients, modes } = basis;
     const { weights, gains } = moment;
@@ -97,7 +97,7 @@ function start() {
     const pivot = state.camera.pivot ?? centre;
     const toRoom = compose(cameraTurn(), modelTurn(q));
     const away = rotate(toRoom, pivot);
-    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // raised, to show the table
+    const offset = [pan[0] - away[0], pan[1] - away[1] + 0.2 * radius * blend(), -away[2] - distance]; // raises the lungs, to show the table
     const { gravity } = moment;
     const lowestAt = pane_lowest(name, moment);
     const tail = lowestAt - dot(gravity, centre) + 0.08 * radius;
@@ -115,26 +115,26 @@ function start() {
       arrowToEye: arrow, arrowEnds: [tail, tail + length].map((far) => centre.map((c, i) => c + gravity[i] * far)), gravity, lowest: lowestAt, measure: kind.measure, map: kind.map, range: state.range,
       pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, contours: state.contours, dark: isDark(), tint: rgb(theme.gravity), ink: [...rgb(theme.ink), 1], radius,
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
-      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // translucent from below
+      tableToEye, tableTint: [...rgb(theme.table), tableToEye && tableToEye[10] < 0 ? 1 : 0.25], // a table seen from below is translucent
       cut: axis < 0 ? NO_CUT : [...[0, 1, 2].map((i) => (i === axis ? 1 : 0)), low[axis] + at * (high[axis] - low[axis])],
     };
   }
 
-  const depths = {}; // heights of the lowest point and the table of each state, kept until its moment changes
+  const depths = {}; // depths of the lowest point and of the table in each state, kept until its moment changes
   function pane_depth(name, moment) {
     const { kind } = state;
     if (depths[name]?.moment !== moment || depths[name].kind !== kind) {
       const { gravity } = moment;
       const flat = Math.hypot(gravity[0], gravity[1]);
-      const down = flat > 0.4 ? [gravity[0] / flat, gravity[1] / flat, 0] : null; // normal to the table, downwards; patients who stand have no table
+      const down = flat > 0.4 ? [gravity[0] / flat, gravity[1] / flat, 0] : null; // normal to the table, downwards; a standing patient has no table
       depths[name] = { moment, kind, value: reachAlong(moment, gravity), down, table: down && reachAlong(moment, down) };
     }
     return depths[name];
   }
   const pane_lowest = (name, moment) => pane_depth(name, moment).value;
 
-  /** Return the matrix from the unit box to the table of a posture, which tilts with the patient, in the
-   * eye's axes; null if there is no table. */
+  /** Return the matrix from the box of makeTable to the table of a posture in the eye's axes; null if there is no
+   * table. The table tilts with the patient. */
   function pane_table(name, moment, toRoom, offset) {
     const { down, table } = pane_depth(name, moment);
     if (!down) return null;
@@ -152,15 +152,15 @@ function start() {
     return [makePane('pinned', state.pinned, state.pinnedQ, [0, 0, half, h]), makePane('now', state.moment, state.q, [half, 0, w - half, h])];
   }
 
-  /** Return the pane at a position on the canvas (CSS pixels), and the position in it, -1 to 1 each towards. */
+  /** Return the pane at a position on the canvas, CSS pixels, and x and y of the position in the pane, -1 to 1. */
   function paneAt({ x, y }) {
     const [px, py] = [x * ratio(), canvas.height - y * ratio()];
     const pane = panes.find(({ box }) => px >= box[0] && px < box[0] + box[2]) ?? panes[0];
     return { pane, x: (2 * (px - pane.box[0])) / pane.box[2] - 1, y: (2 * (py - pane.box[1])) / pane.box[3] - 1 };
   }
 
-  /** Show what is under the pointer once the graphics card has answered, and ask again if the picture or the
-   * pointer has changed since. */
+  /** Show what is under the pointer if the graphics card has answered, and ask again if the picture or the pointer
+   * has changed since the last question. */
   function point() {
     const found = picture.picked();
     if (found) found.pane = question.pane;
@@ -189,7 +189,7 @@ function start() {
       tip.lastChild.textContent = `${basis.lungNames[found.lung]}   ${placeText(found.at)}`;
     } else {
       Object.assign(found, insideAt(found));
-      tip.firstChild.textContent = `${inside.names[found.part]}  moved ${found.move.toFixed(2)} mm`;
+      tip.firstChild.textContent = `${inside.names[found.part]}  moved ${found.displacement.toFixed(2)} mm`;
       tip.lastChild.textContent = placeText(found.place);
     }
     const [x, y] = [Math.max(4, Math.min(pointer.x + 16, canvas.clientWidth - tip.offsetWidth - 8)), Math.max(8, pointer.y - tip.offsetHeight - 10)];
@@ -247,7 +247,7 @@ function start() {
       const n = state.probes.length;
       return `${n - 1} to ${n}: ${apart(places(state.moment)).toFixed(1)} mm; ${fromWhere} ${apart(places(state.from)).toFixed(1)} mm`;
     };
-    write('probes-text', state.probes.length === 0 ? 'Click or tap the lungs to keep a probe; two measure the distance between them.' : state.probes.length === 1 ? 'A second probe measures the distance.' : between());
+    write('probes-text', state.probes.length === 0 ? 'Click or tap the lungs to place a probe. Two probes measure the distance between them.' : state.probes.length === 1 ? 'Place a second probe to measure the distance.' : between());
     $('probes-clear').hidden = state.probes.length === 0;
   }
 
@@ -255,15 +255,15 @@ function start() {
   const insideTable = inside && new InsideTable(inside, state, redraw);
   const insideNames = new InsideNames($('letters'));
 
-  /** Return the position of the content's vertex nearest to the pointer, how far it has moved, and the value
-   * of its colour. */
+  /** Return the position of the content's vertex nearest to the pointer and its displacement, mm, and the value that
+   * its colour shows. */
   function insideAt({ part, at, pane }) {
     const moment = pane === 'pinned' ? state.pinned : state.moment;
     const vertex = insideNearest(inside, part, moment, at);
     const [place, from] = [insidePlace(inside, moment, vertex), insidePlace(inside, originMoment(), vertex)];
-    const move = Math.hypot(...place.map((x, i) => x - from[i]));
+    const displacement = Math.hypot(...place.map((x, i) => x - from[i]));
     const height = pane_lowest(pane, moment) - dot(moment.gravity, place);
-    return { place, move, value: { displacement: move, difference: move, height }[state.kind] };
+    return { place, displacement, value: { displacement, difference: displacement, height }[state.kind] };
   }
 
   function showInside() {
@@ -271,13 +271,13 @@ function start() {
     const shown = state.inside ? [...new Set([...state.named, insideTable.pointed])].filter((part) => part >= 0) : [];
     const pane = panes.at(-1);
     insideNames.show(shown.map((part) => {
-      const { place, move } = partNow(part);
+      const { place, displacement } = partNow(part);
       const at = project(pane, place, ratio());
-      return { text: `${inside.names[part]} moved ${move.toFixed(1)} mm`, at: at && at.x > pane.box[0] / ratio() ? at : null };
+      return { text: `${inside.names[part]} moved ${displacement.toFixed(1)} mm`, at: at && at.x > pane.box[0] / ratio() ? at : null };
     }));
   }
 
-  /** Request what is at a position on the canvas. */
+  /** Request what is at a position on the canvas, CSS pixels; `then` receives the result of picked(). */
   function ask(at, then) {
     pointer = at;
     wanted = { at, then };
@@ -301,23 +301,23 @@ function start() {
   const holds = new Holds($('holds'), basis);
   const outlines = new Outlines($('outlines'), basis, state, () => { described = null; redraw(); });
 
-  /** Write the changes in each posture on its card; `most` is the largest volume of a lung in them, mL. */
-  let answered = { depth: null };
+  let answered = { depth: null }; // volume above rest of the answers on the cards, and the largest volume of a lung, mL
+  /** Write the changes in each posture on its card. */
   function answerCards() {
     if (answered.depth === state.depth) return;
     answered = { depth: state.depth, most: 0 };
     for (const { posture, answer } of buttons) {
       const moment = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), state.depth);
-      answer.textContent = moment.folds ? 'would fold' : answerOf(basis, moment);
+      answer.textContent = moment.folds ? 'out of reach' : answerOf(basis, moment);
       answered.most = Math.max(answered.most, ...(moment.folds ? [] : moment.held));
     }
   }
 
-  /** Return the height of each lung's middle, mm. */
+  /** Return the height of each lung's middle against gravity, mm. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
-  let described = null; // the moment that the sentences describe, and the stride of the vertices they use
-  /** Write the finding from every `stride`th vertex: all, or about 3000 while the moment changes. */
+  let described = null; // the moment that the sentences describe, and the stride of the vertices that they use
+  /** Write the sentences, bars and outlines of the moment, with displacements over every `stride`th vertex. */
   function tellFinding(stride) {
     if (described?.moment === state.moment && described.stride <= stride) return;
     described = { moment: state.moment, stride };
@@ -328,22 +328,21 @@ function start() {
     if (held) {
       basis.fromHeld ??= heldBy(basis, basis.from);
       holds.show(basis, held, basis.fromHeld, answered.most ?? 0, lungHeights(state.gravity), measured);
-      write('holds-text', `Grey: ${basis.from.name}. Orange: gained. Hatched: lost.${measured ? ` Bracket: published, mean and SD (${measured.source}).` : ''}`);
+      write('holds-text', `Grey: ${basis.from.name}. Orange: gain. Hatched: loss.${measured ? ` Bracket: published mean and SD (${measured.source}).` : ''}`);
     }
     outlines.show(state.moment, state.from);
     write('outlines-text', `Dashed: ${basis.from.name}. Solid: ${postureWords(state.gravity)}${above && `, ${above}`}. Seen from the feet and the front; drag a line to move the slice.`);
     changed('breathing', state.playing, () => $('finding').setAttribute('aria-live', state.playing ? 'off' : 'polite'));
-    const [finding, move] = findingOf(basis, state.moment, state.gravity, above, stride);
+    const [finding, displacement] = findingOf(basis, state.moment, state.gravity, above, stride);
     writeFinding($('finding'), finding);
-    write('finding-move', move);
-    write('finding-error', stride === 1 && move ? errorWords(basis, state.moment, state.depth) : '');
+    write('finding-displacement', displacement);
+    write('finding-error', stride === 1 && displacement ? errorWords(basis, state.moment, state.depth) : '');
   }
 
-  const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // as "rest + 500 mL"
+  const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // for example "rest + 500 mL"
 
   const last = {};
-  /** Call `act` if a value has changed. The last one is kept here, because reading it from the page is
-   * slower. */
+  /** Call act(value) if a value differs from the last one, which is kept here because reading the page is slower. */
   const changed = (what, value, act) => {
     if (last[what] === value) return;
     last[what] = value;
@@ -370,7 +369,7 @@ function start() {
       $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');
     });
     const held = state.moment?.held?.map((ml, lung) => `${basis.lungNames[lung]} ${ml.toFixed(0)} mL`).join('   ');
-    write('held', `${held}, gas and tissue`);
+    write('held', `${held} (gas and tissue)`);
     drawBall($('ball'), compose(cameraTurn(), modelTurn()), gravity);
     changed('beside', state.beside, () => { $('left-name').hidden = $('right-name').hidden = !state.beside; });
     if (state.beside) {
@@ -393,9 +392,9 @@ function start() {
     for (const id of CHECKBOXES) $(id).checked = state[id];
     if (inside) {
       const from = state.kind === 'difference' ? `${postureWords(gravityOf(state.pinnedQ))} at the same breath` : basis.from.name;
-      write('inside-text', `Displacement from ${from}${inside.corners.length ? '; of a mesh, the mean' : ''}`);
+      write('inside-text', `Displacement from ${from}${inside.corners.length ? '; for a mesh, the mean of its vertices' : ''}`);
       $('inside-legend').hidden = !state.inside;
-      write('inside-legend', state.kind === 'expansion' ? 'inside: grey, because points have no area' : 'inside: balls and meshes in the same colours');
+      write('inside-legend', state.kind === 'expansion' ? 'Content: grey, because points have no area' : 'Content: balls and meshes in the same colours');
     }
     state.opacity.forEach((opacity, lung) => { for (const input of document.getElementsByName(`lung-${lung}`)) input.checked = Number(input.value) === opacity; });
     $('cut-axis').value = String(state.cut.axis);
@@ -439,7 +438,7 @@ function start() {
       deform();
     }
     if (state.moment) draw();
-    if (state.moment && now - tabled > 250) { // not in every frame of a breath
+    if (state.moment && now - tabled > 250) { // writing in every frame of a breath would be slow
       if (inside) insideTable.show(state.moment, originMoment());
       tellFinding(Math.ceil(basis.vertices / 3000));
       tabled = now;
@@ -456,7 +455,7 @@ function start() {
     idle = setTimeout(keepLink, 400);
   }
 
-  let kept = null; // the Picture or Poster whose state `from` has been computed
+  let kept = null; // the Picture or Poster that has deformed the state `from`
   function deform() {
     if (!state.moment) return;
     if (kept !== picture) {
@@ -467,8 +466,7 @@ function start() {
     if (state.kind === 'difference' || state.beside) picture.deform('pinned', state.pinned);
   }
 
-  /* Boxes of the elements over the picture, CSS pixels; measured when their sizes change. */
-  let covers = null;
+  let covers = null; // boxes of the legend and the ball, CSS pixels, measured when their sizes change
   const covered = new ResizeObserver(() => { covers = null; redraw(); });
   for (const plate of ['legend', 'ball']) covered.observe($(plate));
   function plates() {
@@ -485,7 +483,7 @@ function start() {
   }
 
   let inHeadset = false;
-  /** Advance the state to a time, ms, and return the pane that a headset shows; null without a moment. */
+  /** Advance the state to a time, ms, and return the pane that a headset shows; null if there is no moment yet. */
   function headsetFrame(now) {
     if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
       state.compute();
@@ -503,7 +501,7 @@ function start() {
     try {
       history.replaceState(null, '', `#${linkOf(state)}`);
     } catch {
-      // some browsers refuse this on pages from disk
+      // Some browsers refuse to change the address of a page from disk.
     }
   }
 
@@ -514,13 +512,13 @@ function start() {
     redraw();
   };
   const boxSize = () => ({ width: sizeOf(canvas).width / (state.beside ? 2 : 1), height: sizeOf(canvas).height });
-  const shift = (dx, dy) => { // CSS pixels
+  const shift = (dx, dy) => { // distances in CSS pixels
     const { width, height } = boxSize();
     const mm = (2 * tangent * distanceNow(width / height)) / height;
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
     redraw();
   };
-  /** Zoom so that what is at a position on the canvas, at the depth of the pivot, stays there. */
+  /** Zoom by a ratio; the point at a position on the canvas, at the depth of the pivot, stays there. */
   const zoom = (ratioOfSizes, at) => {
     const { width, height } = boxSize();
     const aspect = width / height;
@@ -545,7 +543,7 @@ function start() {
     });
   canvas.addEventListener('dblclick', (event) => ask(within(event.clientX, event.clientY), (found) => {
     if (!found) return;
-    if (found.part === undefined) state.probes.pop(); // the first click's
+    if (found.part === undefined) state.probes.pop(); // the probe that the first click placed
     else insideTable.keep(found.part);
     state.camera.pivot = found.at;
     state.camera.pan = [0, 0];
@@ -557,7 +555,7 @@ function start() {
   }, { passive: false });
   for (const type of ['pointermove', 'pointerdown']) {
     canvas.addEventListener(type, (event) => {
-      if (event.pointerType === 'touch' && type === 'pointermove') return; // a tap says what is there
+      if (event.pointerType === 'touch' && type === 'pointermove') return; // on a touch screen a tap shows what is there
       pointer = dragging() ? null : { x: event.offsetX, y: event.offsetY };
       asked = false;
     });
@@ -572,12 +570,12 @@ function start() {
     if (arrow) event.preventDefault();
   });
   const lookFrom = (letter) => {
-    const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // to the viewer
+    const [x, y, z] = rotate(modelTurn(state.goal), ENDS[letter]).map((part) => Math.round(1e9 * part) / 1e9); // direction to the viewer in the room
     Object.assign(state.camera, { azimuth: Math.atan2(0 - x, 0 - y), elevation: Math.asin(Math.max(-1, Math.min(1, z))), pan: [0, 0] });
     redraw();
   };
 
-  /* The ball: a drag turns the patient or, if the patient stays still, gravity. */
+  /* The ball: a drag turns the patient or, if the patient is still, gravity. */
   const spin = (dx, dy) => {
     const sense = state.room ? 1 : -1;
     for (const [axis, angle] of [[[0, 1, 0], dx], [[1, 0, 0], dy]]) {
@@ -606,13 +604,13 @@ function start() {
     const found = postureFrom($('posture-name').value);
     $('posture-trouble').hidden = Boolean(found);
     if (!found) {
-      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, a tilt as supine+15, or gravity as 0.6:0:-0.8`);
+      write('posture-trouble', `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, a tilt such as supine+15, or gravity such as 0.6:0:-0.8.`);
       return;
     }
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
-  $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // the typed text may be no posture
+  $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // writes the posture again: the typed text may be invalid
   const play = () => {
     state.playing = !state.playing;
     remeasure();
@@ -699,7 +697,7 @@ function start() {
       await navigator.clipboard.writeText(location.href);
       write('link', 'Copied');
     } catch {
-      write('link', 'In the address bar');
+      write('link', 'See the address bar');
     }
     setTimeout(() => write('link', 'Copy link'), 2000);
   });
@@ -743,7 +741,7 @@ function start() {
   canvas.addEventListener('webglcontextlost', (event) => {
     event.preventDefault(); // lets the browser restore the context
     picture = null;
-    tell('The browser has lost the graphics card. Reload the page if the picture does not come back.');
+    tell('The browser has lost its connection to the graphics card. Reload the page if the picture does not come back.');
   });
   canvas.addEventListener('webglcontextrestored', () => {
     picture = pictureOn(canvas, basis);
@@ -754,18 +752,17 @@ function start() {
   showLegend();
   requestAnimationFrame(frame);
 
-  /* For tests, benchmarks and the console. Gravity is in the patient's axes (x left, y back, z head), volumes
-   * are mL above rest. */
+  /* Interface for tests, benchmarks and the console. Gravity is a vector in the patient's axes (x left, y back,
+   * z head); volumes are mL above rest. */
   return {
     get picture() { return picture; },
     panes: () => panes,
-    /** Positions as the graphics card computes them: xyz of each vertex, mm LPS. */
+    /** Return the positions that the graphics card computes, xyz of each vertex, mm LPS. */
     positions: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[0],
-    /** Unit normals from the graphics card, xyz of each vertex. */
+    /** Return the unit normals that the graphics card computes, xyz of each vertex. */
     normals: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[1],
-    /** Positions of the content from the graphics card, mm LPS, in the order of takeInside. */
+    /** Return the positions of the content that the graphics card computes, mm LPS, in the order of takeInside. */
     insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
-    /** Weights, gains and volumes. */
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** Run the part of a frame that does not use the graphics card. */
     frameScript: () => { state.compute(); panes = makePanes(); letters.show(panes, state.body, ratio(), plates()); showState(); },
@@ -773,7 +770,7 @@ function start() {
   };
 }
 
-/** Return what draws on a canvas: a Picture or, without WebGL 2, a Poster. */
+/** Return a Picture, or a Poster if the browser has no WebGL 2, that draws on a canvas. */
 function pictureOn(canvas, basis) {
   try {
     return new Picture(canvas, basis);
@@ -783,7 +780,7 @@ function pictureOn(canvas, basis) {
   }
 }
 
-/** List the facts about the basis. */
+/** List facts about the basis on the page. */
 function showFacts(basis) {
   const { metadata } = basis;
   const facts = [

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Write the value and the position under the pointer as bits; the lung replaces the value's lowest four.
+// Write the bits of the value and of the position under the pointer. The index of the lung replaces the lowest 4 bits
+// of the value.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

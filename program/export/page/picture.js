@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Draw with WebGL 2. A change of gravity or volume costs one pass over the vertices, whose positions and
-// normals transform feedback stores on the graphics card; a change of the camera costs none.
+// Draw with WebGL 2. For each gravity and volume, one pass over the vertices stores positions and normals on the
+// graphics card by transform feedback; a change of the camera needs no such pass.
 
 const source = (id) => document.getElementById(id).textContent;
 
@@ -31,13 +31,13 @@ class Picture {
     this.gpuTime = NaN;
   }
 
-  /** Return the lines of supine.glsl with this basis' sizes. */
+  /** Return supine.glsl after lines that define the sizes of this basis. */
   sized() {
     const { basis } = this;
     return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, basis.words)}`, source('supine.glsl')];
   }
 
-  /** Return the shader that moves vertices, with the normal's words as attributes from location 6 on. */
+  /** Return the shader that deforms the surface, with the words of the normals as attributes from location 6 on. */
   library() {
     const all = Array.from({ length: this.basis.words }, (_, j) => j);
     return [...this.sized(), source('vertex.vert.glsl'),
@@ -45,8 +45,8 @@ class Picture {
       `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(reference, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
   }
 
-  /** Return the shader that moves the content, with an attribute for each axis and four modes from location 1
-   * on. */
+  /** Return the shader that deforms the content, with attributes from location 1 on, each for one axis and four
+   * modes. */
   insideLibrary() {
     const vectors = Math.ceil(this.basis.modes / 4);
     const all = [0, 1, 2].flatMap((axis) => Array.from({ length: vectors }, (_, j) => ({ axis, j, name: `c${axis}_${j}` })));
@@ -86,7 +86,7 @@ class Picture {
     return made;
   }
 
-  /** Make a vertex array; each attribute is [buffer, size, stride, offset, divisor, integer], or null. */
+  /** Return a vertex array. Each attribute is [buffer, size, stride, offset, divisor, integer], or null for none. */
   array(attributes) {
     const { gl } = this;
     const made = gl.createVertexArray();
@@ -104,8 +104,9 @@ class Picture {
     return made;
   }
 
-  /** Make the inputs of all vertices, and of a few for arrows: reference position and lung, direction, up to
-   * 16 coefficients, and the normal's words. Missing coefficients read as (0, 0, 0, 1) and have weight 0. */
+  /** Make the inputs of vertex.vert.glsl for all vertices, and for the few that have arrows: reference position and
+   * lung, direction, up to 16 coefficients, and the words of the normals. Missing coefficients read as (0, 0, 0, 1),
+   * but their weights are 0. */
   makeInputs() {
     const { basis } = this;
     const k = basis.modes;
@@ -126,7 +127,7 @@ class Picture {
     this.fewInputs = inputs(few(reference, 4), few(basis.direction, 3), few(basis.coefficients, k), few(basis.normals, 3 * words));
   }
 
-  /** Make the buffers of the content: displacements, a ball, and meshes. */
+  /** Make the programs and buffers of the content: coefficients, a ball, and meshes. */
   makeInside() {
     const { gl, basis: { inside, modes: k } } = this;
     this.insideMoving = this.program('inside.vert.glsl', null, ['moved'], this.insideLibrary());
@@ -165,7 +166,7 @@ class Picture {
   makeOutputs() {
     const { gl, basis } = this;
     this.indices = this.buffer(basis.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // takes the arrows' normals, which nothing reads
+    this.unread = this.buffer(16 * basis.vertices, gl.DYNAMIC_COPY); // receives the arrows' normals, which are unused
     this.edges = null;
     this.states = {};
     this.arrays = {};
@@ -178,7 +179,7 @@ class Picture {
     return this.states[name];
   }
 
-  /** Return the vertex array of one state whose colours measure from another. */
+  /** Return the vertex array that draws the state `name` in colours that measure from the state `origin`. */
   shown(name, origin) {
     const { gl } = this;
     const key = `${name} ${origin}`;
@@ -189,8 +190,8 @@ class Picture {
     return this.arrays[key];
   }
 
-  /** Make the list of edges, as pairs of vertices, lung by lung: each edge once for closed surfaces; once for
-   * each of its triangles for open ones. */
+  /** Make the list of edges as pairs of vertices, lung by lung. Of the two directions in which triangles of a closed
+   * surface follow an edge, only that towards the larger index is listed. */
   makeEdges() {
     const { gl, basis } = this;
     const { corners } = basis;
@@ -210,7 +211,7 @@ class Picture {
     this.edges = { buffer: this.buffer(pairs.subarray(0, count), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), begin: [...begin, count] };
   }
 
-  /** Make the framebuffer of one pixel that picking draws to; it holds the bits of floats. */
+  /** Make the framebuffer to which picking draws: one pixel that holds the bits of four floats. */
   makePick() {
     const { gl } = this;
     this.picking = null;
@@ -232,7 +233,7 @@ class Picture {
     return made;
   }
 
-  /** Make an arrow of length 1 along -z, from the origin. */
+  /** Return an arrow of length 1 from the origin along -z. */
   makeArrow() {
     const places = [];
     const normals = [];
@@ -255,7 +256,7 @@ class Picture {
     return { ...made, array: this.array([[made.places, 3, 12, 0], [made.normals, 3, 12, 0]]) };
   }
 
-  /** Make a box from -1 to 1 each way. */
+  /** Return the vertex array of a box from -1 to 1 along each axis. */
   makeTable() {
     const [places, normals] = [[], []];
     for (let axis = 0; axis < 3; ++axis) {
@@ -270,7 +271,7 @@ class Picture {
     return this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]);
   }
 
-  /** Compute positions and normals of every vertex of `array` into buffers. */
+  /** Store what the program `moving` computes for `count` vertices of `array` in the buffers `targets`. */
   capture(moment, array, targets, count, moving = this.moving) {
     const { gl } = this;
     gl.useProgram(moving.program);
@@ -292,7 +293,7 @@ class Picture {
     gl.bindVertexArray(null);
   }
 
-  /** Deform the surface and the content of a state. */
+  /** Deform the surface and the content to a moment, and keep both as the state `name`. */
   deform(name, moment) {
     const { moved, turned, few, inside } = this.state(name);
     this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
@@ -300,8 +301,8 @@ class Picture {
     if (inside) this.captureInside(moment, inside);
   }
 
-  /** Deform the content by its field; then overwrite the rigid parts, whose motion depends on all of their
-   * vertices. */
+  /** Deform the content by its displacement field; then overwrite the rigid parts, whose motion depends on all
+   * vertices of a part. */
   captureInside(moment, target) {
     const { gl, basis: { inside } } = this;
     this.capture(moment, this.insideInputs, [target], inside.vertices, this.insideMoving);
@@ -310,7 +311,7 @@ class Picture {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** Return the uniforms of a moment, computed once. */
+  /** Return the uniforms of a moment; those of the last moment are kept. */
   uniforms(moment) {
     if (this.uniformsMoment !== moment) {
       this.uniformsMoment = moment;
@@ -335,7 +336,7 @@ class Picture {
     return this.take(target, inside.vertices);
   }
 
-  /** Read the first three of each four floats of a buffer, and delete it. */
+  /** Read the first three of every four floats of a buffer, and delete the buffer. */
   take(target, count) {
     const { gl } = this;
     const four = new Float32Array(4 * count);
@@ -345,7 +346,7 @@ class Picture {
     return new Float32Array(3 * count).map((_, i) => four[4 * Math.floor(i / 3) + (i % 3)]);
   }
 
-  /** Set the uniforms of a program for a pane of the picture. */
+  /** Use a program for a pane of the picture, and set its uniforms. `lens` is described in surface.vert.glsl. */
   usePane(program, pane, lens) {
     const { gl } = this;
     gl.useProgram(program.program);
@@ -373,7 +374,7 @@ class Picture {
     set('spacing', pane.contours ? pane.range.step : 0);
     set('dark', pane.dark ? 1 : 0);
     set('flatly', 0);
-    /** Draw the state that displacements are measured from: 1 as a shell behind the lungs, 2 as an outline. */
+    /** Draw the state from which displacements are measured: as a shell (1) or as an outline (2). */
     const ghost = (how) => {
       if (!pane.ghost) return;
       gl.bindVertexArray(this.shown('from', 'from'));
@@ -411,7 +412,7 @@ class Picture {
     ghost(2);
   }
 
-  /** Draw the content, balls of `radius` mm and meshes, by a program that usePane has set up. */
+  /** Draw the content, balls of radius `radius`, mm, and meshes, by a program that usePane has set up. */
   drawInside(program, pane, radius) {
     const { gl, basis: { inside } } = this;
     const [now, from] = [this.state(pane.state).inside, this.state(pane.origin).inside];
@@ -433,7 +434,7 @@ class Picture {
     }
   }
 
-  /** Draw the content in the colours of the lungs, or in grey for expansion, which points do not have. */
+  /** Draw the content in the colours of the lungs; in grey if they show expansion, which points do not have. */
   drawContent(pane) {
     const { gl, content } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
@@ -442,10 +443,10 @@ class Picture {
     gl.uniform2f(content.at.range, pane.range.begin, pane.range.end);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
     gl.uniform1f(content.at.opacity, 1);
-    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // at least 4 pixels
+    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // balls of at least 4 pixels
   }
 
-  /** Draw some arrows from the state that the colour measures from to the state shown. */
+  /** Draw arrows at some vertices, from the state from which colours measure to the state shown. */
   drawArrows(pane) {
     const { gl, solid } = this;
     const key = `arrows ${pane.state} ${pane.origin}`;
@@ -490,7 +491,7 @@ class Picture {
     gl.drawArrays(gl.TRIANGLES, 0, 36);
   }
 
-  /** Draw panes on the canvas or another framebuffer. */
+  /** Draw panes on a framebuffer; null is the canvas. */
   draw(panes, framebuffer = null) {
     const { gl } = this;
     this.beginTiming();
@@ -516,13 +517,13 @@ class Picture {
     this.endTiming();
   }
 
-  /** Ask what is at a position in a pane, -1 to 1 each way. picked() has the answer a frame or two later, so
+  /** Ask what is at the position (x, y) in a pane, -1 to 1 each. picked() has the answer a frame or two later, so
    * that no frame waits for it. */
   pick(pane, x, y) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);
     gl.viewport(0, 0, 1, 1);
-    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // a NaN without a part: nothing is there
+    gl.clearBufferuiv(gl.COLOR, 0, [0x7fc00000, 0, 0, 0]); // a NaN whose part is 0 means that nothing is there
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     gl.enable(gl.DEPTH_TEST);
     this.usePane(this.picker, pane, [x, y, pane.box[2], pane.box[3]]);
@@ -541,7 +542,7 @@ class Picture {
       this.drawInside(this.contentPicker, pane, Math.max(BALL_RADIUS, 8 * pane.pixel));
     }
     gl.bindVertexArray(null);
-    this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a new one: reading into the old one would wait
+    this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a new buffer, because reading into the old one would wait
     gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -549,8 +550,8 @@ class Picture {
     gl.flush();
   }
 
-  /** Return {value, at, lung} of the surface or {part, at} of the content; null if nothing was there, undefined
-   * if the answer has not arrived. `at` is mm LPS. */
+  /** Return the answer to pick(): {value, at, lung} on the surface, {part, at} on the content, null if nothing is
+   * there, or undefined if the answer has not arrived. `at` is the position, mm LPS. */
   picked() {
     const { gl } = this;
     if (!this.picking || gl.getSyncParameter(this.picking, gl.SYNC_STATUS) !== gl.SIGNALED) return undefined;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Draw the surface on a 2-D canvas where WebGL 2 is missing, farthest triangles first. There is no shading
-// and there are no lines, arrows, content or picking, which Picture has.
+// Draw the surface on a 2-D canvas if WebGL 2 is missing, farthest triangles first. Unlike Picture, a Poster has no
+// shading, lines, arrows, content or picking.
 
 class Poster {
   constructor(canvas, basis) {

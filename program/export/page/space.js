@@ -15,7 +15,7 @@ const turn = (axis, angle) => {
   return [axis[0] * s, axis[1] * s, axis[2] * s, Math.cos(angle / 2)];
 };
 
-/** Return the rotation by b, then by a. */
+/** Return the quaternion of the rotation by b, followed by a. */
 const compose = (a, b) => unit([
   a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
   a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
@@ -40,7 +40,7 @@ function slerp(a, b, t) {
   return unit(a.map((x, i) => p * x + sign * q * b[i]));
 }
 
-/** Return the matrix that rotates by q, then adds `offset`. */
+/** Return the matrix that rotates by the quaternion q, then adds `offset`. */
 function rigid(q, offset) {
   const columns = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(q, axis));
   return new Float32Array([...columns[0], 0, ...columns[1], 0, ...columns[2], 0, ...offset, 1]);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Keep the state of the page: posture, breath, colours, camera. A posture is a rotation of the patient into
-// a room whose z points up; gravity in the patient's axes follows from it.
+// Keep the state of the page: posture, breath, colours, camera. A posture is a rotation from the patient's axes to a
+// room whose z points up. It determines gravity in the patient's axes.
 
 const RIGHT_ANGLE = Math.PI / 2;
-const LYING = compose(turn([0, 0, 1], RIGHT_ANGLE), turn([1, 0, 0], -RIGHT_ANGLE)); // on the back
+const LYING = compose(turn([0, 0, 1], RIGHT_ANGLE), turn([1, 0, 0], -RIGHT_ANGLE)); // supine
 const rolled = (degrees) => compose(LYING, turn([0, 0, 1], (degrees * Math.PI) / 180));
 const tilted = (q, degrees) => compose(q, turn([1, 0, 0], (-degrees * Math.PI) / 180));
 
@@ -22,8 +22,8 @@ const gravityOf = (q) => rotate(inverse(q), [0, 0, -1]);
 const near = (a, b) => dot(a, b) > Math.cos(0.004);
 const NAMED = [...POSTURES.slice(0, 5), INVERTED].map((p) => ({ name: p.name, gravity: gravityOf(p.q) }));
 
-/** Return a direction of gravity in the notation of the program: a name, a name with a tilt in degrees, or
- * three numbers. */
+/** Return a direction of gravity in the notation of --posture: a name, a name with a tilt in degrees, or three
+ * numbers. */
 function postureText(gravity) {
   const named = NAMED.find((p) => near(p.gravity, gravity));
   if (named) return named.name;
@@ -36,15 +36,15 @@ function postureText(gravity) {
   return gravity.map((x) => x.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
-/** Return a direction of gravity in words: as postureText, but "left side" for "left". */
+/** Return a direction of gravity as postureText does, but "left side" for "left". */
 const postureWords = (gravity) => postureText(gravity).replace(/^(left|right)$/, '$1 side');
 
-/** Return {q, tilt} of a posture in the notation of the program, or null if it is not valid. */
+/** Return {q, tilt} of a posture in the notation of --posture, or null if the text is not valid. */
 function postureFrom(text) {
   const word = text.trim().replaceAll('\u2212', '-');
   const numbers = word.split(/[:,]/).map((part) => (part.trim() === '' ? NaN : Number(part)));
   if (numbers.length === 3 && numbers.every(Number.isFinite) && Math.hypot(...numbers) > 0) {
-    const now = rotate(LYING, unit(numbers)); // turned so that it points down
+    const now = rotate(LYING, unit(numbers)); // gravity in the room if the patient were supine
     const axis = cross(now, [0, 0, -1]);
     const size = Math.hypot(...axis);
     const swing = size < 1e-9 ? (now[2] < 0 ? IDENTITY : turn([1, 0, 0], Math.PI)) : turn(unit(axis), Math.atan2(size, -now[2]));
@@ -59,14 +59,14 @@ const FADED = 0.35; // opacity of translucent lungs
 
 const FIRST_CAMERA = { azimuth: -0.4, elevation: 0.16, zoom: 1, pan: [0, 0], pivot: null };
 
-/** Names of the views, by the letter of the axis that points to the viewer. */
+/** Names of the views, by the letter of the end of the axis that points to the viewer. */
 const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 'From the right', H: 'From the head', F: 'From the feet' };
 
 class State {
   constructor(basis) {
     this.basis = basis;
-    this.standing = { q: POSTURES[2].q, tilt: 0 }; // the posture, and the tilt on top of it
-    this.q = POSTURES[2].q;                        // the rotation shown, on its way to `standing`
+    this.standing = { q: POSTURES[2].q, tilt: 0 }; // the chosen posture, and its tilt, degrees
+    this.q = POSTURES[2].q;                        // the rotation shown, which turns to the chosen posture
     this.turning = null;
     this.tidal = basis.breathVolume;
     this.depth = 0;
@@ -80,20 +80,20 @@ class State {
     this.ghost = true;
     this.arrows = false;
     this.wires = false;
-    this.beside = false;                           // the reference posture beside this one
+    this.beside = false;                           // whether the other posture is shown beside the chosen one
     this.inside = Boolean(basis.inside);           // whether the content is shown
     this.named = [];                               // parts of the content whose names are kept in the picture
     this.opacity = Array(basis.lungs).fill(basis.inside ? FADED : 1);
-    this.cut = { axis: -1, at: 0.5 };              // normal to axis 0, 1 or 2, or -1 for none; at a fraction of the lungs' extent
-    this.ownRanges = {};                           // ranges of the colours that the user typed, {begin, end}, by kind
+    this.cut = { axis: -1, at: 0.5 };              // plane of the cut: its axis, or -1 for no cut, and its position as a fraction of the lungs' extent
+    this.ownRanges = {};                           // ranges of the colours that the user typed: {begin, end} by kind
     this.probes = [];                              // marked vertices
     this.room = true;
-    this.roomBlend = 1; // 0: the patient stays still; 1: the room does
+    this.roomBlend = 1; // 0: the patient is still; 1: the room is still
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
-    this.from = basis.from;                        // weights and gains that displacements are measured from
+    this.from = basis.from;                        // weights and gains from which displacements are measured
     this.measure();
-    this.slices = [this.body.high[2] - 80, (this.body.low[1] + this.body.high[1]) / 2]; // axial z, coronal y
+    this.slices = [this.body.high[2] - 80, (this.body.low[1] + this.body.high[1]) / 2]; // z of the axial and y of the coronal plane, mm
   }
 
   get gravity() {
@@ -112,7 +112,7 @@ class State {
     if (still) this.q = this.goal;
   }
 
-  /** Turn the patient about an axis of the room. */
+  /** Turn the patient about an axis of the room by an angle, radians. */
   roll(axis, angle) {
     this.settle(compose(turn(axis, angle), this.q), 0, 0);
   }
@@ -142,7 +142,7 @@ class State {
     return this.kind === 'difference' || this.beside;
   }
 
-  /** Compute the moment; return false and keep the old one if the surface would fold. */
+  /** Compute the moment; return false and keep the old moment if the surface would fold. */
   compute() {
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (moment.folds) return false;
@@ -154,8 +154,8 @@ class State {
     return true;
   }
 
-  /** Range of the colours: as typed, or one that holds 95 % of the surface in each of six postures at the
-   * largest volume in use. */
+  /** Range of the colours: the range that the user typed, or one that contains 95 % of the surface in each of six
+   * postures at the largest volume in use. */
   get range() {
     const own = this.ownRanges[this.kind];
     if (!own) return this.ranges[this.kind];
@@ -195,7 +195,7 @@ class State {
     this.ranges = Object.fromEntries(Object.keys(found).map((kind) => {
       const value = Math.max(...found[kind], 0);
       const end = rangeEnd(value > 1e-3 ? value : 0);
-      const begin = kind === 'expansion' ? -end : 0; // shrinking has the same range as growing
+      const begin = kind === 'expansion' ? -end : 0; // shrinkage has the same range as growth
       return [kind, { begin, end, step: tickStep(end - begin), beyond: most[kind] > end, most: most[kind] }];
     }));
     this.body = boundsOf(all.flat());

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Colour by value, shaded softly so that the colours stay readable.
+// Colour the surface by value, with soft shading so that the colours can be read from the bar.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;
 in float value;
 uniform sampler2D colours;
 uniform vec2 range;    // values at the ends of the colours
-uniform float spacing; // of contour lines; 0: none
+uniform float spacing; // difference of the value between contour lines; 0: no lines
 uniform float dark;    // 1 on a dark background
-uniform vec4 cut;      // plane of the cut: nothing is drawn where dot(body, xyz) > w
+uniform vec4 cut;      // plane of the cut: the side dot(body, xyz) > w is not drawn
 uniform float opacity;
-uniform float ghost;   // 1: a translucent shell without colours; 2: its outline alone; 0: neither
+uniform float ghost;   // 0: the surface in colours; 1: a translucent shell; 2: the shell's outline alone
 uniform float flatly;  // 1: colours without shading, for the wireframe
 out vec4 colour;
 

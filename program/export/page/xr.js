@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Show the lungs in a headset, at life size, if the browser has WebXR.
 
-const XR_AWAY = 0.7; // metres in front of the viewer's first position
+const XR_AWAY = 0.7; // distance of the lungs from the viewer's first position, m
 
 /** Return the product of column-major 4 x 4 matrices. */
 const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
@@ -10,8 +10,8 @@ const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
   return sum;
 });
 
-/** Return a pane as one eye of the headset sees it: the pane's millimetres in front of the viewer become
- * metres in the room. */
+/** Return a pane as one eye of the headset sees it. Millimetres of the pane become metres in the room, in front of
+ * the viewer. */
 function xrPane(pane, view, { x, y, width, height }) {
   const room = Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * pane.distance - XR_AWAY, 1]);
   const toEye = product(view.transform.inverse.matrix, room);
@@ -21,8 +21,8 @@ function xrPane(pane, view, { x, y, width, height }) {
   };
 }
 
-/** Show `button` if the browser supports a headset. `frame(time)` advances the state and returns the pane to
- * draw, or null; `over()` is called after the session. */
+/** Show `button`, which starts and ends a session, if the browser supports a headset. frame(time) advances the
+ * state and returns the pane to draw, or null; over() is called after a session. */
 async function offerXr(button, getPicture, frame, over) {
   if (!(await navigator.xr?.isSessionSupported('immersive-vr').catch(() => false))) return;
   button.hidden = false;
