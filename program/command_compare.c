@@ -61,24 +61,19 @@ typedef struct content_moves {
                             unknown */
 } content_moves;
 
-/* Average the `width` values of each vertex over the vertices of each name. */
+/* Average the `width` values of each vertex over the vertices of each name; 0 without vertices. */
 static void average(const content_moves *c, size_t width, const float *values, double *mean) {
   const supine_command_names *names = &c->names;
-  const size_t n = supine_basis_get_info(c->basis)->vertex_count;
-  for (size_t begin = 0; begin < n;) { /* in this order a name's vertices follow each other */
-    const size_t part = names->part[names->order[begin]];
-    size_t end = begin;
-    while (end < n && names->part[names->order[end]] == part) {
-      ++end;
-    }
+  for (size_t part = 0; part < names->count; ++part) {
+    const size_t begin = names->begin[part];
+    const size_t end = names->begin[part + 1];
     for (size_t k = 0; k < width; ++k) {
       double sum = 0.0;
       for (size_t i = begin; i < end; ++i) {
         sum += (double)values[width * names->order[i] + k];
       }
-      mean[width * part + k] = sum / (double)(end - begin);
+      mean[width * part + k] = end > begin ? sum / (double)(end - begin) : 0.0;
     }
-    begin = end;
   }
 }
 

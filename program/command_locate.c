@@ -50,15 +50,15 @@ typedef struct observations {
 } observations;
 
 /* Find the vertex of a name that has only one. */
-static supine_status find_vertex(const supine_csv *csv, const char *text,
-                                 const supine_basis *inside, const supine_command_names *names,
+static supine_status find_vertex(const supine_csv *csv, const supine_command_names *names,
                                  size_t *vertex, supine_error *error) {
-  const size_t n = supine_basis_get_info(inside)->vertex_count;
+  const char *text = supine_csv_text(csv, 0);
   size_t found = 0;
-  for (size_t i = 0; i < n; ++i) {
-    if (strcmp(names->text[names->part[i]], text) == 0) {
-      *vertex = i;
-      ++found;
+  for (size_t part = 0; part < names->count; ++part) {
+    const size_t own = names->begin[part + 1] - names->begin[part];
+    if (own > 0 && strcmp(names->text[part], text) == 0) {
+      *vertex = names->order[names->begin[part]];
+      found += own;
     }
   }
   if (found == 1) {
@@ -78,8 +78,7 @@ static supine_status find_vertex(const supine_csv *csv, const char *text,
                           nearest == NULL ? "" : nearest, nearest == NULL ? "" : "'?");
 }
 
-static supine_status read_rows(supine_csv *csv, const supine_basis *inside,
-                               const supine_command_names *names, double noise,
+static supine_status read_rows(supine_csv *csv, const supine_command_names *names, double noise,
                                observations *observed, supine_error *error) {
   static const char *const axes[] = {"x", "y", "z"};
   for (bool more = true;;) {
@@ -94,7 +93,7 @@ static supine_status read_rows(supine_csv *csv, const supine_basis *inside,
     }
     supine_observation *point = &observed->points[observed->count];
     point->noise = noise;
-    status = find_vertex(csv, supine_csv_text(csv, 0), inside, names, &point->vertex, error);
+    status = find_vertex(csv, names, &point->vertex, error);
     for (size_t i = 0; i < 3 && status == SUPINE_OK; ++i) {
       status = supine_csv_number(csv, 1 + i, axes[i], &point->position[i], error);
     }
@@ -106,9 +105,8 @@ static supine_status read_rows(supine_csv *csv, const supine_basis *inside,
 }
 
 /* Read a CSV file with the columns name, x, y, z. */
-static supine_status load_observed(const char *path, const supine_basis *inside,
-                                   const supine_command_names *names, double noise,
-                                   observations *observed, supine_error *error) {
+static supine_status load_observed(const char *path, const supine_command_names *names,
+                                   double noise, observations *observed, supine_error *error) {
   static const char *const columns[] = {"name", "x", "y", "z"};
   supine_csv csv = {0};
   observed->points = calloc(SUPINE_LOCATE_POINTS_MAX, sizeof *observed->points);
@@ -117,7 +115,7 @@ static supine_status load_observed(const char *path, const supine_basis *inside,
   }
   supine_status status = supine_csv_open(path, columns, 4, 4, &csv, error);
   if (status == SUPINE_OK) {
-    status = read_rows(&csv, inside, names, noise, observed, error);
+    status = read_rows(&csv, names, noise, observed, error);
   }
   if (status == SUPINE_OK && observed->count == 0) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -403,7 +401,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     status = supine_command_inside_open(lungs, wanted->points, &inside, &names, error);
   }
   if (status == SUPINE_OK) {
-    status = load_observed(given->operand[1], inside, &names, wanted->noise, &observed, error);
+    status = load_observed(given->operand[1], &names, wanted->noise, &observed, error);
   }
   if (status == SUPINE_OK) {
     status = locate(wanted, lungs, inside, &names, &observed, error);

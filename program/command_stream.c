@@ -183,16 +183,14 @@ static supine_status open_points(const supine_basis *basis, const request *wante
   if (status != SUPINE_OK) {
     return status;
   }
-  const size_t n = supine_basis_get_info(points->inside)->vertex_count;
   size_t count = 0;
-  for (size_t i = 0; i < n; ++i) { /* the vertices of a name are contiguous */
-    const uint32_t part = names->part[names->order[i]];
-    const bool first = i == 0 || names->part[names->order[i - 1]] != part;
-    const bool last = i + 1 == n || names->part[names->order[i + 1]] != part;
-    if (first && last && count++ < SUPINE_LOCATE_POINTS_MAX) {
+  for (size_t part = 0; part < names->count; ++part) {
+    const bool single = names->begin[part + 1] - names->begin[part] == 1;
+    if (single && count++ < SUPINE_LOCATE_POINTS_MAX) {
       observed->name[count - 1] = names->text[part];
-      observed->last[count - 1] = (supine_observation){
-          .vertex = names->order[i], .position = {(double)NAN}, .noise = wanted->noise};
+      observed->last[count - 1] = (supine_observation){.vertex = names->order[names->begin[part]],
+                                                       .position = {(double)NAN},
+                                                       .noise = wanted->noise};
     }
   }
   if (count == 0 || count > SUPINE_LOCATE_POINTS_MAX) {

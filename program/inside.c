@@ -10,22 +10,21 @@
 
 /* Sort vertices by name, stably, by counting. */
 static bool sort_by_name(supine_command_names *names, size_t n) {
-  size_t *next = calloc(names->count + 1, sizeof *next);
+  size_t *begin = calloc(names->count + 2, sizeof *begin);
+  names->begin = begin;
   names->order = malloc(n * sizeof *names->order);
-  if (next == NULL || names->order == NULL) {
-    free(next);
+  if (begin == NULL || names->order == NULL) {
     return false;
   }
   for (size_t i = 0; i < n; ++i) {
-    ++next[names->part[i] + 1];
+    ++begin[names->part[i] + 2];
   }
   for (size_t name = 0; name < names->count; ++name) {
-    next[name + 1] += next[name];
+    begin[name + 2] += begin[name + 1];
   }
-  for (size_t i = 0; i < n; ++i) {
-    names->order[next[names->part[i]]++] = i;
+  for (size_t i = 0; i < n; ++i) { /* this moves each begin + 1 to the begin of the next name */
+    names->order[begin[names->part[i] + 1]++] = i;
   }
-  free(next);
   return true;
 }
 
@@ -82,6 +81,7 @@ void supine_command_names_close(supine_command_names *names) {
   free(names->space);
   free(names->text);
   free(names->order);
+  free(names->begin);
   *names = (supine_command_names){0};
 }
 
@@ -117,8 +117,10 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
 }
 
 /* Add the marks of one part: its vertices, and its name at their mean position. */
-static void add_part(const supine_command_names *names, size_t part, const size_t *order,
-                     size_t count, const float *xyz, const float *from, supine_command_marks *out) {
+static void add_part(const supine_command_names *names, size_t part, const float *xyz,
+                     const float *from, supine_command_marks *out) {
+  const size_t *order = names->order + names->begin[part];
+  const size_t count = names->begin[part + 1] - names->begin[part];
   supine_mark middle = {.xyz = {0.0F, 0.0F, 0.0F}, .point = count == 1, .label = out->label[part]};
   for (size_t i = 0; i < count; ++i) {
     const float *p = xyz + 3 * order[i];
@@ -134,7 +136,9 @@ static void add_part(const supine_command_names *names, size_t part, const size_
   }
   (void)snprintf(out->label[part], sizeof out->label[part], "%.30s moved %.1f mm",
                  names->text[part], (double)middle.value);
-  out->mark[out->marks.count++] = middle;
+  if (count > 0) {
+    out->mark[out->marks.count++] = middle;
+  }
 }
 
 supine_status supine_command_marks_make(const supine_basis *inside,
@@ -151,14 +155,8 @@ supine_status supine_command_marks_make(const supine_basis *inside,
   if (xyz != NULL && before != NULL && made.mark != NULL && made.label != NULL) {
     supine_deform(inside, pose, xyz);
     supine_deform(inside, from, before);
-    for (size_t at = 0; at < n;) { /* the vertices of a part are contiguous */
-      const uint32_t part = names->part[names->order[at]];
-      size_t end = at;
-      while (end < n && names->part[names->order[end]] == part) {
-        ++end;
-      }
-      add_part(names, part, names->order + at, end - at, xyz, before, &made);
-      at = end;
+    for (size_t part = 0; part < names->count; ++part) {
+      add_part(names, part, xyz, before, &made);
     }
     made.marks.mark = made.mark;
     *marks = made;

@@ -12,6 +12,7 @@ typedef struct supine_command_names {
   char **text;          /* [count] */
   const uint32_t *part; /* [N] index of each vertex's name */
   size_t *order;        /* [N] vertices by name, and by input order within each name */
+  size_t *begin;        /* [count + 1] index in `order` of the first vertex of each name */
   char *space;          /* memory of `text` */
 } supine_command_names;
 
