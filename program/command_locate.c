@@ -374,11 +374,10 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {
+    /* Write last: no failure follows. */
+    print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, &located);
     status = csv ? write_points(wanted->output, inside, names, &located, error)
                  : write_surface(wanted->output, lungs, &located, error);
-  }
-  if (status == SUPINE_OK) {
-    print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, &located);
   }
   free_found(&located);
   return status;

@@ -62,15 +62,16 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
                                 json_limb(&pv.limb[limb], &reports[limb]));
     }
   }
+  supine_options_print(json_incref(root), chosen->json);
   supine_output output = {0};
-  if (chosen->output != NULL) {
+  if (chosen->output != NULL) { /* last: no failure follows */
     status = supine_output_open(chosen->output, &output, error);
   }
   if (status == SUPINE_OK && chosen->output != NULL) {
     (void)json_dumpf(root, output.file, JSON_INDENT(2)); /* a failed write stays in the stream */
     status = supine_output_commit(&output, error);
   }
-  supine_options_print(root, chosen->json);
+  json_decref(root);
   return status;
 }
 

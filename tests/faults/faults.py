@@ -76,6 +76,7 @@ export lungs.safetensors -o out/a.html
 export lungs.safetensors --inside points.safetensors -o out/a.html
 export lungs.safetensors -o out/a.glb
 export lungs.safetensors -o out/a.glb --plain --animate
+locate lungs.safetensors points.csv --points points.safetensors --posture prone -o out/a.csv
 pv show patient.pv.json
 pv fit samples.csv -o out/a.csv
 pv fit samples.csv --json
