@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute CRC-64: 64 bytes per step if the processor has carry-less multiplication, else byte by
- * byte. */
+/* Compute CRC-64: 256 or 64 bytes per step if the processor has carry-less multiplication, else
+ * byte by byte. */
 #include <pthread.h>
+#include <stdbool.h>
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -12,11 +13,12 @@
 
 static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* without the term x^64 */
 
-/* Tables computed once: table[b] = b(x) x^64 mod P, and powers of x for folding. */
-static struct {
-  uint64_t table[256];
-  uint64_t far[2], near[2]; /* x^(512 + 64), x^512; x^(128 + 64), x^128 */
-} known;
+/* Sizes of the steps of folding, bytes. */
+enum { NEAR, FAR, FARTHEST, STEPS };
+static const size_t step[STEPS] = {16, 64, 256};
+
+/* Tables computed once: table[b] = b(x) x^64 mod P, and for each step of n bits x^n, x^(n + 64). */
+static struct { uint64_t table[256], power[STEPS][2]; } known;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
 static uint64_t times_x(uint64_t a) {
@@ -31,7 +33,8 @@ static uint64_t multiply(uint64_t a, uint64_t b) {
   return product;
 }
 
-uint64_t supine_stream_crc64_power(size_t size) {
+/* Compute x^(8 size) mod P, the factor of a checksum when `size` bytes follow. */
+static uint64_t power_of(size_t size) {
   uint64_t power = 1;
   uint64_t square = 1u << 8; /* x^8, then its square, ... */
   for (; size != 0; size >>= 1) {
@@ -41,8 +44,8 @@ uint64_t supine_stream_crc64_power(size_t size) {
   return power;
 }
 
-uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, uint64_t power) {
-  return multiply(first, power) ^ second;
+uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size) {
+  return multiply(first, power_of(size)) ^ second;
 }
 
 static void make_tables(void) {
@@ -53,10 +56,10 @@ static void make_tables(void) {
     }
     known.table[b] = value;
   }
-  known.far[0] = supine_stream_crc64_power(72);
-  known.far[1] = supine_stream_crc64_power(64);
-  known.near[0] = supine_stream_crc64_power(24);
-  known.near[1] = supine_stream_crc64_power(16);
+  for (int i = 0; i < STEPS; ++i) {
+    known.power[i][0] = power_of(step[i]);
+    known.power[i][1] = power_of(step[i] + 8);
+  }
 }
 
 static uint64_t by_bytes(uint64_t crc, const unsigned char *at, size_t size) {
@@ -68,24 +71,36 @@ static uint64_t by_bytes(uint64_t crc, const unsigned char *at, size_t size) {
 
 #ifdef CRC64_CARRY_LESS
 typedef __m128i lane; /* 16 bytes of the message; the first byte is the most significant */
+typedef __m512i lanes;
 
 #define CARRY_LESS __attribute__((target("pclmul,ssse3")))
+#define WIDE __attribute__((target("vpclmulqdq,avx512bw")))
+#define FRONT _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
-CARRY_LESS static lane take(const unsigned char *at) {
-  const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  return _mm_shuffle_epi8(_mm_loadu_si128((const lane *)(const void *)at), front);
+/* Load 16 bytes, the last first. */
+CARRY_LESS static lane take(const void *at) {
+  return _mm_shuffle_epi8(_mm_loadu_si128(at), FRONT);
 }
 
-/* Compute a_high x^(n + 64) + a_low x^n + next, with powers = (x^(n + 64), x^n). */
+WIDE static lanes take_wide(const void *at) {
+  return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(FRONT));
+}
+
+/* Compute a_high x^(n + 64) + a_low x^n + next, with powers = (x^n, x^(n + 64)). */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
 }
 
+WIDE static lanes fold_wide(lanes a, lanes powers, lanes next) {
+  return _mm512_xor_si512(next, _mm512_xor_si512(_mm512_clmulepi64_epi128(a, powers, 0x11),
+                                                 _mm512_clmulepi64_epi128(a, powers, 0x00)));
+}
+
 /* Compute the CRC of at least 64 bytes, a multiple of 16. */
 CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, size_t size) {
-  const lane far = _mm_set_epi64x((long long)known.far[0], (long long)known.far[1]);
-  const lane near = _mm_set_epi64x((long long)known.near[0], (long long)known.near[1]);
+  const lane far = _mm_loadu_si128((const void *)known.power[FAR]);
+  const lane near = _mm_loadu_si128((const void *)known.power[NEAR]);
   lane part[4] = {take(at), take(at + 16), take(at + 32), take(at + 48)};
   part[0] = _mm_xor_si128(part[0], _mm_set_epi64x((long long)crc, 0));
   for (at += 64, size -= 64; size >= 64; at += 64, size -= 64) {
@@ -100,10 +115,27 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   for (; size != 0; at += 16, size -= 16) {
     sum = fold(sum, near, take(at));
   }
-  unsigned char remainder[16]; /* congruent to the whole message mod P */
-  const lane front = _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  _mm_storeu_si128((lane *)(void *)remainder, _mm_shuffle_epi8(sum, front));
-  return by_bytes(0, remainder, sizeof remainder);
+  const lane remainder = take(&sum); /* congruent to the whole message mod P */
+  return by_bytes(0, (const void *)&remainder, sizeof remainder);
+}
+
+/* Compute the CRC of at least 256 bytes, a multiple of 256. */
+WIDE static uint64_t by_wide_folding(uint64_t crc, const unsigned char *at, size_t size) {
+  const lanes powers = _mm512_broadcast_i32x4(_mm_loadu_si128((const void *)known.power[FARTHEST]));
+  lanes part[4];
+  for (int i = 0; i < 4; ++i) {
+    part[i] = take_wide(at + 64 * i);
+  }
+  part[0] = _mm512_xor_si512(part[0], _mm512_zextsi128_si512(_mm_set_epi64x((long long)crc, 0)));
+  for (at += 256, size -= 256; size != 0; at += 256, size -= 256) {
+    for (int i = 0; i < 4; ++i) {
+      part[i] = fold_wide(part[i], powers, take_wide(at + 64 * i));
+    }
+  }
+  for (int i = 0; i < 4; ++i) {
+    part[i] = take_wide(&part[i]);
+  }
+  return by_folding(0, (const void *)part, sizeof part);
 }
 #endif
 
@@ -111,11 +143,16 @@ uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size) {
   (void)pthread_once(&once, make_tables);
   const unsigned char *at = bytes;
 #ifdef CRC64_CARRY_LESS
-  if (size >= 64 && __builtin_cpu_supports("pclmul") && __builtin_cpu_supports("ssse3")) {
-    const size_t most = size & ~(size_t)15;
-    crc = by_folding(crc, at, most);
+  if (__builtin_cpu_supports("pclmul") && __builtin_cpu_supports("ssse3")) {
+    const bool wide = __builtin_cpu_supports("vpclmulqdq") && __builtin_cpu_supports("avx512bw");
+    const size_t most = wide ? size & ~(size_t)255 : 0;
+    crc = most > 0 ? by_wide_folding(crc, at, most) : crc;
     at += most;
     size -= most;
+    const size_t rest = size >= 64 ? size & ~(size_t)15 : 0;
+    crc = rest > 0 ? by_folding(crc, at, rest) : crc;
+    at += rest;
+    size -= rest;
   }
 #endif
   return by_bytes(crc, at, size);

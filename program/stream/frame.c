@@ -31,8 +31,6 @@ struct supine_stream_frames {
   size_t strips_size;  /* bytes */
   size_t strips_count; /* number of strips */
   uint64_t strips_crc;
-  uint64_t strips_power,
-      points_power;            /* supine_stream_crc64_power of the sizes of strips and points */
   supine_stream_frame *unused; /* list of frames without users */
 };
 
@@ -81,7 +79,6 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   f->info = supine_basis_get_info(basis);
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
-  f->points_power = supine_stream_crc64_power(12 * f->info->vertex_count);
   /* Compute the strips now: it takes 0.1 s for a million triangles, a delay for every peer if done
    * at the first request for a surface. */
   const supine_status status = make_strips(f, error);
@@ -90,7 +87,6 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
     return status;
   }
   f->strips_crc = supine_stream_crc64(0, f->strips, f->strips_size);
-  f->strips_power = supine_stream_crc64_power(f->strips_size);
   *frames = f;
   return SUPINE_OK;
 }
@@ -137,14 +133,13 @@ void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_fra
   }
 }
 
-/* Write points as sent, in RAS if the frames are in RAS; xyz is overwritten. */
-static void put_points(const supine_stream_frames *f, size_t count, float *xyz,
-                       unsigned char *bytes) {
+/* Convert points to the form in which they are sent: in RAS if the frames are in RAS. */
+static void encode_points(const supine_stream_frames *f, size_t count, float *xyz) {
   for (size_t i = 0; f->ras && i < count; ++i) {
     xyz[3 * i] = -xyz[3 * i];
     xyz[3 * i + 1] = -xyz[3 * i + 1];
   }
-  supine_stream_put_floats(3 * count, xyz, bytes);
+  supine_stream_encode_floats(3 * count, xyz);
 }
 
 /* Compute positions and expected errors of lungs located from observed points. If that fails, clear
@@ -152,25 +147,23 @@ static void put_points(const supine_stream_frames *f, size_t count, float *xyz,
  */
 static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
-  float *xyz = malloc(3 * count * sizeof *xyz + 1);
-  float *sigma = malloc(count * sizeof *sigma + 1);
   if (frame->errors == NULL) {
     frame->errors = malloc(SUPINE_STREAM_ATTRIBUTE + 4 * count);
   }
-  const bool good = xyz != NULL && sigma != NULL && frame->errors != NULL;
-  if (good &&
-      supine_locate_positions(frame->snapshot.location, f->basis, xyz, sigma, NULL) == SUPINE_OK) {
-    put_points(f, count, xyz, frame->points);
-    const size_t head = supine_stream_attribute_head(count, frame->errors);
-    supine_stream_put_floats(count, sigma, frame->errors + head);
+  if (frame->errors == NULL) {
+    return false;
+  }
+  float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
+  if (supine_locate_positions(frame->snapshot.location, f->basis, frame->points, sigma, NULL) ==
+      SUPINE_OK) {
+    encode_points(f, count, frame->points);
+    supine_stream_encode_floats(count, sigma);
     frame->points_crc = supine_stream_crc64(0, frame->points, 12 * count);
     frame->has_points = true;
   } else {
     frame->snapshot.location = NULL;
   }
-  free(xyz);
-  free(sigma);
-  return good;
+  return true;
 }
 
 /* Work of the threads that compute points: each writes the checksum and size of its part. */
@@ -183,14 +176,13 @@ typedef struct points_work {
 
 static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
   points_work *p = context;
-  _Alignas(64) float xyz[3 * PIECE];
   p->size[thread] = 12 * (end - begin);
   for (; begin < end; begin += PIECE) {
     const size_t next = begin + PIECE < end ? begin + PIECE : end;
-    unsigned char *bytes = p->frame->points + 12 * begin;
+    float *xyz = p->frame->points + 3 * begin;
     supine_deform_range(p->frames->basis, &p->frame->snapshot.pose, begin, next, xyz);
-    put_points(p->frames, next - begin, xyz, bytes);
-    p->crc[thread] = supine_stream_crc64(p->crc[thread], bytes, 12 * (next - begin));
+    encode_points(p->frames, next - begin, xyz);
+    p->crc[thread] = supine_stream_crc64(p->crc[thread], xyz, 12 * (next - begin));
   }
 }
 
@@ -210,8 +202,7 @@ static bool compute_points(supine_stream_frames *f, supine_stream_frame *frame) 
     points_work p = {.frames = f, .frame = frame};
     supine_parallel_for(count, GRAIN, 0, compute_range, &p);
     for (size_t t = 0; t < THREADS_MAX && p.size[t] > 0; ++t) {
-      frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t],
-                                                   supine_stream_crc64_power(p.size[t]));
+      frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t], p.size[t]);
     }
     frame->has_points = true;
   }
@@ -229,7 +220,8 @@ static size_t put_weights(const supine_stream_frames *f, const supine_stream_sna
     values[i] = (float)(i < modes ? snapshot->pose.weights[i]
                                   : snapshot->pose.gains[(i - modes) / 3][(i - modes) % 3]);
   }
-  supine_stream_put_floats(count, values, bytes + head);
+  supine_stream_encode_floats(count, values);
+  memcpy(bytes + head, values, 4 * count);
   return head + 4 * count;
 }
 
@@ -258,11 +250,11 @@ bool supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame 
   uint64_t crc = supine_stream_crc64(0, body, size);
   if (!weights) {
     add_piece(packet, frame->points, 12 * frames->info->vertex_count);
-    crc = supine_stream_crc64_join(crc, frame->points_crc, frames->points_power);
+    crc = supine_stream_crc64_join(crc, frame->points_crc, 12 * frames->info->vertex_count);
   }
   if (!weights && triangles) {
     add_piece(packet, frames->strips, frames->strips_size);
-    crc = supine_stream_crc64_join(crc, frames->strips_crc, frames->strips_power);
+    crc = supine_stream_crc64_join(crc, frames->strips_crc, frames->strips_size);
   }
   if (located) {
     const size_t bytes = SUPINE_STREAM_ATTRIBUTE + 4 * frames->info->vertex_count;

@@ -45,8 +45,8 @@ typedef struct supine_stream_frame {
   size_t users;    /**< peers that send it, and the server while it is the newest */
   uint64_t number; /**< 1, 2, ... */
   supine_stream_snapshot snapshot;
-  bool has_points;       /**< `points` and `points_crc` are computed */
-  unsigned char *points; /**< [N, 12] positions as sent: big-endian floats x, y, z */
+  bool has_points; /**< `points` and `points_crc` are computed */
+  float *points;   /**< [N, 3] positions as sent: big-endian */
   uint64_t points_crc;
   unsigned char *errors; /**< expected errors as sent, valid if the lungs were located; or NULL */
   struct supine_stream_frame *next; /**< in the list of unused frames */

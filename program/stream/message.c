@@ -80,13 +80,12 @@ size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
   return SUPINE_STREAM_ATTRIBUTE;
 }
 
-SUPINE_CLONES void supine_stream_put_floats(size_t count, const float *values,
-                                            unsigned char *bytes) {
+SUPINE_CLONES void supine_stream_encode_floats(size_t count, float *values) {
   for (size_t i = 0; i < count; ++i) {
     uint32_t word;
     memcpy(&word, values + i, sizeof word);
     word = htobe32(word);
-    memcpy(bytes + 4 * i, &word, sizeof word);
+    memcpy(values + i, &word, sizeof word);
   }
 }
 

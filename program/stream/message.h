@@ -98,8 +98,8 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 enum { SUPINE_STREAM_ATTRIBUTE = 24 };
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 
-/** Write big-endian 32-bit floats. */
-void supine_stream_put_floats(size_t count, const float *values, unsigned char *bytes);
+/** Make floats big-endian, in place. */
+void supine_stream_encode_floats(size_t count, float *values);
 
 /* The checksum of messages: CRC-64 of ECMA-182, most significant bit first, from 0,
  *
@@ -110,11 +110,7 @@ void supine_stream_put_floats(size_t count, const float *values, unsigned char *
 /** Continue the checksum `crc` (0 for the first bytes) over more bytes. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
 
-/** Compute x^(8 size) mod P, the factor of a checksum when `size` bytes follow. */
-uint64_t supine_stream_crc64_power(size_t size);
-
-/** Join checksums: crc(A B) = crc(A) x^(8 |B|) + crc(B).
- * @param power  supine_stream_crc64_power of the second part's size */
-uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, uint64_t power);
+/** Join the checksums of A and of B, of `size` bytes: crc(A B) = crc(A) x^(8 size) + crc(B). */
+uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size);
 
 #endif

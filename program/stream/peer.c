@@ -45,18 +45,10 @@ void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *fram
 
 /* Receive up to `size` bytes; return their number, 0 if none are there, -1 if the peer is gone. */
 static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
-  for (;;) {
-    const ssize_t got = recv(socket, bytes, size, MSG_DONTWAIT);
-    if (got > 0) {
-      return got;
-    }
-    if (got == 0) {
-      return -1;
-    }
-    if (errno != EINTR) {
-      return errno == EAGAIN || errno == EWOULDBLOCK ? 0 : -1;
-    }
-  }
+  const ssize_t got = recv(socket, bytes, size, MSG_DONTWAIT);
+  return got > 0                                                                  ? got
+         : got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) ? 0
+                                                                                  : -1;
 }
 
 /* Parse a complete header, and choose whether to read or skip its body. */

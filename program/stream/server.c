@@ -189,12 +189,11 @@ static double frame_due(const supine_stream_server *s) {
 static bool make_frame(supine_stream_server *s) {
   supine_stream_snapshot snapshot;
   supine_stream_patient_snapshot(&s->patient, s->woke, &snapshot);
-  supine_stream_frame *frame = supine_stream_frame_acquire(s->frames, &snapshot);
-  if (frame == NULL) {
+  supine_stream_frame_release(s->frames, s->latest); /* its memory, still in the cache, is reused */
+  s->latest = supine_stream_frame_acquire(s->frames, &snapshot);
+  if (s->latest == NULL) {
     return false;
   }
-  supine_stream_frame_release(s->frames, s->latest);
-  s->latest = frame;
   s->frame_time = s->woke;
   ++s->counts.frames;
   if (s->options->web != NULL) {

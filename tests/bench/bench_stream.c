@@ -94,17 +94,18 @@ static int dial(int port) {
 /* Write the message of a pose: the body turns about its long axis, twice a minute. */
 static void make_pose(double time, uint64_t stamp, unsigned char bytes[SUPINE_STREAM_HEADER + 48]) {
   const double angle = time * (2.0 * M_PI / 30.0);
-  const float columns[12] = {(float)cos(angle),
-                             0,
-                             (float)-sin(angle), /* left */
-                             (float)-sin(angle),
-                             0,
-                             (float)-cos(angle), /* back */
-                             0,
-                             1,
-                             0}; /* head */
+  float columns[12] = {(float)cos(angle),
+                       0,
+                       (float)-sin(angle), /* left */
+                       (float)-sin(angle),
+                       0,
+                       (float)-cos(angle), /* back */
+                       0,
+                       1,
+                       0}; /* head */
   unsigned char *body = bytes + SUPINE_STREAM_HEADER;
-  supine_stream_put_floats(12, columns, body);
+  supine_stream_encode_floats(12, columns);
+  memcpy(body, columns, sizeof columns);
   supine_stream_header header = {
       .version = 1, .stamp = stamp, .size = 48, .crc = supine_stream_crc64(0, body, 48)};
   strcpy(header.type, "TRANSFORM");

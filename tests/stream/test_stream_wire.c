@@ -35,7 +35,7 @@ TEST(test_crc_every_length_equals_library) {
                 wanted);
     assert_true(supine_stream_crc64_join(supine_stream_crc64(0, at, cut),
                                          supine_stream_crc64(0, at + cut, size - cut),
-                                         supine_stream_crc64_power(size - cut)) == wanted);
+                                         size - cut) == wanted);
   }
   free(bytes);
 }
@@ -508,12 +508,11 @@ TEST(test_surface_written_equals_polydata_of_library) {
     assert_true(supine_stream_frame_pack(frames, again, SUPINE_STREAM_POINTS, false, &packet));
     float first[3];
     supine_deform_range(s.basis, &other.pose, 0, 1, first);
-    unsigned char wanted[12];
     for (int k = 0; ras == 1 && k < 2; ++k) {
       first[k] = -first[k];
     }
-    supine_stream_put_floats(3, first, wanted);
-    assert_memory_equal(again->points, wanted, sizeof wanted);
+    supine_stream_encode_floats(3, first);
+    assert_memory_equal(again->points, first, sizeof first);
     supine_stream_frame_release(frames, again);
     supine_stream_frames_destroy(frames);
   }
