@@ -99,7 +99,6 @@ void supine_stream_frames_destroy(supine_stream_frames *frames) {
     supine_stream_frame *frame = frames->unused;
     frames->unused = frame->next;
     free(frame->points);
-    free(frame->errors);
     free(frame);
   }
   free(frames->strips);
@@ -112,10 +111,17 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
   if (frame != NULL) {
     frames->unused = frame->next;
   } else {
+    const size_t count = frames->info->vertex_count;
+    const size_t size = 12 * count + SUPINE_STREAM_ATTRIBUTE + 4 * count;
     frame = calloc(1, sizeof *frame);
-    if (frame == NULL) {
+    float *points = aligned_alloc(64, (size + 63) / 64 * 64);
+    if (frame == NULL || points == NULL) {
+      free(frame);
+      free(points);
       return NULL;
     }
+    frame->points = points;
+    frame->errors = (unsigned char *)(points + 3 * count);
   }
   frame->users = 1;
   frame->number = ++frames->number;
@@ -143,16 +149,9 @@ static void encode_points(const supine_stream_frames *f, size_t count, float *xy
 }
 
 /* Compute positions and expected errors of lungs located from observed points. If that fails, clear
- * the location: the caller then computes the positions of the pose. Return false if out of memory.
- */
-static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
+ * the location: the caller then computes the positions of the pose. */
+static void compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
-  if (frame->errors == NULL) {
-    frame->errors = malloc(SUPINE_STREAM_ATTRIBUTE + 4 * count);
-  }
-  if (frame->errors == NULL) {
-    return false;
-  }
   float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
   if (supine_locate_positions(frame->snapshot.location, f->basis, frame->points, sigma, NULL) ==
       SUPINE_OK) {
@@ -163,7 +162,6 @@ static bool compute_located_points(supine_stream_frames *f, supine_stream_frame 
   } else {
     frame->snapshot.location = NULL;
   }
-  return true;
 }
 
 /* Work of the threads that compute points: each writes the checksum and size of its part. */
@@ -186,27 +184,19 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute the points of a frame, once for all peers; return false if out of memory. */
-static bool compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
-  const size_t count = f->info->vertex_count;
-  if (frame->points == NULL) {
-    frame->points = aligned_alloc(64, (12 * count + 64) / 64 * 64); /* padded for 64-byte stores */
-    if (frame->points == NULL) {
-      return false;
-    }
-  }
-  if (frame->snapshot.location != NULL && !frame->has_points && !compute_located_points(f, frame)) {
-    return false;
+/* Compute the points of a frame, once for all peers. */
+static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
+  if (frame->snapshot.location != NULL && !frame->has_points) {
+    compute_located_points(f, frame);
   }
   if (!frame->has_points) {
     points_work p = {.frames = f, .frame = frame};
-    supine_parallel_for(count, GRAIN, 0, compute_range, &p);
+    supine_parallel_for(f->info->vertex_count, GRAIN, 0, compute_range, &p);
     for (size_t t = 0; t < THREADS_MAX && p.size[t] > 0; ++t) {
       frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t], p.size[t]);
     }
     frame->has_points = true;
   }
-  return true;
 }
 
 /* Write the NDARRAY of weights and gains; return its size in bytes. */
@@ -230,12 +220,12 @@ static void add_piece(supine_stream_packet *packet, void *bytes, size_t size) {
   packet->size += size;
 }
 
-bool supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
+void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
                               supine_stream_content content, bool triangles,
                               supine_stream_packet *packet) {
   const bool weights = content == SUPINE_STREAM_WEIGHTS;
-  if (!weights && !compute_points(frames, frame)) {
-    return false;
+  if (!weights) {
+    compute_points(frames, frame);
   }
   const bool located = !weights && frame->snapshot.location != NULL;
   unsigned char *body = packet->front + SUPINE_STREAM_HEADER;
@@ -268,5 +258,4 @@ bool supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame 
   (void)snprintf(header.type, sizeof header.type, "%s", weights ? "NDARRAY" : "POLYDATA");
   memcpy(header.device, frames->device, sizeof header.device);
   supine_stream_header_write(&header, packet->front);
-  return true;
 }

@@ -48,7 +48,7 @@ typedef struct supine_stream_frame {
   bool has_points; /**< `points` and `points_crc` are computed */
   float *points;   /**< [N, 3] positions as sent: big-endian */
   uint64_t points_crc;
-  unsigned char *errors; /**< expected errors as sent, valid if the lungs were located; or NULL */
+  unsigned char *errors;            /**< expected errors as sent, valid if the lungs were located */
   struct supine_stream_frame *next; /**< in the list of unused frames */
 } supine_stream_frame;
 
@@ -90,9 +90,8 @@ typedef struct supine_stream_packet {
 /** Make the message of a frame, with a header of version 1, which all peers read. The first message
  * of a frame that needs positions computes them.
  * @param content    not SUPINE_STREAM_SILENCE
- * @param triangles  true: a POLYDATA also holds the triangles
- * @return false if out of memory */
-bool supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
+ * @param triangles  true: a POLYDATA also holds the triangles */
+void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
                               supine_stream_content content, bool triangles,
                               supine_stream_packet *packet);
 

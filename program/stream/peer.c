@@ -125,18 +125,15 @@ bool supine_stream_peer_ready(const supine_stream_peer *peer) {
          ioctl(peer->socket, SIOCOUTQNSD, &queued) == 0 && queued == 0;
 }
 
-bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
+void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
                              supine_stream_frame *frame) {
   const bool triangles = peer->content == SUPINE_STREAM_SURFACE ||
                          (peer->content == SUPINE_STREAM_POINTS && !peer->knows_triangles);
-  if (!supine_stream_frame_pack(frames, frame, peer->content, triangles, &peer->packet)) {
-    return false;
-  }
+  supine_stream_frame_pack(frames, frame, peer->content, triangles, &peer->packet);
   peer->knows_triangles = peer->content == SUPINE_STREAM_POINTS;
   peer->last_frame = frame->number;
   peer->frame = frame;
   ++frame->users;
-  return true;
 }
 
 supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer) {

@@ -83,8 +83,8 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
  * kernel's queue. */
 bool supine_stream_peer_ready(const supine_stream_peer *peer);
 
-/** Make the message of a frame for the peer, to be sent; return false if out of memory. */
-bool supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
+/** Make the message of a frame for the peer, to be sent. */
+void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
                              supine_stream_frame *frame);
 
 /** Send as much as the socket's buffer accepts. When all is sent, the caller releases

@@ -221,15 +221,13 @@ double supine_stream_latency_quantile(const supine_stream_latency *latency, doub
   return latency->worst;
 }
 
-/* Send a peer the rest of its frame, or the newest frame if it is ready; return false if out of
- * memory. */
-static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
-  if (needs_frame(s, peer) && supine_stream_peer_ready(peer) &&
-      !supine_stream_peer_give(peer, s->frames, s->latest)) {
-    return false;
+/* Send a peer the rest of its frame, or the newest frame if it is ready. */
+static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
+  if (needs_frame(s, peer) && supine_stream_peer_ready(peer)) {
+    supine_stream_peer_give(peer, s->frames, s->latest);
   }
   if (peer->frame == NULL) {
-    return true;
+    return;
   }
   const supine_stream_outcome outcome = supine_stream_peer_send(peer);
   if (outcome == SUPINE_STREAM_LOST) {
@@ -244,21 +242,19 @@ static bool send_peer(supine_stream_server *s, supine_stream_peer *peer) {
     supine_stream_frame_release(s->frames, peer->frame);
     peer->frame = NULL;
   }
-  return true;
 }
 
-static bool send_peers(supine_stream_server *s) {
+static void send_peers(supine_stream_server *s) {
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     for (size_t i = 0; i < s->options->peers; ++i) {
       supine_stream_peer *peer = &s->peer[i];
       const bool surface =
           peer->content == SUPINE_STREAM_SURFACE || peer->content == SUPINE_STREAM_POINTS;
-      if (peer->socket >= 0 && surface == (surfaces == 1) && !send_peer(s, peer)) {
-        return false;
+      if (peer->socket >= 0 && surface == (surfaces == 1)) {
+        send_peer(s, peer);
       }
     }
   }
-  return true;
 }
 
 /* Compute the timeout of ppoll(). */
@@ -354,9 +350,10 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
       connect_peer(s);
     }
     receive_all(s, count);
-    if ((s->woke >= frame_due(s) && !make_frame(s)) || !send_peers(s)) {
+    if (s->woke >= frame_due(s) && !make_frame(s)) {
       return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     }
+    send_peers(s);
   }
   return SUPINE_OK;
 }
