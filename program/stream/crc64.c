@@ -92,11 +92,6 @@ CARRY_LESS static lane fold(lane a, lane powers, lane next) {
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
 }
 
-WIDE static lanes fold_wide(lanes a, lanes powers, lanes next) {
-  return _mm512_xor_si512(next, _mm512_xor_si512(_mm512_clmulepi64_epi128(a, powers, 0x11),
-                                                 _mm512_clmulepi64_epi128(a, powers, 0x00)));
-}
-
 /* Compute the CRC of at least 64 bytes, a multiple of 16. */
 CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, size_t size) {
   const lane far = _mm_loadu_si128((const void *)known.power[FAR]);
@@ -129,7 +124,9 @@ WIDE static uint64_t by_wide_folding(uint64_t crc, const unsigned char *at, size
   part[0] = _mm512_xor_si512(part[0], _mm512_zextsi128_si512(_mm_set_epi64x((long long)crc, 0)));
   for (at += 256, size -= 256; size != 0; at += 256, size -= 256) {
     for (int i = 0; i < 4; ++i) {
-      part[i] = fold_wide(part[i], powers, take_wide(at + 64 * i));
+      const lanes high = _mm512_clmulepi64_epi128(part[i], powers, 0x11);
+      const lanes low = _mm512_clmulepi64_epi128(part[i], powers, 0x00);
+      part[i] = _mm512_xor_si512(take_wide(at + 64 * i), _mm512_xor_si512(high, low));
     }
   }
   for (int i = 0; i < 4; ++i) {

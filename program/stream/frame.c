@@ -148,20 +148,19 @@ static void encode_points(const supine_stream_frames *f, size_t count, float *xy
   supine_stream_encode_floats(3 * count, xyz);
 }
 
-/* Compute positions and expected errors of lungs located from observed points. If that fails, clear
- * the location: the caller then computes the positions of the pose. */
-static void compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
+/* Compute positions and expected errors of lungs located from observed points; return false if that
+ * fails. */
+static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
-  if (supine_locate_positions(frame->snapshot.location, f->basis, frame->points, sigma, NULL) ==
+  if (supine_locate_positions(frame->snapshot.location, f->basis, frame->points, sigma, NULL) !=
       SUPINE_OK) {
-    encode_points(f, count, frame->points);
-    supine_stream_encode_floats(count, sigma);
-    frame->points_crc = supine_stream_crc64(0, frame->points, 12 * count);
-    frame->has_points = true;
-  } else {
-    frame->snapshot.location = NULL;
+    return false;
   }
+  encode_points(f, count, frame->points);
+  supine_stream_encode_floats(count, sigma);
+  frame->points_crc = supine_stream_crc64(0, frame->points, 12 * count);
+  return true;
 }
 
 /* Work of the threads that compute points: each writes the checksum and size of its part. */
@@ -184,18 +183,16 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute the points of a frame, once for all peers. */
+/* Compute the points of a frame, of the pose if the lungs cannot be located. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
-  if (frame->snapshot.location != NULL && !frame->has_points) {
-    compute_located_points(f, frame);
+  points_work p = {.frames = f, .frame = frame};
+  if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {
+    return;
   }
-  if (!frame->has_points) {
-    points_work p = {.frames = f, .frame = frame};
-    supine_parallel_for(f->info->vertex_count, GRAIN, 0, compute_range, &p);
-    for (size_t t = 0; t < THREADS_MAX && p.size[t] > 0; ++t) {
-      frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t], p.size[t]);
-    }
-    frame->has_points = true;
+  frame->snapshot.location = NULL;
+  supine_parallel_for(f->info->vertex_count, GRAIN, 0, compute_range, &p);
+  for (size_t t = 0; t < THREADS_MAX && p.size[t] > 0; ++t) {
+    frame->points_crc = supine_stream_crc64_join(frame->points_crc, p.crc[t], p.size[t]);
   }
 }
 
@@ -224,8 +221,9 @@ void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame 
                               supine_stream_content content, bool triangles,
                               supine_stream_packet *packet) {
   const bool weights = content == SUPINE_STREAM_WEIGHTS;
-  if (!weights) {
+  if (!weights && !frame->has_points) { /* once for all peers */
     compute_points(frames, frame);
+    frame->has_points = true;
   }
   const bool located = !weights && frame->snapshot.location != NULL;
   unsigned char *body = packet->front + SUPINE_STREAM_HEADER;

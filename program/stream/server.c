@@ -248,8 +248,7 @@ static void send_peers(supine_stream_server *s) {
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     for (size_t i = 0; i < s->options->peers; ++i) {
       supine_stream_peer *peer = &s->peer[i];
-      const bool surface =
-          peer->content == SUPINE_STREAM_SURFACE || peer->content == SUPINE_STREAM_POINTS;
+      const bool surface = peer->content != SUPINE_STREAM_WEIGHTS;
       if (peer->socket >= 0 && surface == (surfaces == 1)) {
         send_peer(s, peer);
       }
@@ -414,9 +413,7 @@ void supine_stream_server_destroy(supine_stream_server *server) {
   if (server->listener >= 0) {
     (void)close(server->listener);
   }
-  if (server->frames != NULL) {
-    supine_stream_frame_release(server->frames, server->latest);
-  }
+  supine_stream_frame_release(server->frames, server->latest);
   supine_stream_frames_destroy(server->frames);
   free(server->latency);
   free(server->owner);
