@@ -12,7 +12,7 @@
 #include "sh/base/text.h"
 
 #include "program/options/basis_input.h"
-#include "program/options/breath_frames.h"
+#include "program/options/breath_turn.h"
 #include "program/options/pv.h"
 #include "program/options/state_options.h"
 
@@ -112,9 +112,13 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
 typedef struct playing {
   const request *wanted;
   supine_basis *basis;
-  breath_frames frames;
-  supine_mesh mesh;  /* for VTP: vertices of the current frame, triangles of the basis */
-  float *normals;    /* [N, 3] for VTP */
+  size_t count, lungs; /* T, G */
+  double *time;        /* [T] s */
+  double *above;       /* [T] volume of all lungs together, mL above rest or the scan */
+  double *gravity;     /* [T, 3] */
+  double *volumes;     /* [T, G] gas and tissue, mL */
+  supine_mesh mesh;    /* for VTP: vertices of the current frame, triangles of the basis */
+  float *normals;      /* [N, 3] for VTP */
   float *positions;  /* [N, 3] of the current frame; for safetensors [T, N, 3] of all follow, mm */
   double *seconds;   /* [T] time that each frame took to compute */
   double *origin;    /* [N, 3] positions that displacements start from, mm */
@@ -122,7 +126,7 @@ typedef struct playing {
 } playing;
 
 static void end(playing *p) {
-  supine_breath_frames_free(&p->frames);
+  free(p->time);
   supine_mesh_free(&p->mesh);
   free(p->normals);
   free(p->positions);
@@ -134,16 +138,22 @@ static void end(playing *p) {
 /* Allocate the memory for `count` frames. */
 static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
+  p->count = count;
+  p->lungs = supine_basis_get_info(p->basis)->lung_count;
+  p->time = malloc((5 + p->lungs) * count * sizeof *p->time);
   const size_t kept = series ? 1 : 1 + count;
   if (frame <= SIZE_MAX / sizeof(float) / kept) {
     p->positions = malloc(kept * frame * sizeof *p->positions);
   }
   p->normals = malloc(frame * sizeof *p->normals);
   p->seconds = malloc(count * sizeof *p->seconds);
-  if (p->normals == NULL || p->seconds == NULL ||
+  if (p->time == NULL || p->normals == NULL || p->seconds == NULL ||
       supine_options_basis_mesh(p->basis, &p->mesh) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
+  p->above = p->time + count;
+  p->gravity = p->above + count;
+  p->volumes = p->gravity + 3 * count;
   return p->positions != NULL
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MEMORY,
@@ -153,25 +163,50 @@ static supine_status begin_frames(playing *p, size_t count, bool series, supine_
                                 4e-9 * (double)frame * (double)kept);
 }
 
+/* Compute the pose of frame t. */
+static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, supine_error *error) {
+  const supine_state state = supine_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
+  return supine_basis_pose(p->basis, &state, pose, error);
+}
+
+/* Compute times, directions of gravity and volumes. */
+static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error *error) {
+  for (size_t t = 0; t < p->count; ++t) {
+    p->time[t] = (double)t / p->wanted->fps;
+    supine_breath_turn_gravity(&p->wanted->turn, p->time[t], p->gravity + 3 * t);
+  }
+  supine_status status =
+      supine_breath_evaluate(pv, &p->wanted->breath, p->count, p->time, p->above, NULL, error);
+  for (size_t t = 0; t < p->count && status == SUPINE_OK; ++t) {
+    supine_pose pose;
+    supine_error cause;
+    status = find_pose(p, t, &pose, &cause);
+    if (status != SUPINE_OK) {
+      return supine_error_set(error, status, "at %.3f s: %s", p->time[t], cause.message);
+    }
+    supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lungs);
+  }
+  return status;
+}
+
 /* Print the volumes, and the time that frames took. */
 static void report(const playing *p) {
-  const breath_frames *frames = &p->frames;
   double least = INFINITY;
   double peak = 0.0;
-  for (size_t t = 0; t < frames->count; ++t) {
+  for (size_t t = 0; t < p->count; ++t) {
     double sum = 0.0;
-    for (size_t lung = 0; lung < frames->lungs; ++lung) {
-      sum += frames->volumes[t * frames->lungs + lung];
+    for (size_t lung = 0; lung < p->lungs; ++lung) {
+      sum += p->volumes[t * p->lungs + lung];
     }
     least = fmin(least, sum);
     peak = fmax(peak, sum);
   }
   (void)printf("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-               p->wanted->path, frames->count, frames->count == 1 ? "" : "s",
-               frames->time[frames->count - 1], p->wanted->fps, least, peak);
+               p->wanted->path, p->count, p->count == 1 ? "" : "s", p->time[p->count - 1],
+               p->wanted->fps, least, peak);
   (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
-               1e3 * gsl_stats_median(p->seconds, 1, frames->count),
-               1e3 * gsl_stats_max(p->seconds, 1, frames->count), 1e3 * budget);
+               1e3 * gsl_stats_median(p->seconds, 1, p->count),
+               1e3 * gsl_stats_max(p->seconds, 1, p->count), 1e3 * budget);
 }
 
 /* Compute all frames.
@@ -180,11 +215,10 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
   const size_t frame = 3 * p->mesh.vertex_count;
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
-  for (size_t t = 0; t < p->frames.count && status == SUPINE_OK; ++t) {
+  for (size_t t = 0; t < p->count && status == SUPINE_OK; ++t) {
     supine_pose pose;
     const double start = supine_clock_seconds();
-    (void)supine_breath_frames_pose(&p->frames, t, &pose,
-                                    NULL); /* succeeded in supine_breath_frames_create */
+    (void)find_pose(p, t, &pose, NULL); /* succeeded in find_volumes */
     supine_deform(p->basis, &pose, p->positions);
     p->seconds[t] = supine_clock_seconds() - start;
     if (series != NULL) {
@@ -196,7 +230,7 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
     } else {
       memcpy(p->positions + (1 + t) * frame, p->positions, frame * sizeof *p->positions);
     }
-    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->frames.count)) {
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->count)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
     }
@@ -211,8 +245,8 @@ static supine_status write_series(playing *p, supine_mesh_save_options *save, su
   /* Half of this step, mm, is less than the storage error (supine_basis_info). */
   static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
-  const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->frames.gravity},
-                                      {"volume_mL", p->frames.lungs, p->frames.volumes}};
+  const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
+                                      {"volume_mL", p->lungs, p->volumes}};
   supine_mesh_series *series = NULL;
   save->from = p->origin;
   save->normals = p->normals;
@@ -220,8 +254,8 @@ static supine_status write_series(playing *p, supine_mesh_save_options *save, su
   save->fields = fields;
   save->field_count = sizeof fields / sizeof *fields;
   save->rounding = rounding;
-  supine_status status = supine_mesh_series_open(p->wanted->path, &p->mesh, save, p->frames.count,
-                                                 p->frames.time, &series, error);
+  supine_status status =
+      supine_mesh_series_open(p->wanted->path, &p->mesh, save, p->count, p->time, &series, error);
   if (status == SUPINE_OK) {
     status = play_frames(p, series, error);
   }
@@ -234,8 +268,7 @@ static supine_status write_series(playing *p, supine_mesh_save_options *save, su
 
 /* Compute the frames, and write them as safetensors. */
 static supine_status write_tensors(playing *p, const char *made_by, supine_error *error) {
-  const breath_frames *frames = &p->frames;
-  const size_t t = frames->count;
+  const size_t t = p->count;
   const supine_tensor tensors[] = {
       {"positions",
        SUPINE_F32,
@@ -243,9 +276,9 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
        {t, p->mesh.vertex_count, 3},
        p->positions + 3 * p->mesh.vertex_count},
       {"triangles", SUPINE_U32, 2, {p->mesh.triangle_count, 3}, p->mesh.triangles},
-      {"time", SUPINE_F64, 1, {t}, frames->time},
-      {"volume", SUPINE_F64, 2, {t, frames->lungs}, frames->volumes},
-      {"gravity", SUPINE_F64, 2, {t, 3}, frames->gravity}};
+      {"time", SUPINE_F64, 1, {t}, p->time},
+      {"volume", SUPINE_F64, 2, {t, p->lungs}, p->volumes},
+      {"gravity", SUPINE_F64, 2, {t, 3}, p->gravity}};
   const supine_metadata metadata[] = {{"format", "supine-breath"},
                                       {"version", "1"},
                                       {"units", "mm, s, mL (gas and tissue of each lung)"},
@@ -260,21 +293,20 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
 }
 
 /* Check the surfaces with the smallest and the largest volume: warn, or fail if they fold. */
-static supine_status check_ends(const request *wanted, const breath_frames *frames,
-                                supine_error *error) {
+static supine_status check_ends(const playing *p, supine_error *error) {
   size_t least = 0;
   size_t most = 0;
-  for (size_t t = 1; t < frames->count; ++t) {
-    least = frames->above[t] < frames->above[least] ? t : least;
-    most = frames->above[t] > frames->above[most] ? t : most;
+  for (size_t t = 1; t < p->count; ++t) {
+    least = p->above[t] < p->above[least] ? t : least;
+    most = p->above[t] > p->above[most] ? t : most;
   }
   const size_t ends[2] = {least, most};
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     supine_pose pose;
-    status = supine_breath_frames_pose(frames, ends[i], &pose, error);
+    status = find_pose(p, ends[i], &pose, error);
     if (status == SUPINE_OK) {
-      status = supine_options_pose_check(frames->basis, name, wanted->allow_folds, &pose, error);
+      status = supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &pose, error);
     }
   }
   return status;
@@ -295,14 +327,13 @@ static supine_status play(playing *p, size_t count, const char *made_by, supine_
     status = supine_breath_load(wanted->pv, &pv, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_breath_frames_create(p->basis, &pv, &wanted->breath, &wanted->turn, wanted->fps,
-                                         count, &p->frames, error);
+    status = find_volumes(p, &pv, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_reference(p->basis, &wanted->from, false, &from, error);
   }
   if (status == SUPINE_OK) {
-    status = check_ends(wanted, &p->frames, error);
+    status = check_ends(p, error);
   }
   if (status == SUPINE_OK) {
     p->origin = supine_options_basis_positions(p->basis, &from.pose);

@@ -12,7 +12,7 @@
 
 #include "program/inside.h"
 #include "program/options/basis_input.h"
-#include "program/options/breath_frames.h"
+#include "program/options/breath_turn.h"
 #include "program/options/state_options.h"
 
 static const char name[] = "render";

@@ -16,7 +16,7 @@
 
 #include "command_helpers.h"
 #include "lungs_helpers.h"
-#include "program/options/breath_frames.h"
+#include "program/options/breath_turn.h"
 #include "program/options/pv.h"
 
 #include "tests/poses.h"

@@ -4,8 +4,8 @@
 #include <stdbool.h>
 #include <string.h>
 
-const supine_asset *supine_template_asset(const supine_asset *assets, const char *name,
-                                          size_t length) {
+/* Return the asset whose name is the first `length` bytes of `name`, or NULL. */
+static const supine_asset *find_asset(const supine_asset *assets, const char *name, size_t length) {
   for (const supine_asset *a = assets; a->name != NULL; ++a) {
     if (strlen(a->name) == length && memcmp(a->name, name, length) == 0) {
       return a;
@@ -56,7 +56,8 @@ static const json_t *look_up(const scope *from, const char *name, size_t length)
   return found;
 }
 
-void supine_template_escape(const char *text, FILE *file) {
+/* Write text with HTML's reserved characters & < > " replaced by entities. */
+static void escape(const char *text, FILE *file) {
   static const char *const replaced[] = {
       ['&'] = "&amp;", ['<'] = "&lt;", ['>'] = "&gt;", ['"'] = "&quot;"};
   for (const unsigned char *c = (const unsigned char *)text; *c != '\0'; ++c) {
@@ -70,7 +71,7 @@ void supine_template_escape(const char *text, FILE *file) {
 
 static void write_value(const json_t *value, FILE *file) {
   if (json_is_string(value)) {
-    supine_template_escape(json_string_value(value), file);
+    escape(json_string_value(value), file);
   } else if (json_is_integer(value)) {
     (void)fprintf(file, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
   } else {
@@ -84,7 +85,7 @@ static void fill(const supine_template *t, const char *at, const char *end, cons
 static void write_named(const supine_template *t, const tag *named, const scope *around,
                         FILE *file) {
   const json_t *value = look_up(around, named->name, named->length);
-  const supine_asset *asset = supine_template_asset(t->assets, named->name, named->length);
+  const supine_asset *asset = find_asset(t->assets, named->name, named->length);
   if (value != NULL) {
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
@@ -146,7 +147,7 @@ static void fill(const supine_template *t, const char *at, const char *end, cons
 }
 
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file) {
-  const supine_asset *asset = supine_template_asset(filling->assets, name, strlen(name));
+  const supine_asset *asset = find_asset(filling->assets, name, strlen(name));
   const scope data = {filling->data, NULL};
   if (asset != NULL) {
     fill(filling, asset->bytes, asset->bytes + asset->size, &data, file);

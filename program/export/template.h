@@ -24,10 +24,6 @@ typedef struct supine_asset {
   size_t size;
 } supine_asset;
 
-/** Return the asset whose name is the first `length` bytes of `name`, or NULL. */
-const supine_asset *supine_template_asset(const supine_asset *assets, const char *name,
-                                          size_t length);
-
 /** Assets and data to fill a template with. */
 typedef struct supine_template {
   const supine_asset *assets;
@@ -43,8 +39,5 @@ void supine_template_fill(const supine_template *filling, const char *name, FILE
 
 /** Return `count` numbers as a JSON array. */
 json_t *supine_template_numbers(const double *values, size_t count);
-
-/** Write text with HTML's reserved characters & < > " replaced by entities. */
-void supine_template_escape(const char *text, FILE *file);
 
 #endif

@@ -25,7 +25,9 @@ static void find_changes(const supine_comparison *c, size_t posture, double *per
   }
 }
 
-double supine_report_lowest_over_uppermost(const supine_comparison *c, size_t posture) {
+/* Return the ratio of the regional expansion of the three lowest slabs to that of the three
+ * uppermost slabs. */
+static double lowest_over_uppermost(const supine_comparison *c, size_t posture) {
   double gain[2] = {0, 0};
   double volume[2] = {0, 0};
   for (size_t s = 0; s < 3; ++s) {
@@ -116,8 +118,7 @@ static void print_profile(const supine_comparison *c, size_t last, bool share, F
     }
     (void)fprintf(to, share ? "%s %s %.0f %%" : "%s %s %.1f", i > 0 ? "," : "",
                   supine_options_posture_label(c->postures.item[i].name),
-                  share ? 100 * gain / supine_report_gain(c, i)
-                        : supine_report_lowest_over_uppermost(c, i));
+                  share ? 100 * gain / supine_report_gain(c, i) : lowest_over_uppermost(c, i));
   }
 }
 
@@ -160,7 +161,7 @@ json_t *supine_report_postures(const supine_comparison *c) {
                         supine_report_line(i), "held", lungs, "mean",
                         json_sprintf("%.1f", c->posture[i].displacement.mean), "max",
                         json_sprintf("%.1f", c->posture[i].displacement.max), "published", words,
-                        "ratio", json_sprintf("%.2f", supine_report_lowest_over_uppermost(c, i))));
+                        "ratio", json_sprintf("%.2f", lowest_over_uppermost(c, i))));
   }
   return list;
 }

@@ -31,12 +31,9 @@ json_t *supine_report_findings(const supine_comparison *comparison);
  * published values. */
 json_t *supine_report_postures(const supine_comparison *comparison);
 
-/* Return the ratio of the regional expansion of the three lowest slabs to that of the three
- * uppermost slabs. */
-double supine_report_lowest_over_uppermost(const supine_comparison *comparison, size_t posture);
-
 /* Return the title of a profile, with a value for each of the first four postures: the share of the
- * breath in the lower half of the lungs if `share`, else supine_report_lowest_over_uppermost. */
+ * breath in the lower half of the lungs if `share`, else the ratio of the regional expansion
+ * of the three lowest slabs to that of the three uppermost slabs. */
 json_t *supine_report_profile_finding(const supine_comparison *comparison, bool share);
 
 /* Return {{profiles}}: charts of regional expansion and of the share of the breath by height. */

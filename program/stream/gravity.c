@@ -5,7 +5,7 @@
 
 #include "sh/base/vec3.h"
 
-#include "program/options/breath_frames.h"
+#include "program/options/breath_turn.h"
 #include "program/stream/gravity.h"
 
 /* Largest deviation from a rotation that counts as exact: 32-bit floats cause 1e-6, the arithmetic

@@ -5,7 +5,7 @@
 #ifndef SUPINE_STREAM_PATIENT_H
 #define SUPINE_STREAM_PATIENT_H
 
-#include "program/options/breath_frames.h"
+#include "program/options/breath_turn.h"
 #include "program/stream/server.h"
 
 /** How the volume is determined. */
