@@ -63,9 +63,8 @@ typedef struct supine_mesh_report {
  * order of first appearance.
  *
  * Counts are checked against the file's size, so truncated or corrupt files are refused. assimp
- * runs in its own process, so files on which an importer crashes or exceeds its limits are refused
- * too. Positions are rounded to float32. A file whose name has no known ending is read as PLY or
- * STL if it begins with "ply" or "solid".
+ * runs in its own process, so files on which an importer crashes or exceeds its limits are
+ * refused too. Positions are rounded to float32.
  *
  * @param path     file
  * @param options  NULL: defaults

@@ -57,15 +57,6 @@ static void pipeline_free(pipeline *p) {
   supine_accuracy_truth_free(&p->truth);
 }
 
-/* Report progress, 0 to 1; fail if the caller asks to stop. */
-static supine_status report_progress(const supine_precompute_options *options, double fraction,
-                                     supine_error *error) {
-  return options->progress == NULL || options->progress(options->progress_context, fraction)
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_INTERRUPTED,
-                                "interrupted: nothing was written");
-}
-
 static supine_status find_directions(pipeline *p, supine_error *error) {
   const size_t n = p->lungs->mesh.vertex_count;
   p->directions = malloc(3 * n * sizeof *p->directions);
@@ -84,11 +75,7 @@ static supine_status find_directions(pipeline *p, supine_error *error) {
 
 static supine_status project(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
-  const supine_model *model = &options->model;
-  const supine_status status = report_progress(options, 0.0, error);
-  return status == SUPINE_OK
-             ? supine_projection_create(p->lungs, model, options->band, &p->projection, error)
-             : status;
+  return supine_projection_create(p->lungs, &options->model, options->band, &p->projection, error);
 }
 
 static supine_status compress(pipeline *p, supine_error *error) {
@@ -281,8 +268,7 @@ static supine_status write_file(const pipeline *p, const char *path, supine_erro
                                         .table = &p->table,
                                         .reference = p->reference.known ? &p->reference : NULL,
                                         .resting = p->reference.known ? p->resting[0] : NULL};
-  const supine_status status = report_progress(p->options, 0.9, error);
-  return status == SUPINE_OK ? supine_writer_basis_write(path, &content, error) : status;
+  return supine_writer_basis_write(path, &content, error);
 }
 
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,

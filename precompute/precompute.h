@@ -10,9 +10,6 @@
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/projection.h"
 
-/** Report progress from 0 to 1; return false to stop the work. */
-typedef bool supine_progress_function(void *context, double fraction);
-
 /** Options of a basis. */
 typedef struct supine_precompute_options {
   supine_model model;
@@ -22,8 +19,6 @@ typedef struct supine_precompute_options {
   size_t held_out;       /**< number of directions at which the error is measured; 0: 100 to 1000 */
   double expected_error; /**< its constant, mm, at most the default; 0: the default */
   supine_scan_frame frame;
-  supine_progress_function *progress; /**< optional */
-  void *progress_context;
   /** @{ For the file's metadata, optional. */
   const char *made_by;         /**< the command */
   const char *patient;         /**< a patient's own law, JSON */
@@ -42,7 +37,7 @@ typedef struct supine_precompute_report {
 } supine_precompute_report;
 
 /** Project, compress, measure, and write the basis file, whole or not at all.
- * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_INTERRUPTED, and those of the steps */
+ * @retval SUPINE_ERROR_WRITE, and those of the steps */
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);

@@ -157,7 +157,6 @@ static supine_status compress_fields(const supine_lungs *lungs, const request *w
 
 static supine_status compute(const supine_lungs *lungs, request *wanted, const char *made_by,
                              supine_error *error) {
-  supine_progress progress = supine_options_progress_begin(name);
   supine_precompute_report report;
   wanted->basis.model = wanted->model.prepared.model;
   wanted->basis.reference = &wanted->model.prepared.reference;
@@ -165,12 +164,8 @@ static supine_status compute(const supine_lungs *lungs, request *wanted, const c
   wanted->basis.assumed = wanted->model.assumed;
   wanted->basis.findings = wanted->model.findings.text;
   wanted->basis.frame = wanted->model.made_from.frame;
-  wanted->basis.progress = supine_options_progress_step;
-  wanted->basis.progress_context = &progress;
-  supine_options_signals_catch(true);
   const supine_status status =
       supine_precompute(lungs, &wanted->basis, wanted->path, &report, error);
-  supine_options_progress_end(&progress);
   if (status == SUPINE_OK) {
     report_result(wanted->path, lungs, &wanted->basis, &report);
   }

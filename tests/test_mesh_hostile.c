@@ -365,7 +365,6 @@ TEST(test_defects_known_read_right) {
       {"STL/Wuson.stl", SUPINE_OK, 2117, 3732},
       {"STL/triangle_with_two_solids.stl", SUPINE_OK, 6, 2},
       {"STL/triangle_with_empty_solid.stl", SUPINE_OK, 3, 1},
-      {"STL/formatDetection", SUPINE_OK, 3, 1},
       {"OFF/Wuson.off", SUPINE_OK, 2117, 3732},
       {"OFF/Cube.off", SUPINE_OK, 8, 12},
       {"OFF/invalid.off", SUPINE_ERROR_MESH, 0, 0},

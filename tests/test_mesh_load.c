@@ -523,26 +523,12 @@ TEST(test_load_vtp_each_encoding_same_triangle) {
   }
 }
 
-TEST(test_load_vtp_strips_cut_into_triangles) {
-  static const char text[] =
-      "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"4\" NumberOfStrips=\"1\">"
-      "<Points><DataArray type=\"Float64\" format=\"ascii\">0 0 0 1 0 0 0 1 0 1 1 0</DataArray>"
-      "</Points><Strips><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3"
-      "</DataArray><DataArray type=\"Int64\" Name=\"offsets\" "
-      "format=\"ascii\">4</DataArray></Strips>"
-      "</Piece></PolyData></VTKFile>";
-  static const uint32_t triangles[6] = {0, 1, 2, 1, 3, 2};
-  char path[256];
-  supine_mesh mesh = load(sample_text(state, "a.vtp", text, path), NULL, NULL);
-  assert_int_equal(mesh.triangle_count, 2);
-  assert_memory_equal(mesh.triangles, triangles, sizeof triangles);
-  supine_mesh_free(&mesh);
-}
-
 TEST(test_load_vtp_bad_files_refused) {
   static const char *const texts[][2] = {
       {"<VTKFile type=\"ImageData\"></VTKFile>", "no VTKFile of type PolyData"},
       {VTP("byte_order=\"BigEndian\"", "", "", ""), "big-endian"},
+      {"<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"4\" NumberOfStrips=\"1\">",
+       "strips"},
       {VTP("compressor=\"vtkLZ4DataCompressor\"", "", "", ""), "not compressed by zlib"},
       {"<VTKFile type=\"PolyData\"></VTKFile>", "no Piece"},
       {"<VTKFile type=\"PolyData\"><Piece ></Piece><Piece ></Piece></VTKFile>", "several pieces"},

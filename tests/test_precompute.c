@@ -582,41 +582,6 @@ TEST(test_precompute_reach_fine_real_surface_few_reversed) {
   supine_lungs_free(&lungs);
 }
 
-/* Request a stop once, at call number `due`. */
-static bool stop_once(void *context, double fraction) {
-  (void)fraction;
-  return (*(int *)context)-- != 0;
-}
-
-TEST(test_precompute_interrupted_anywhere_leaves_old_file) {
-  supine_lungs lungs = phantom(200);
-  for (size_t r = 0; r < 2; ++r) {
-    (void)make_basis(&lungs, 3, 0, 0.0, 0);
-    int due = 0;
-    supine_precompute_options options = {.model = supine_physics_model(SUPINE_LAW_PAPER),
-                                         .band = 7,
-                                         .modes = 9,
-                                         .held_out = 20,
-                                         .progress = stop_once,
-                                         .progress_context = &due};
-    options.model.force.soften = r == 0 ? 0.0 : 0.5;
-    options.model.reach = 10.0;
-    supine_status status = SUPINE_ERROR_INTERRUPTED;
-    int calls = 0;
-    for (; status == SUPINE_ERROR_INTERRUPTED; ++calls) {
-      supine_basis *basis = open_basis();
-      assert_int_equal(supine_basis_get_info(basis)->mode_count, 16);
-      supine_basis_close(basis);
-      due = calls;
-      status = supine_precompute(&lungs, &options, path, NULL, NULL);
-    }
-    assert_int_equal(status, SUPINE_OK);
-    assert_true(due >= 0); /* it was called less often */
-    assert_true(calls > 1);
-  }
-  supine_lungs_free(&lungs);
-}
-
 TEST(test_precompute_unwritable_leaves_old_file) {
   supine_lungs lungs = phantom(500);
   const supine_precompute_options options = {

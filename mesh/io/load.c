@@ -16,36 +16,23 @@ static supine_status cannot_read(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
 }
 
-/* Return the reader for the name's ending, or else the file's first word; NULL if none. */
-static mesh_reader *find_reader(const mesh_file *file) {
+/* Return the reader for the ending of the name; NULL if none. */
+static mesh_reader *find_reader(const char *path) {
   static const struct {
     const char *ending;
-    const char *word; /* first word that identifies the format; NULL: none */
     mesh_reader *read;
-  } known[] = {{".ply", "ply", supine_mesh_read_ply},
-               {".vtp", NULL, supine_mesh_read_vtp},
-               {".stl", "solid", supine_mesh_read_stl},
-               {".obj", NULL, supine_mesh_read_obj}};
-  enum { KNOWN = sizeof known / sizeof *known };
-  const char *slash = strrchr(file->path, '/');
-  const char *ending = strrchr(slash == NULL ? file->path : slash, '.');
-  mesh_text text = {file->bytes, file->bytes + file->size};
-  mesh_text word;
-  for (size_t i = 0; i < KNOWN && ending != NULL; ++i) {
+  } known[] = {{".ply", supine_mesh_read_ply},
+               {".vtp", supine_mesh_read_vtp},
+               {".stl", supine_mesh_read_stl},
+               {".obj", supine_mesh_read_obj}};
+  const char *slash = strrchr(path, '/');
+  const char *ending = strrchr(slash == NULL ? path : slash, '.');
+  for (size_t i = 0; i < sizeof known / sizeof *known && ending != NULL; ++i) {
     if (strcasecmp(ending, known[i].ending) == 0) {
       return known[i].read;
     }
   }
-  if (ending != NULL && supine_mesh_import_knows(ending)) {
-    return supine_mesh_import;
-  }
-  const bool any = supine_mesh_text_word(&text, &word);
-  for (size_t i = 0; i < KNOWN && any; ++i) {
-    if (known[i].word != NULL && supine_mesh_text_is(word, known[i].word)) {
-      return known[i].read;
-    }
-  }
-  return NULL;
+  return ending != NULL && supine_mesh_import_knows(ending) ? supine_mesh_import : NULL;
 }
 
 /* Check that the path is a file, and return its size in *size. */
@@ -114,7 +101,7 @@ static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_err
     return status;
   }
   find_space(file);
-  *reader = find_reader(file);
+  *reader = find_reader(file->path);
   return *reader != NULL
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,

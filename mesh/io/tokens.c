@@ -1,18 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Split a text of any content into lines, words and numbers; decode binary numbers. */
+#include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 #include "mesh/io/read.h"
-
-static bool is_blank(unsigned char c) {
-  return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\f' || c == '\v';
-}
-
-static bool is_digit(unsigned char c) {
-  return c >= '0' && c <= '9';
-}
 
 bool supine_mesh_text_line(mesh_text *text, mesh_text *line) {
   if (text->at >= text->end) {
@@ -28,11 +21,11 @@ bool supine_mesh_text_line(mesh_text *text, mesh_text *line) {
 }
 
 bool supine_mesh_text_word(mesh_text *text, mesh_text *word) {
-  while (text->at < text->end && is_blank(*text->at)) {
+  while (text->at < text->end && isspace(*text->at)) {
     ++text->at;
   }
   word->at = text->at;
-  while (text->at < text->end && !is_blank(*text->at)) {
+  while (text->at < text->end && !isspace(*text->at)) {
     ++text->at;
   }
   word->end = text->at;
@@ -48,7 +41,7 @@ bool supine_mesh_text_is(mesh_text word, const char *expected) {
 bool supine_mesh_text_count(mesh_text word, uint64_t *value) {
   *value = 0;
   for (const unsigned char *p = word.at; p < word.end; ++p) {
-    if (!is_digit(*p) || *value > (uint64_t)INT64_MAX / 10 - 1) {
+    if (!isdigit(*p) || *value > (uint64_t)INT64_MAX / 10 - 1) {
       return false;
     }
     *value = *value * 10 + (uint64_t)(*p - '0');

@@ -251,17 +251,16 @@ static bool count_of(const element *piece, const char *name, size_t *count) {
   return end != text && *end == '\0' && text[0] != '-' && value <= MESH_VERTICES_MAX;
 }
 
-/* Read the polygons, or strips of triangles, of a piece. */
+/* Read the polygons of a piece. */
 static supine_status take_polygons(const vtp_file *v, const element *piece, mesh_faces *faces,
-                                   size_t count, bool strips, supine_error *error) {
-  const char *within = strips ? "Strips" : "Polys";
+                                   size_t count, supine_error *error) {
   element offsets;
   element connectivity;
   if (count == 0) {
     return SUPINE_OK;
   }
-  if (!find_array(v, piece, within, "offsets", &offsets) ||
-      !find_array(v, piece, within, "connectivity", &connectivity)) {
+  if (!find_array(v, piece, "Polys", "offsets", &offsets) ||
+      !find_array(v, piece, "Polys", "connectivity", &connectivity)) {
     return malformed(v, "its polygons have no offsets or connectivity; save it again", error);
   }
   double *ends = NULL;
@@ -279,15 +278,8 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
       status = malformed(v, "the offsets of its polygons are invalid; save it again", error);
       break;
     }
-    const double *of = corners + (size_t)from;
-    const size_t size = (size_t)ends[p] - (size_t)from;
-    for (size_t k = 0; strips && k + 2 < size && status == SUPINE_OK; ++k) {
-      const double triangle[3] = {of[k], of[k + 1 + k % 2], of[k + 2 - k % 2]};
-      status = supine_mesh_faces_add(faces, triangle, 3, error);
-    }
-    if (!strips) {
-      status = supine_mesh_faces_add(faces, of, size, error);
-    }
+    status =
+        supine_mesh_faces_add(faces, corners + (size_t)from, (size_t)ends[p] - (size_t)from, error);
     from = ends[p];
   }
   free(ends);
@@ -368,6 +360,9 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
       !count_of(&piece, "NumberOfStrips", &count[2])) {
     return malformed(&v, "its numbers of points and polygons are invalid; save it again", error);
   }
+  if (count[2] > 0) {
+    return malformed(&v, "strips of triangles are not read; save triangles", error);
+  }
   if (count[0] > 0 && !find_array(&v, &piece, "Points", NULL, &points)) {
     return malformed(&v, "no array of points; save it again", error);
   }
@@ -382,10 +377,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     mesh->vertices[i] = (double)(float)mesh->vertices[i];
   }
   mesh_faces faces = {.path = file->path, .mesh = mesh};
-  status = take_polygons(&v, &piece, &faces, count[1], false, error);
-  if (status == SUPINE_OK) {
-    status = take_polygons(&v, &piece, &faces, count[2], true, error);
-  }
+  status = take_polygons(&v, &piece, &faces, count[1], error);
   *dropped = faces.dropped;
   return status;
 }

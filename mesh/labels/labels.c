@@ -108,7 +108,7 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
       high[a] = tally[label].high[a] > high[a] ? tally[label].high[a] : high[a];
     }
   }
-  if (supine_labels_mask_cut(&w->image, low, high, side, &w->both) != SUPINE_OK) {
+  if (supine_labels_mask_cut(&w->image, low, high, LABELS_MARGIN, side, &w->both) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", w->path);
   }
   return SUPINE_OK;

@@ -44,39 +44,6 @@ static bool box_of(const labels_mask *mask, uint8_t value, size_t low[3], size_t
   return any;
 }
 
-supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
-                                         labels_mask *mask) {
-  size_t low[3];
-  size_t high[3];
-  *mask = *from;
-  mask->at = NULL;
-  if (!box_of(from, value, low, high)) {
-    return SUPINE_OK;
-  }
-  double voxel[3];
-  for (int a = 0; a < 3; ++a) {
-    mask->size[a] = high[a] - low[a] + 1 + 2 * margin;
-    mask->from[a] = (long)low[a] - (long)margin;
-    voxel[a] = (double)mask->from[a];
-  }
-  supine_labels_mask_place(from, voxel, mask->origin);
-  mask->at = calloc(supine_labels_mask_count(mask), 1);
-  if (mask->at == NULL) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  for (size_t k = low[2]; k <= high[2]; ++k) {
-    for (size_t j = low[1]; j <= high[1]; ++j) {
-      const uint8_t *row = from->at + from->size[0] * (j + from->size[1] * k) + low[0];
-      uint8_t *out = mask->at + margin +
-                     mask->size[0] * (j - low[1] + margin + mask->size[1] * (k - low[2] + margin));
-      for (size_t i = 0; i <= high[0] - low[0]; ++i) {
-        out[i] = row[i] == value;
-      }
-    }
-  }
-  return SUPINE_OK;
-}
-
 /* Read the labels of a row; if a voxel is not a label, set `bad` to its value and return false. */
 static bool read_row(const supine_image *image, size_t row, uint16_t *labels, double *bad) {
   const size_t size = image->size[0];
@@ -147,19 +114,19 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
 }
 
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
-                                     const size_t high[3], const uint8_t *value,
+                                     const size_t high[3], size_t margin, const uint8_t *value,
                                      labels_mask *mask) {
   uint16_t *row = malloc(image->size[0] * sizeof *row);
   *mask = (labels_mask){.at = NULL};
   for (int k = 0; k < 3; ++k) {
     mask->origin[k] = image->origin[k];
     for (int a = 0; a < 3; ++a) {
-      mask->origin[k] += ((double)low[a] - LABELS_MARGIN) * image->step[a][k];
+      mask->origin[k] += ((double)low[a] - (double)margin) * image->step[a][k];
     }
   }
   for (int a = 0; a < 3; ++a) {
-    mask->size[a] = high[a] - low[a] + 1 + (size_t)2 * LABELS_MARGIN;
-    mask->from[a] = (long)low[a] - LABELS_MARGIN;
+    mask->size[a] = high[a] - low[a] + 1 + 2 * margin;
+    mask->from[a] = (long)low[a] - (long)margin;
     mask->spacing[a] = supine_length(image->step[a]);
     memcpy(mask->step[a], image->step[a], sizeof mask->step[a]);
   }
@@ -173,9 +140,8 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
     for (size_t j = low[1]; j <= high[1]; ++j) {
       double bad;
       (void)read_row(image, j + image->size[1] * k, row, &bad); /* checked by supine_labels_count */
-      uint8_t *out = mask->at + LABELS_MARGIN +
-                     mask->size[0] * (j - low[1] + LABELS_MARGIN +
-                                      mask->size[1] * (k - low[2] + LABELS_MARGIN));
+      uint8_t *out = mask->at + margin +
+                     mask->size[0] * (j - low[1] + margin + mask->size[1] * (k - low[2] + margin));
       for (size_t i = low[0]; i <= high[0]; ++i) {
         out[i - low[0]] = value[row[i]];
       }
@@ -183,6 +149,22 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   }
   free(row);
   return SUPINE_OK;
+}
+
+supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
+                                         labels_mask *mask) {
+  size_t low[3];
+  size_t high[3];
+  uint8_t kept[UINT8_MAX + 1] = {0};
+  supine_image image = {.voxel = SUPINE_VOXEL_U8, .values = from->at};
+  *mask = (labels_mask){.at = NULL};
+  memcpy(image.size, from->size, sizeof image.size);
+  memcpy(image.origin, from->origin, sizeof image.origin);
+  memcpy(image.step, from->step, sizeof image.step);
+  kept[value] = 1;
+  return box_of(from, value, low, high)
+             ? supine_labels_mask_cut(&image, low, high, margin, kept, mask)
+             : SUPINE_OK;
 }
 
 void supine_labels_mask_free(labels_mask *mask) {

@@ -60,11 +60,12 @@ supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
                                    labels_choice *choice, supine_error *error);
 
-/** Cut the box from voxel `low` to voxel `high`, with a margin of LABELS_MARGIN, from an image that
- * supine_labels_count has checked; on SUPINE_ERROR_MEMORY `at` is NULL.
- * @param value  [LABELS_MAX] value of each label in the mask */
+/** Cut the box from voxel `low` to voxel `high`, with `margin` voxels around it, from an image
+ * that supine_labels_count has checked; on SUPINE_ERROR_MEMORY `at` is NULL.
+ * @param value  value in the mask of each label that the image holds */
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
-                                     const size_t high[3], const uint8_t *value, labels_mask *mask);
+                                     const size_t high[3], size_t margin, const uint8_t *value,
+                                     labels_mask *mask);
 
 /* ---- pieces.c: pieces of equal voxels that share faces ---- */
 

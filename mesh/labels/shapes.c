@@ -21,7 +21,7 @@ static supine_status make_part(const supine_image *image, const labels_tally *ta
   const size_t high[3] = {tally->high[0], tally->high[1], tally->high[2]};
   labels_mask mask;
   value[part->label] = 1;
-  supine_status status = supine_labels_mask_cut(image, low, high, value, &mask);
+  supine_status status = supine_labels_mask_cut(image, low, high, LABELS_MARGIN, value, &mask);
   value[part->label] = 0;
   if (status == SUPINE_OK) {
     part->mask = supine_labels_voxel_ml(&mask) * (double)tally->count;
