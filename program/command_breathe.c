@@ -241,21 +241,21 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
 
 /* Compute the frames, and write them as VTP.
  * @param save  axes, unit and comment */
-static supine_status write_series(playing *p, supine_mesh_save_options *save, supine_error *error) {
+static supine_status write_series(playing *p, supine_mesh_save_options save, supine_error *error) {
   /* Half of this step, mm, is less than the storage error (supine_basis_info). */
   static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
                                       {"volume_mL", p->lungs, p->volumes}};
   supine_mesh_series *series = NULL;
-  save->from = p->origin;
-  save->normals = p->normals;
-  save->lung = lung == NULL ? NULL : lung->data;
-  save->fields = fields;
-  save->field_count = sizeof fields / sizeof *fields;
-  save->rounding = rounding;
+  save.from = p->origin;
+  save.normals = p->normals;
+  save.lung = lung == NULL ? NULL : lung->data;
+  save.fields = fields;
+  save.field_count = sizeof fields / sizeof *fields;
+  save.rounding = rounding;
   supine_status status =
-      supine_mesh_series_open(p->wanted->path, &p->mesh, save, p->count, p->time, &series, error);
+      supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->count, p->time, &series, error);
   if (status == SUPINE_OK) {
     status = play_frames(p, series, error);
   }
@@ -344,7 +344,7 @@ static supine_status play(playing *p, size_t count, const char *made_by, supine_
     (void)snprintf(p->comment, sizeof p->comment,
                    "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
                    made_by);
-    status = tensors ? write_tensors(p, made_by, error) : write_series(p, &save, error);
+    status = tensors ? write_tensors(p, made_by, error) : write_series(p, save, error);
   }
   if (status == SUPINE_OK) {
     report(p);

@@ -51,8 +51,10 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
   if (sscanf(text, "%47[^:]:%47[^:]:%31s", from, to, seconds) != 3) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  const size_t last = strlen(seconds) - 1;
-  seconds[last] = seconds[last] == 's' ? '\0' : seconds[last];
+  char *unit = &seconds[strlen(seconds) - 1];
+  if (*unit == 's') {
+    *unit = '\0';
+  }
   if (!supine_options_parse_number(seconds, &made->seconds) || !(made->seconds > 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "'%s' needs a time above 0 s, as in supine:left:5s", text);
