@@ -71,11 +71,10 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
     memcpy(a, choice->stiffness, n * sizeof *a);
     return SUPINE_OK;
   }
-  if (a != NULL) {
-    status =
-        choice->expandability != NULL
-            ? supine_tissue_expandability_load(choice->expandability, n, a, error)
-            : supine_tissue_expandability_regional(lungs, &choice->expandability_law, a, error);
+  if (a != NULL && choice->expandability != NULL) {
+    status = supine_tissue_expandability_load(choice->expandability, n, a, error);
+  } else if (a != NULL) {
+    supine_tissue_expandability_regional(lungs, &choice->expandability_law, a);
   }
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     a[i] = 1.0 / a[i];

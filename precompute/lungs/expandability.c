@@ -13,33 +13,15 @@ static bool positive(double value) {
   return value > 0.0 && isfinite(value) && isfinite(1.0 / value);
 }
 
-supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
-                                                   const supine_expandability_law *law, double *a,
-                                                   supine_error *error) {
-  const size_t n = lungs->mesh.vertex_count;
-  if (law->shape == SUPINE_EXPANDABILITY_UNIFORM) {
-    for (size_t i = 0; i < n; ++i) {
-      a[i] = 1.0;
-    }
-    return SUPINE_OK;
-  }
-  if (law->axis < 0 || law->axis > 2) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "expandability: axis %d: give 0, 1 or 2",
-                            law->axis);
-  }
-  if (!positive(law->from) || !positive(law->to)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "expandability from %g to %g: give positive values", law->from,
-                            law->to);
-  }
-  for (size_t i = 0; i < n; ++i) {
+void supine_tissue_expandability_regional(const supine_lungs *lungs,
+                                          const supine_expandability_law *law, double *a) {
+  for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
     double box[3];
     supine_lungs_box_coordinates(lungs, i, box);
     const double t = box[law->axis];
     a[i] = law->shape == SUPINE_EXPANDABILITY_LINEAR ? law->from + (law->to - law->from) * t
                                                      : law->from * pow(law->to / law->from, t);
   }
-  return SUPINE_OK;
 }
 
 /* Parse the index of a vertex; false if it is not a whole number. */

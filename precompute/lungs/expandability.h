@@ -26,12 +26,9 @@ typedef struct supine_expandability_law {
   double from, to; /**< a at t = 0 and t = 1, > 0 */
 } supine_expandability_law;
 
-/** Compute a [N] by a regional model.
- * @retval SUPINE_ERROR_ARGUMENT  an axis that is not 0 to 2, or a value at an end that is not
- *                                positive and finite, or whose reciprocal is infinite */
-supine_status supine_tissue_expandability_regional(const supine_lungs *lungs,
-                                                   const supine_expandability_law *law, double *a,
-                                                   supine_error *error);
+/** Compute a [N] by a regional model whose shape is not UNIFORM. */
+void supine_tissue_expandability_regional(const supine_lungs *lungs,
+                                          const supine_expandability_law *law, double *a);
 
 /** Read a [N] from a CSV file: a header line, then either one value per line in the model's order,
  * or `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin

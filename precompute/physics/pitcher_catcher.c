@@ -5,8 +5,7 @@
 
 #include "precompute/physics/equilibrium.h"
 
-/* Nodes 0 to N - 1 are the masses, node N + e is the spring of edge e. A binary heap keeps the node
- * with the largest Pitcher on top. */
+/* Nodes 0 to N - 1 are the masses, node N + e is the spring of edge e. */
 typedef struct iteration {
   size_t node_count;
   size_t *clique_begin; /* [nodes + 2] index in `clique` of the first neighbour of a node */
@@ -15,8 +14,8 @@ typedef struct iteration {
   double *te_self;      /* [nodes] Te[j->j] */
   double *pitcher;      /* [nodes] may be negative */
   double *catcher;      /* [nodes] */
-  size_t *heap;         /* [nodes] nodes; the largest |pitcher| on top */
-  size_t *place;        /* [nodes] index of each node in the heap */
+  size_t *largest;      /* [2 nodes] tree of nodes: leaf nodes + j is node j, and entry k the one of
+                           its children 2 k and 2 k + 1 with the larger |pitcher|; 1 is the root */
 } iteration;
 
 static void iteration_free(iteration *it) {
@@ -26,42 +25,15 @@ static void iteration_free(iteration *it) {
   free(it->te_self);
   free(it->pitcher);
   free(it->catcher);
-  free(it->heap);
-  free(it->place);
+  free(it->largest);
 }
 
-static void heap_swap(iteration *it, size_t a, size_t b) {
-  const size_t node = it->heap[a];
-  it->heap[a] = it->heap[b];
-  it->heap[b] = node;
-  it->place[it->heap[a]] = a;
-  it->place[it->heap[b]] = b;
-}
-
-static double heap_key(const iteration *it, size_t at) {
-  return fabs(it->pitcher[it->heap[at]]);
-}
-
-static void heap_up(iteration *it, size_t at) {
-  while (at > 0 && heap_key(it, at) > heap_key(it, (at - 1) / 2)) {
-    heap_swap(it, at, (at - 1) / 2);
-    at = (at - 1) / 2;
-  }
-}
-
-static void heap_down(iteration *it, size_t at) {
-  for (;;) {
-    size_t largest = at;
-    for (size_t child = 2 * at + 1; child <= 2 * at + 2 && child < it->node_count; ++child) {
-      if (heap_key(it, child) > heap_key(it, largest)) {
-        largest = child;
-      }
-    }
-    if (largest == at) {
-      return;
-    }
-    heap_swap(it, at, largest);
-    at = largest;
+/* Find the node with the largest Pitcher again, after that of `node` has changed. */
+static void update(iteration *it, size_t node) {
+  for (size_t k = (it->node_count + node) / 2; k > 0; k /= 2) {
+    const size_t a = it->largest[2 * k];
+    const size_t b = it->largest[2 * k + 1];
+    it->largest[k] = fabs(it->pitcher[a]) >= fabs(it->pitcher[b]) ? a : b;
   }
 }
 
@@ -77,10 +49,9 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
   it->te_self = malloc(nodes * sizeof *it->te_self);
   it->pitcher = calloc(nodes, sizeof *it->pitcher);
   it->catcher = calloc(nodes, sizeof *it->catcher);
-  it->heap = calloc(nodes, sizeof *it->heap);
-  it->place = calloc(nodes, sizeof *it->place);
+  it->largest = calloc(2 * nodes, sizeof *it->largest);
   if (it->clique_begin == NULL || it->clique == NULL || it->te == NULL || it->te_self == NULL ||
-      it->pitcher == NULL || it->catcher == NULL || it->heap == NULL || it->place == NULL) {
+      it->pitcher == NULL || it->catcher == NULL || it->largest == NULL) {
     return false;
   }
   /* Offset by one: filling advances each entry to the beginning of the next node. */
@@ -125,16 +96,11 @@ static void distribute(iteration *it, size_t j) {
   const double held = it->pitcher[j];
   it->catcher[j] += it->te_self[j] * held;
   it->pitcher[j] = 0.0;
-  heap_down(it, it->place[j]);
+  update(it, j);
   for (size_t c = it->clique_begin[j]; c < it->clique_begin[j + 1]; ++c) {
     const size_t i = it->clique[c];
-    const double before = fabs(it->pitcher[i]);
     it->pitcher[i] += it->te[c] * held;
-    if (fabs(it->pitcher[i]) > before) {
-      heap_up(it, it->place[i]);
-    } else {
-      heap_down(it, it->place[i]);
-    }
+    update(it, i);
   }
 }
 
@@ -170,12 +136,12 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
     sum += fabs(force[i]);
   }
   for (size_t j = 0; j < it.node_count; ++j) {
-    it.heap[j] = it.place[j] = j;
+    it.largest[it.node_count + j] = j;
   }
-  for (size_t at = it.node_count; at-- > 0;) {
-    heap_down(&it, at);
+  for (size_t j = 0; j < it.node_count; ++j) {
+    update(&it, j);
   }
-  for (size_t steps = 0; heap_key(&it, 0) > tolerance * largest; ++steps) {
+  for (size_t steps = 0; fabs(it.pitcher[it.largest[1]]) > tolerance * largest; ++steps) {
     if (progress != NULL && steps % n == 0) {
       double remaining = 0.0;
       for (size_t j = 0; j < it.node_count; ++j) {
@@ -183,7 +149,7 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
       }
       progress(context, steps, remaining / sum);
     }
-    distribute(&it, it.heap[0]);
+    distribute(&it, it.largest[1]);
   }
   for (size_t i = 0; i < n; ++i) {
     masses[i] = it.catcher[i];
