@@ -140,7 +140,7 @@ TEST(test_load_ply_strips_refused) {
               "ply\nformat ascii 1.0\nelement tristrips 1\nproperty list int int vertex_indices\n"
               "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
               "end_header\n3 0 1 2\n0 0 0\n1 0 0\n0 1 0\n",
-              SUPINE_ERROR_FORMAT, "save triangles");
+              SUPINE_ERROR_MESH, "save the mesh as triangles");
 }
 
 /* A concave flat face of any size, one corner of which sees all others, is cut inside: all
