@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the basis file: tensors and metadata of a compressed field. */
+/* Write a basis file. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -60,7 +60,7 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   }
 }
 
-/* Add the number of vertices that lesions change, and the range of factors. */
+/* Add the number of vertices whose stiffness lesions change, and the range of the factors. */
 static void add_lesions(entries *list, size_t count, const double *factors) {
   size_t changed = 0;
   double low = 1.0;
@@ -97,7 +97,7 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   }
 }
 
-/* Add metadata with a number for each lung, separated by commas. */
+/* Add an entry with a number for each lung, separated by commas. */
 static void add_by_lung(entries *list, const char *key, size_t count, const double values[2]) {
   if (count == 2) {
     add(list, key, "%.9g,%.9g", values[0], values[1]);
@@ -106,7 +106,7 @@ static void add_by_lung(entries *list, const char *key, size_t count, const doub
   }
 }
 
-/* Add the scan's state, the volumes at full inflation and the shares at rest. */
+/* Add the state and volumes of the scan, the full volume and the volumes at rest as shares. */
 static void add_reference(entries *list, const supine_reference *reference, const double share[2]) {
   const double *g = reference->scan.state.gravity;
   const bool full = reference->scan.state.volume.kind == SUPINE_VOLUME_FULL;
@@ -130,7 +130,7 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* Add the expected error of positions, and whether volumes at rest were given (supine/locate.h). */
+/* Add the constant of the expected error, and whether volumes at rest were given. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
@@ -145,7 +145,7 @@ static void add_expected_error(entries *list, const supine_basis_content *conten
 }
 
 static void add_fit(entries *list, const supine_fit_report *fit) {
-  add(list, "route", "fields"); /* the run-time library evaluates them at gain 1 */
+  add(list, "route", "fields");
   add(list, "condition", "%.4g", fit->condition);
   add(list, "band_determined", "%zu", fit->band_highest);
   add(list, "error_method", "leave-one-out");
@@ -168,7 +168,7 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
 }
 
-/* Convert to floats; the caller frees them. Return NULL if out of memory. */
+/* Convert doubles to floats. The caller frees them. Return NULL if out of memory. */
 static float *to_float(const double *values, size_t count) {
   float *out = malloc(count * sizeof *out);
   for (size_t i = 0; out != NULL && i < count; ++i) {
@@ -177,7 +177,7 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Find the modes of the normals for the surface and field that are written to the file. */
+/* Compute the modes of the normals from the vertices and directions as written to the file. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {
@@ -227,7 +227,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   float *directions = NULL;
   double *rest = malloc(3 * n * sizeof *rest);
   unsigned char *lung = malloc(n);
-  if (rest != NULL) { /* first for the positions of collapsed lungs, then for their directions */
+  if (rest != NULL) { /* positions of collapsed lungs, then their directions */
     supine_tissue_collapse(lungs, share, rest);
     vertices = to_float(rest, 3 * n);
   }

@@ -1,23 +1,24 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Make a basis from another simulator's fields: displacements of one surface for some directions of
- * gravity are fitted by harmonics and compressed.
+ * Fit harmonics to another simulator's fields, the displacements of one surface for several
+ * directions of gravity, and compress them. With u(g_j) the field for direction j and Y the
+ * harmonics, the coefficients C minimise
  *
- *     minimise over C:  sum over directions j of |u(g_j) - C Y(g_j)|^2
+ *     sum over j of |u(g_j) - C Y(g_j)|^2
  *
- * By default, of the bands that the directions determine, a higher one is chosen if it reduces the
- * leave-one-out error by more than 1 %. */
+ * By default, a higher band that the directions determine is chosen if it reduces the leave-one-out
+ * error by more than 1 %. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
 #include "precompute/lungs/lungs.h"
 #include "precompute/projection/accuracy.h"
 
-/** Displacements u of every vertex for M directions of gravity. */
+/** Displacements of N vertices for M directions of gravity. */
 typedef struct supine_fields {
   size_t direction_count; /**< M */
   size_t vertex_count;    /**< N */
-  double *directions;     /**< [M, 3] unit */
+  double *directions;     /**< [M, 3] unit vectors */
   double *displacement;   /**< [M, N, 3] mm */
 } supine_fields;
 
@@ -39,33 +40,32 @@ void supine_fields_free(supine_fields *fields);
 
 enum { SUPINE_FIT_BAND_MAX = 11 };
 
-/** Result of a fit. */
+/** Result of fitting fields. */
 typedef struct supine_fit_report {
   size_t band_highest; /**< highest band that the directions determine */
   size_t band;         /**< chosen band */
   double condition;    /**< condition number of the band's harmonics at the directions */
-  size_t mode_count;   /**< number of modes of the basis; set by supine_precompute_fields */
+  size_t mode_count;   /**< number of modes of the basis; supine_precompute_fields sets it */
   double error[SUPINE_FIT_BAND_MAX + 1]; /**< leave-one-out error of each band up to band_highest,
                                           * relative RMS */
-  supine_accuracy accuracy; /**< leave-one-out error of the basis; errors in mm are those at the
-                             * given displacements, and volume is 0 */
+  supine_accuracy accuracy; /**< leave-one-out error of the basis, at the given displacements;
+                             * `volume` is 0 */
 } supine_fit_report;
 
-/** Options of the fit. */
+/** Options of fitting fields. */
 typedef struct supine_fit_options {
-  int band;             /**< negative: chosen by the leave-one-out error */
+  int band;             /**< degree of the harmonics; negative: chosen by the leave-one-out error */
   size_t modes;         /**< largest number of modes; 0: the harmonics themselves */
-  const char *findings; /**< notes on the surface for the basis, one a line; optional */
-  const char *made_by;  /**< for the basis's metadata; optional */
+  const char *findings; /**< notes on the surface for the metadata, one a line, or NULL */
+  const char *made_by;  /**< command line for the metadata, or NULL */
 } supine_fit_options;
 
 /** Fit the fields, compress and cross-validate.
  *
- * @param compression  written; its 3 N rows are the components of each vertex. Release with
+ * @param compression  written: 3 N rows, one for each component of each vertex. Release with
  *                     supine_projection_compression_free
- * @retval SUPINE_ERROR_ARGUMENT   a band that the directions do not determine, fewer than two
- *         directions
- * @retval SUPINE_ERROR_NUMERICAL  the displacements are all zero, or a decomposition failed
+ * @retval SUPINE_ERROR_ARGUMENT   the directions do not determine the band, or are fewer than two
+ * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,
                                 supine_compression *compression, supine_fit_report *report,

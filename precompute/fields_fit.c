@@ -12,22 +12,23 @@
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
-/* Largest condition number of the harmonics at directions that determine a band, and largest
- * leverage: at 1, one direction alone would fix a coefficient. */
+/* Directions determine a band up to this condition number of its harmonics, and up to this leverage
+ * of a direction. At a leverage of 1, one direction would determine a coefficient by itself. */
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
-/* A higher band is chosen only if its error is below `worthwhile` times the error of the band
- * chosen so far, and if that error exceeds the rounding error of single-precision coefficients. */
+/* A higher band is chosen only if its error is below `worthwhile` times that of the band chosen
+ * before, and if the latter exceeds `exact`, the rounding error of single precision. */
 static const double worthwhile = 0.99;
 static const double exact = 1e-6; /* relative RMS */
 
-/* A least-squares fit of one band: Y = U S V', C' = A F with A = V S^-1 U'. */
+/* A least-squares fit of a band to fields F: coefficients A F with A = V S^-1 U', harmonics Y = U S
+ * V'. */
 typedef struct fit {
   size_t count, terms;
   double *y;        /* [M, P] harmonics at the directions */
   double *analysis; /* [P, M] A */
-  double condition; /* of Y */
+  double condition; /* condition number of Y */
 } fit;
 
 /* Work space to predict one direction from the others. */
@@ -37,8 +38,8 @@ typedef struct prediction {
   double *gram;     /* [P, P] scalar products of the coefficients, mm^2 */
   double *values;   /* [P] eigenvalues */
   double *vectors;  /* [P, P] eigenvectors */
-  double *seen;     /* [P] harmonics at the direction, projected on the modes */
-  double *residual; /* [M] the residual as a combination of the fields */
+  double *target;   /* [P] harmonics at the direction, projected onto the modes */
+  double *residual; /* [M] residual as a linear combination of the fields */
   double *product;  /* [M] work space */
 } prediction;
 
@@ -110,7 +111,7 @@ static bool fit_is_determined(const fit *f) {
   return determined;
 }
 
-/* Allocate the Gram matrix and the work space in one piece; all bands have fewer terms than M. */
+/* Allocate the Gram matrix and the work space together; every band has fewer terms than M. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
   double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
@@ -118,7 +119,7 @@ static supine_status allocate(fitting *w, supine_error *error) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
   double **const squares[] = {&w->work.analysis, &w->work.part, &w->work.gram, &w->work.vectors};
-  double **const lists[] = {&w->work.values, &w->work.seen, &w->work.residual, &w->work.product};
+  double **const lists[] = {&w->work.values, &w->work.target, &w->work.residual, &w->work.product};
   for (size_t i = 0; i < 4; ++i) {
     *squares[i] = next += m * m;
   }
@@ -129,9 +130,9 @@ static supine_status allocate(fitting *w, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Predict direction d from the others, by the harmonics (modes 0) or the leading modes of their
- * coefficients, and write the residual as a combination of the fields into work.residual. Return
- * its square. With h the row of Y A for d, the fit without it is
+/* Predict the field of direction d from the others, by the harmonics (modes 0) or by the leading
+ * modes of their coefficients. Write the residual, as a linear combination of the fields, to
+ * work.residual, and its square, mm^2. With h row d of Y A, the fit without direction d is
  *
  *     A_d = A - a (e_d - h)',    a = A e_d / (1 - h_d) */
 static supine_status predict(const fitting *w, const fit *f, size_t d, size_t modes,
@@ -146,20 +147,20 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   memcpy(o->analysis, f->analysis, f->terms * f->count * sizeof *o->analysis);
   cblas_dger(CblasRowMajor, p, m, -1.0 / o->residual[d], f->analysis + d, m, o->residual, 1,
              o->analysis, m);
-  memcpy(o->seen, y, f->terms * sizeof *o->seen);
+  memcpy(o->target, y, f->terms * sizeof *o->target);
   if (modes > 0) {
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->analysis, m, w->gram, m,
                 0.0, o->part, m);
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->part, m, o->analysis, m,
                 0.0, o->gram, p);
     status = supine_projection_leading_eigenpairs(f->terms, o->gram, modes, o->values, o->vectors);
-    memset(o->seen, 0, f->terms * sizeof *o->seen);
+    memset(o->target, 0, f->terms * sizeof *o->target);
     for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
       const double *mode = o->vectors + k * f->terms;
-      cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, o->seen, 1);
+      cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, o->target, 1);
     }
   }
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->analysis, m, o->seen, 1, 0.0, o->residual,
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->analysis, m, o->target, 1, 0.0, o->residual,
               1);
   o->residual[d] += 1.0;
   cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, o->residual, 1, 0.0, o->product, 1);
@@ -176,7 +177,7 @@ static double square_sum(const fitting *w) {
   return sum;
 }
 
-/* Find the leave-one-out error of the harmonics, relative RMS. */
+/* Compute the leave-one-out error of the harmonics, relative RMS. */
 static double leave_one_out(const fitting *w, const fit *f) {
   double sum = 0.0;
   for (size_t d = 0; d < f->count; ++d) {
@@ -187,8 +188,8 @@ static double leave_one_out(const fitting *w, const fit *f) {
   return sqrt(sum / square_sum(w));
 }
 
-/* Try the bands that the directions determine; keep band `wanted` or, if that is negative, the one
- * with the smallest worthwhile error. */
+/* Fit the bands that the directions determine. Choose band `wanted`, or if that is negative, the
+ * highest band that is worthwhile. */
 static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
                                  supine_error *error) {
   const size_t m = w->fields->direction_count;
@@ -228,8 +229,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Make a projection whose columns [rows, m] are the given fields and whose functions [m, P] are the
- * chosen band's analysis, transposed. */
+/* Make a projection of the fields, which are its columns [rows, M]; its functions [M, P] are the
+ * transposed analysis of the chosen band. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;
@@ -257,15 +258,15 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
   const size_t m = w->fields->direction_count;
   const double samples = (double)m * (double)w->fields->vertex_count;
   supine_tally *tally = calloc(1, sizeof *tally);
-  double *miss = malloc(w->rows * sizeof *miss);
-  supine_status status = tally == NULL || miss == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  double *residual = malloc(w->rows * sizeof *residual);
+  supine_status status = tally == NULL || residual == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   for (size_t d = 0; d < m && status == SUPINE_OK; ++d) {
     double square;
     status = predict(w, &w->chosen, d, modes, &square);
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)m, (int)w->rows, 1.0, w->fields->displacement,
-                (int)w->rows, w->work.residual, 1, 0.0, miss, 1);
+                (int)w->rows, w->work.residual, 1, 0.0, residual, 1);
     for (size_t i = 0; i < w->rows; i += 3) {
-      const double length = supine_length(miss + i);
+      const double length = supine_length(residual + i);
       supine_accuracy_tally_add(tally, 1, &length);
     }
   }
@@ -282,7 +283,7 @@ static supine_status cross_validate(const fitting *w, size_t modes, supine_accur
     (void)supine_error_set(error, status, "cross-validation: %s", supine_status_string(status));
   }
   free(tally);
-  free(miss);
+  free(residual);
   return status;
 }
 

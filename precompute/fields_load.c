@@ -27,7 +27,7 @@ static supine_status allocate(size_t count, supine_fields *fields, supine_error 
                                 fields->vertex_count);
 }
 
-/* Normalise direction `at`. */
+/* Normalise direction `at`, or fail if it is zero or not finite. */
 static supine_status normalise(const supine_fields *fields, size_t at, const char *path,
                                supine_error *error) {
   double *g = fields->directions + 3 * at;
@@ -62,10 +62,10 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
   const size_t n = fields->vertex_count;
   if (!is_real(gravity, 2) || !is_real(displacement, 3) ||
       gravity->shape[0] != displacement->shape[0] || gravity->shape[0] == 0) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: it must hold gravity [M,3] and displacement [M,N,3], F32 or F64: "
-                            "write both",
-                            path);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: expected tensors gravity [M,3] and displacement [M,N,3], F32 or F64: write both",
+        path);
   }
   if (displacement->shape[1] != n) {
     return supine_error_set(

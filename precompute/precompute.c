@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make a basis: project, compress, measure the error, write the file. */
+/* Make a basis: project, compress, measure the error and write the file. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,11 +12,11 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/projection.h"
 
-/* Bounds on the default number of held-out directions, which is HELD_OUT_WORK over the number of
- * vertices. A hundred directions give the error to about 5 %, a thousand to 1 or 2 %. */
+/* The default number of held-out directions is HELD_OUT_WORK over the number of vertices, within
+ * these bounds. 100 directions give the error to about 5 %, 1000 to 1 or 2 %. */
 enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 
-/* Volume above the reference at which errors in mm are stated if rest is unknown, mL. */
+/* Volume beyond the reference at which errors in mm are measured if rest is unknown, mL. */
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
@@ -28,11 +28,11 @@ typedef struct pipeline {
   const supine_lungs *given;
   const supine_lungs *lungs; /* `given` or `anchored` */
   const supine_precompute_options *options;
-  supine_lungs anchored; /* `given` with vertices moved by anchor(); empty if there is no scan */
+  supine_lungs anchored; /* `given` with vertices moved by anchor(), or empty */
   supine_reference reference;
-  double *directions; /* [N, 3] */
-  double *weight; /* [N] |d|^2, so that modes minimise the error of displacement: 0.34 % RMS with
-                     16 modes; without weights 0.40, by area 0.42 % (a left lung, soften 1) */
+  double *directions; /* [N, 3] d, mm */
+  double *weight; /* [N] |d|^2, with which modes minimise the error of displacement: 0.34 % RMS with
+                     16 modes, but 0.40 % without weights (a left lung, soften 1) */
   supine_projection projection;
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];
@@ -41,8 +41,8 @@ typedef struct pipeline {
   supine_truth truth;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[2][9]; /* harmonics of each lung's volume at rest, mL beyond the reference */
-  /* Harmonics of the volume beyond the reference at which errors in mm are stated, mL. */
+  double resting[2][9]; /* harmonics of the volume of each lung at rest, mL beyond the reference */
+  /* Harmonics of the volume at which errors in mm are measured, mL beyond the reference. */
   double volume[9];
   supine_error_table table;
 } pipeline;
@@ -85,11 +85,10 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 &p->compression, p->singular, &p->energy, error);
 }
 
-/* Move the surface at full inflation so that the compressed field takes it exactly to the scan.
- * This cancels the compressed field's error at the scan's gravity and the residual of the fixed
- * point.
+/* Move the surface p at full inflation so that the compressed field F' takes it exactly to the
+ * scan. This cancels the error of F' at the scan's gravity and the residual of the fixed point.
  *
- *     p'_j = scan_j - A_j F' d_j       with gains A that keep the volumes */
+ *     p_j = scan_j - A_j F' d_j       with gains A that keep the volumes */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -127,8 +126,8 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
       &p->compression, p->lungs, p->options->model.share, p->directions, &p->forms, error);
 }
 
-/* Check that the field takes each lung to its volume at rest, volume [lungs] mL beyond the
- * reference, with gravity along the unit vector g. */
+/* Check that the field takes each lung to its volume at rest with gravity along the unit vector g.
+ * @param volume  [lungs] mL beyond the reference */
 static supine_status check_rest(const supine_compression *compression,
                                 const supine_volume_forms *forms, const double g[3],
                                 const double *volume, supine_error *error) {
@@ -154,7 +153,7 @@ static supine_status check_rest(const supine_compression *compression,
 /* Find the volume of each lung at rest, mL beyond the reference surface, as real harmonics of bands
  * 0 to 2 that interpolate the volumes along the axes.
  * @param share  each lung's share of its healthy volume
- * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it holds so little in some posture */
+ * @retval SUPINE_ERROR_NUMERICAL  the surface folds before a lung has its volume at rest */
 static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
                                     const supine_compression *compression,
                                     const supine_volume_forms *forms, double harmonics[2][9],
@@ -178,7 +177,7 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
   return status;
 }
 
-/* Find the volumes at rest, if it is known, and the state at which errors in mm are measured. */
+/* Find the volumes at rest if rest is known, and the volume at which errors in mm are measured. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
   p->volume[0] = breath_volume * sqrt_4pi;
@@ -188,7 +187,7 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_status status = rest_harmonics(&p->reference, options->model.share, &p->compression,
                                               &p->forms, p->resting, error);
   for (size_t t = 0; t < 9; ++t) {
-    p->volume[t] = p->resting[0][t] + p->resting[1][t]; /* zero for a missing second lung */
+    p->volume[t] = p->resting[0][t] + p->resting[1][t]; /* resting[1] is 0 if there is one lung */
   }
   return status;
 }
@@ -211,7 +210,7 @@ static supine_status measure(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Find the smallest number of modes with nearly the same error, from the singular values. */
+/* Find from the singular values the smallest number of modes with nearly the same error. */
 static size_t modes_needed(const pipeline *p) {
   const size_t most = p->compression.mode_count;
   const double limit = pow(same_error, 2.0) - 1.0;

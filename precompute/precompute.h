@@ -14,17 +14,17 @@
 typedef struct supine_precompute_options {
   supine_model model;
   const supine_reference *reference; /**< volumes of the lungs; NULL: rest and full are unknown */
-  size_t band;                       /**< L */
-  size_t modes;          /**< largest number of modes; 0: the (band + 1)^2 harmonics themselves */
-  size_t held_out;       /**< number of directions at which the error is measured; 0: 100 to 1000 */
-  double expected_error; /**< its constant, mm, at most the default; 0: the default */
+  size_t band;                       /**< highest degree of the harmonics */
+  size_t modes;          /**< largest number of modes; 0: keep the (band + 1)^2 harmonics */
+  size_t held_out;       /**< number of directions to measure the error at; 0: 100 to 1000 */
+  double expected_error; /**< constant (supine/locate.h), mm, at most the default; 0: the default */
   supine_scan_frame frame;
-  /** @{ For the file's metadata, optional. */
-  const char *made_by;         /**< the command */
-  const char *patient;         /**< a patient's own law, JSON */
-  const char *patient_summary; /**< with `patient`: name and held-out error, in words */
+  /** @{ Metadata of the file, or NULL. */
+  const char *made_by;         /**< command line */
+  const char *patient;         /**< patient's law, as JSON */
+  const char *patient_summary; /**< with `patient`: its name and held-out error */
   const char *assumed;         /**< assumptions about the scan */
-  const char *findings;        /**< notes and warnings on the input, one a line */
+  const char *findings;        /**< notes and warnings, one a line */
   /** @} */
 } supine_precompute_options;
 
@@ -33,17 +33,17 @@ typedef struct supine_precompute_report {
   size_t mode_count;
   size_t solve_count; /**< number of directions solved for */
   supine_accuracy accuracy;
-  double turned_over; /**< share of triangles, see supine_accuracy_turned_over */
+  double turned_over; /**< share of triangles (supine_accuracy_turned_over) */
 } supine_precompute_report;
 
-/** Project, compress, measure, and write the basis file, whole or not at all.
- * @retval SUPINE_ERROR_WRITE, and those of the steps */
+/** Make a basis of a model of lungs, measure its error, and write the file, whole or not at all.
+ * @retval SUPINE_ERROR_WRITE, and those of projection and compression */
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
 
-/** Fit, compress and cross-validate another simulator's fields, and write the basis file. Gain 1
- * gives the fields as they were.
+/** Fit, compress and cross-validate another simulator's fields, and write the basis file. A gain of
+ * 1 reproduces the fields.
  * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *path,

@@ -18,7 +18,7 @@ supine_model_choice supine_precompute_choice_default(void) {
   return choice;
 }
 
-/* Select the law; constants that the user gives override those of the law. */
+/* Select the law and its constants; constants that the user gives override them. */
 static supine_model choose_law(const supine_model_choice *choice) {
   const bool none = choice->has_scan && !choice->scan.known;
   const supine_model law = supine_physics_model(choice->law != SUPINE_LAW_COUNT
@@ -182,8 +182,8 @@ supine_status supine_precompute_prepare(supine_lungs *lungs, const supine_model_
   }
   if (p->model.law == SUPINE_LAW_PAPER && scan.known) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--law paper adds breaths to the scan as it is: leave --scanned out, "
-                            "or take --law deep");
+                            "--law paper takes the scan as the reference: leave --scanned out, or "
+                            "use --law deep");
   }
   supine_status status = set_expandability(lungs, choice, p, error);
   status = status == SUPINE_OK ? set_lesions(lungs, choice, p, findings, error) : status;

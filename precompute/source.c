@@ -15,16 +15,15 @@
 #include "precompute/lungs/gate.h"
 #include "precompute/source.h"
 
-/* Files being read. The arrays have room for every file, and for at least the two lungs of a map.
- */
+/* Input files. The arrays have room for all files, and for at least two lungs of a label map. */
 typedef struct reading {
   const supine_source_options *options;
   char **paths;
-  size_t count; /* number of files; once maps are loaded, of lungs */
+  size_t count; /* number of files, or of lungs after loading label maps */
   supine_mesh *meshes;
   supine_mesh_report *reports;
-  supine_error *errors; /* status SUPINE_OK for files that were loaded */
-  supine_axes axes;     /* of the files' coordinates, or of a map's header */
+  supine_error *errors; /* of each file; status SUPINE_OK if it was loaded */
+  supine_axes axes;     /* axes of the files, or of a label map's header */
   bool has_midline;
   double midline;
 } reading;
@@ -93,12 +92,12 @@ static bool is_folder(const char *path) {
 
 enum { LOBES = 5, LEFT_LOBES = 2 };
 
-/* The lobes of a folder of TotalSegmentator's masks. */
+/* The masks of lobes in a folder made by TotalSegmentator. */
 typedef struct lobe_files {
   char path[LOBES][PATH_MAX];
   char *list[LOBES];
   size_t count;
-  char labels[64]; /* labels of each side, in the form of --labels */
+  char labels[64]; /* labels of each lung, in the form of --labels */
 } lobe_files;
 
 static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
@@ -168,7 +167,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   return SUPINE_OK;
 }
 
-/* Find the axes and unit that all files share; zeros if their axes differ. */
+/* Return the axes and unit of the files; zeros if their axes differ. */
 static supine_scan_frame frame_of(const reading *r) {
   for (size_t i = 1; i < r->count; ++i) {
     if (r->reports[i].axes != r->reports[0].axes) {
@@ -208,7 +207,7 @@ static void summarize(const reading *r, supine_source *source) {
   }
 }
 
-/* Check that all files are maps, or none. */
+/* Check that the files are all label maps, or all surfaces without options of label maps. */
 static supine_status check_kinds(const supine_source_options *options, char **paths, size_t count,
                                  bool *is_map, supine_error *error) {
   const supine_labels_options *labels = &options->labels;

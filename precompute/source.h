@@ -10,26 +10,26 @@
 #include "precompute/lungs/lungs.h"
 #include "precompute/physics/reference.h"
 
-/** Options of reading the files. */
+/** Options of loading. */
 typedef struct supine_source_options {
   supine_mesh_load_options load;
-  supine_labels_options labels; /**< of label maps; the axes of `load` replace its own */
-  const char *surfaces_out;     /**< path for the joined surfaces of a label map, or NULL */
-  bool has_midline;             /**< `midline` was given; else it is found */
-  double midline;               /**< x between the lungs, mm */
+  supine_labels_options labels; /**< options of label maps; the axes are those of `load` */
+  const char *surfaces_out;     /**< path to save the surfaces of a label map to, or NULL */
+  bool has_midline;             /**< `midline` was given */
+  double midline;               /**< x of the plane between the lungs, mm */
 } supine_source_options;
 
 /** Result of loading. */
 typedef struct supine_source {
   supine_lungs lungs;
   supine_scan_frame frame;
-  bool is_map;    /**< the files are label maps, described by `report` */
-  bool axes_hold; /**< the lungs' shape agrees with the axes (supine_lungs_gate) */
+  bool is_map;    /**< the files are label maps, and `report` is set */
+  bool axes_hold; /**< the shape of the lungs agrees with the axes */
   supine_labels_report report;
-  char summary[256]; /**< axes, unit and the lungs' boxes, in words */
+  char summary[256]; /**< axes, unit and boxes of the lungs, in words */
 } supine_source;
 
-/** Read surfaces (all at once) or label maps, check them and join them into lungs.
+/** Load surfaces (in parallel) or label maps, check them and join them into lungs.
  * @param source    zeroed; release with supine_precompute_source_free
  * @param findings  notes and warnings are added, also after a failure
  * @retval SUPINE_ERROR_ARGUMENT  both label maps and surfaces, or an option for the other kind

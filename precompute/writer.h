@@ -5,7 +5,7 @@
 
 #include <supine/safetensors.h>
 
-/* Write a file as supine_safetensors_write does, whole or not at all (sh/base/output.h).
+/* Write a safetensors file, whole or not at all (sh/base/output.h).
  * @retval SUPINE_ERROR_WRITE, and those of supine_safetensors_write */
 supine_status supine_writer_safetensors_write(const char *path, const supine_tensor *tensors,
                                               size_t tensor_count, const supine_metadata *metadata,

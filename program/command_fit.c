@@ -30,12 +30,12 @@ typedef struct request {
   const char *rest_path, *state_path; /* surfaces of the first and the second scan; NULL: none */
 } request;
 
-/* Evidence about the person. */
-typedef struct evidence {
+/* Scans and landmarks of the person. */
+typedef struct scan_data {
   supine_lungs lungs[2]; /* in the fuller state, in the emptier one (once ordered) */
   supine_patient_pairs pairs;
   bool swapped; /* the state named second is the fuller one */
-} evidence;
+} scan_data;
 
 static void begin(void *chosen) {
   static const double supine[3] = {0.0, 1.0, 0.0};
@@ -125,10 +125,10 @@ static supine_status print(const supine_patient_record *record, const char *made
   return SUPINE_OK;
 }
 
-static void evidence_free(evidence *of) {
-  supine_lungs_free(&of->lungs[0]);
-  supine_lungs_free(&of->lungs[1]);
-  supine_patient_pairs_free(&of->pairs);
+static void scan_data_free(scan_data *data) {
+  supine_lungs_free(&data->lungs[0]);
+  supine_lungs_free(&data->lungs[1]);
+  supine_patient_pairs_free(&data->pairs);
 }
 
 /* Return the volume of lungs, mL; 0 without a surface. */
@@ -165,21 +165,21 @@ static supine_status load_pairs(const request *wanted, const char *path,
   return status == SUPINE_OK ? supine_patient_pairs_check(pairs, moved, error) : status;
 }
 
-static supine_status load_evidence(const request *wanted, evidence *of, supine_error *error) {
+static supine_status load_scans(const request *wanted, scan_data *data, supine_error *error) {
   supine_status status = SUPINE_OK;
   if (wanted->landmarks.path != NULL) {
-    status = load_pairs(wanted, wanted->landmarks.path, &of->pairs, error);
+    status = load_pairs(wanted, wanted->landmarks.path, &data->pairs, error);
   }
   if (status == SUPINE_OK && wanted->rest_path != NULL) {
     status =
-        supine_command_load_lungs(name, wanted->rest_path, &wanted->source, &of->lungs[0], error);
+        supine_command_load_lungs(name, wanted->rest_path, &wanted->source, &data->lungs[0], error);
   }
   if (status == SUPINE_OK && wanted->state_path != NULL) {
-    status =
-        supine_command_load_lungs(name, wanted->state_path, &wanted->source, &of->lungs[1], error);
+    status = supine_command_load_lungs(name, wanted->state_path, &wanted->source, &data->lungs[1],
+                                       error);
   }
-  if (status == SUPINE_OK && wanted->rest_path != NULL && of->pairs.count > 0) {
-    status = find_sides(&of->lungs[0], &of->pairs, error);
+  if (status == SUPINE_OK && wanted->rest_path != NULL && data->pairs.count > 0) {
+    status = find_sides(&data->lungs[0], &data->pairs, error);
   }
   return status;
 }
@@ -200,13 +200,13 @@ static int named_order(const supine_state *first, const supine_state *second) {
 
 /* Find which of the two states is fuller, by the volumes of the surfaces or the spread of the
  * landmarks. If it is the second, exchange the surfaces and landmarks of the two. */
-static supine_status order_states(const request *wanted, evidence *of, supine_error *error) {
+static supine_status order_states(const request *wanted, scan_data *data, supine_error *error) {
   static const double doubt =
       0.02; /* relative difference of volumes that is not yet a contradiction */
-  const double volume[2] = {volume_of(&of->lungs[0]), volume_of(&of->lungs[1])};
+  const double volume[2] = {volume_of(&data->lungs[0]), volume_of(&data->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
-                        : of->pairs.count > 0              ? supine_patient_pairs_growth(&of->pairs)
-                                                           : 1.0;
+                        : data->pairs.count > 0 ? supine_patient_pairs_growth(&data->pairs)
+                                                : 1.0;
   const int named = named_order(&wanted->rest, &wanted->state);
   if ((named > 0 && growth < 1.0 - doubt) || (named < 0 && growth > 1.0 + doubt)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -214,14 +214,14 @@ static supine_status order_states(const request *wanted, evidence *of, supine_er
                             "exchange --rest and --other, or give --reverse",
                             100.0 * (named > 0 ? growth : 1.0 / growth));
   }
-  of->swapped = named > 0 || (named == 0 && growth > 1.0);
-  if (of->swapped) {
-    const supine_lungs lungs = of->lungs[0];
-    of->lungs[0] = of->lungs[1];
-    of->lungs[1] = lungs;
-    double *from = of->pairs.from;
-    of->pairs.from = of->pairs.to;
-    of->pairs.to = from;
+  data->swapped = named > 0 || (named == 0 && growth > 1.0);
+  if (data->swapped) {
+    const supine_lungs lungs = data->lungs[0];
+    data->lungs[0] = data->lungs[1];
+    data->lungs[1] = lungs;
+    double *from = data->pairs.from;
+    data->pairs.from = data->pairs.to;
+    data->pairs.to = from;
   }
   return SUPINE_OK;
 }
@@ -245,7 +245,7 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
 
 /* Fit a further state. Its landmarks start in the first scan: move them to the fuller state where
  * the first is the emptier one. */
-static supine_status fit_further(const request *wanted, const evidence *of, size_t which,
+static supine_status fit_further(const request *wanted, const scan_data *data, size_t which,
                                  const supine_lungs *from, supine_patient_record *record,
                                  supine_error *error) {
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
@@ -258,8 +258,8 @@ static supine_status fit_further(const request *wanted, const evidence *of, size
   supine_status status =
       landmarks ? load_pairs(wanted, path, &pairs, error)
                 : supine_command_load_lungs(name, path, &wanted->source, &lungs, error);
-  if (status == SUPINE_OK && landmarks && of->swapped) {
-    supine_patient_refer(&record->patient, pairs.count, pairs.from);
+  if (status == SUPINE_OK && landmarks && data->swapped) {
+    supine_patient_points_to_fuller(&record->patient, pairs.count, pairs.from);
   }
   if (status == SUPINE_OK) {
     status = supine_patient_gain_fit(record, from, landmarks ? &pairs : NULL,
@@ -271,19 +271,19 @@ static supine_status fit_further(const request *wanted, const evidence *of, size
 }
 
 /* Fit the gravity-dependent share of the force to the further states. */
-static supine_status find_gain(const request *wanted, evidence *of, supine_patient_record *record,
-                               supine_error *error) {
-  supine_lungs *from = &of->lungs[0];
+static supine_status find_gain(const request *wanted, scan_data *data,
+                               supine_patient_record *record, supine_error *error) {
+  supine_lungs *from = &data->lungs[0];
   supine_status status = SUPINE_OK;
   if (from->mesh.vertex_count == 0) { /* only the emptier scan has a surface */
-    from = &of->lungs[1];
-    supine_patient_refer(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
+    from = &data->lungs[1];
+    supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_mesh_box(&from->mesh, from->minimum, from->maximum);
   }
   for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
-    status = fit_further(wanted, of, k, from, record, error);
+    status = fit_further(wanted, data, k, from, record, error);
   }
-  supine_patient_gain_take(record);
+  supine_patient_gain_set(record);
   return status;
 }
 
@@ -304,13 +304,14 @@ static void complete_state(supine_patient_record *record, size_t k) {
   }
 }
 
-static void keep_states(const request *wanted, const evidence *of, supine_patient_record *record) {
+static void set_states(const request *wanted, const scan_data *data,
+                       supine_patient_record *record) {
   record->from_surface = wanted->state_path != NULL;
-  record->state[of->swapped ? 1 : 0] = wanted->rest;
-  record->state[of->swapped ? 0 : 1] = wanted->state;
+  record->state[data->swapped ? 1 : 0] = wanted->rest;
+  record->state[data->swapped ? 0 : 1] = wanted->state;
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *volume = &record->state[k].volume;
-    record->volume[k] = volume_of(&of->lungs[k]);
+    record->volume[k] = volume_of(&data->lungs[k]);
     if (record->volume[k] == 0.0 && volume->kind == SUPINE_VOLUME_ABSOLUTE) {
       record->volume[k] = volume->ml;
     }
@@ -318,11 +319,11 @@ static void keep_states(const request *wanted, const evidence *of, supine_patien
   complete_state(record, 0);
   complete_state(record, 1);
   if (record->from_surface) {
-    memcpy(record->emptier[0], of->lungs[1].minimum, sizeof record->emptier[0]);
-    memcpy(record->emptier[1], of->lungs[1].maximum, sizeof record->emptier[1]);
+    memcpy(record->emptier[0], data->lungs[1].minimum, sizeof record->emptier[0]);
+    memcpy(record->emptier[1], data->lungs[1].maximum, sizeof record->emptier[1]);
   } else {
     const supine_patient_frame frame =
-        supine_patient_frame_of_points(of->pairs.count, of->pairs.to, NULL);
+        supine_patient_frame_of_points(data->pairs.count, data->pairs.to, NULL);
     memcpy(record->emptier[0], frame.minimum, sizeof record->emptier[0]);
     memcpy(record->emptier[1], frame.maximum, sizeof record->emptier[1]);
   }
@@ -350,7 +351,7 @@ static void warn_of_rest(const supine_patient_record *record) {
 }
 
 /* Set the name, and the force with the gain of the law deep. */
-static void keep(const request *wanted, supine_patient_record *record) {
+static void set_name_and_force(const request *wanted, supine_patient_record *record) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   const char *source = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->state_path;
   const char *slash = strrchr(source, '/');
@@ -364,35 +365,35 @@ static void keep(const request *wanted, supine_patient_record *record) {
 
 static supine_status fit(const request *wanted, supine_patient_record *record,
                          supine_error *error) {
-  supine_patient_fit_options options = {.law = (supine_patient_law)wanted->law,
-                                        .moved = wanted->landmarks.rigid ? SUPINE_PATIENT_RIGID
-                                                 : wanted->landmarks.translation
-                                                     ? SUPINE_PATIENT_TRANSLATION
+  supine_patient_fit_options options = {
+      .law = (supine_patient_law)wanted->law,
+      .scan_motion = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
+                     : wanted->landmarks.translation ? SUPINE_PATIENT_TRANSLATION
                                                      : SUPINE_PATIENT_STILL};
-  evidence of = {0};
+  scan_data data = {0};
   double gains[2][3];
-  supine_status status = load_evidence(wanted, &of, error);
+  supine_status status = load_scans(wanted, &data, error);
   if (status == SUPINE_OK) {
-    status = order_states(wanted, &of, error);
+    status = order_states(wanted, &data, error);
   }
   if (status == SUPINE_OK) {
-    keep_states(wanted, &of, record);
+    set_states(wanted, &data, record);
     memcpy(options.gravity, record->state[1].gravity, sizeof options.gravity);
     warn_of_rest(record);
     supine_patient_path(record, gains);
     for (size_t k = 0; k < 3; ++k) {
-      options.way[k] = gains[1][k] - gains[0][k];
+      options.path_span[k] = gains[1][k] - gains[0][k];
     }
     status = wanted->state_path != NULL
-                 ? supine_patient_fit_surface(&of.lungs[0], &of.lungs[1].mesh, &of.pairs, &options,
-                                              wanted->expandability, record, error)
-                 : fit_landmarks(wanted, &of.pairs, &options, record, error);
+                 ? supine_patient_fit_surface(&data.lungs[0], &data.lungs[1].mesh, &data.pairs,
+                                              &options, wanted->expandability, record, error)
+                 : fit_landmarks(wanted, &data.pairs, &options, record, error);
   }
   if (status == SUPINE_OK) {
-    keep(wanted, record);
-    status = find_gain(wanted, &of, record, error);
+    set_name_and_force(wanted, record);
+    status = find_gain(wanted, &data, record, error);
   }
-  evidence_free(&of);
+  scan_data_free(&data);
   return status;
 }
 

@@ -43,7 +43,7 @@ typedef struct supine_command_outcome {
 
 typedef struct supine_command_subject {
   supine_basis *basis;
-  supine_patient_moved moved; /* motion between the scans that is removed */
+  supine_patient_scan_motion moved; /* motion between the scans that is removed */
   supine_command_state from;
   double from_scale, from_millilitres; /* gain and volume of the state that motion starts from */
   supine_mesh rest;                    /* surface that motion starts from */
@@ -84,7 +84,7 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
  * @param predicted  [count, 3] where the pairs' first points were predicted to go
  * @retval SUPINE_ERROR_NUMERICAL (all in one plane), SUPINE_ERROR_MEMORY */
 supine_status supine_command_compare_points(
-    const supine_patient_pairs *pairs, const double *predicted, supine_patient_moved moved,
+    const supine_patient_pairs *pairs, const double *predicted, supine_patient_scan_motion moved,
     supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error);
 
 /* Compute distances between surfaces of any meshing, of the vertices of each to the other surface.
@@ -96,7 +96,7 @@ supine_status supine_command_compare_points(
  * @retval SUPINE_ERROR_MESH  as supine_patient_check_boxes
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status
-supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_moved moved,
+supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_scan_motion moved,
                                 double *predicted, const supine_mesh *state, double *nearest,
                                 supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
                                 supine_error *error);

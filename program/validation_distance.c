@@ -28,7 +28,7 @@ static void summarise(double *distances, size_t count, supine_command_distance *
   of->largest = distances[count - 1];
 }
 
-static void explain(supine_patient_moved moved,
+static void explain(supine_patient_scan_motion moved,
                     supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT]) {
   const double none = distance[moved == SUPINE_PATIENT_STILL ? SUPINE_PATIENT_MAP_NONE
                                                              : SUPINE_PATIENT_MAP_TRANSLATION]
@@ -39,7 +39,7 @@ static void explain(supine_patient_moved moved,
 }
 
 /* Choose the map to fit: for the prediction, the one that removes the motion between the scans. */
-static supine_patient_map map_of(int kind, supine_patient_moved moved) {
+static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID
          : moved == SUPINE_PATIENT_TRANSLATION ? SUPINE_PATIENT_MAP_TRANSLATION
@@ -52,7 +52,7 @@ static supine_status undetermined(supine_error *error) {
 }
 
 supine_status supine_command_compare_points(
-    const supine_patient_pairs *pairs, const double *predicted, supine_patient_moved moved,
+    const supine_patient_pairs *pairs, const double *predicted, supine_patient_scan_motion moved,
     supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT], supine_error *error) {
   double *space = malloc(pairs->count * sizeof *space);
   if (space == NULL) {
@@ -130,7 +130,7 @@ static bool settle(supine_patient_map kind, size_t n, const double *vertices,
 }
 
 supine_status
-supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_moved moved,
+supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_scan_motion moved,
                                 double *predicted, const supine_mesh *state, double *nearest,
                                 supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
                                 supine_error *error) {

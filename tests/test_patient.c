@@ -16,9 +16,9 @@
 
 /* Fit pairs as the command does. */
 static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
-                      supine_patient_moved moved, supine_patient *patient,
+                      supine_patient_scan_motion moved, supine_patient *patient,
                       supine_patient_fit_report *report) {
-  const supine_patient_fit_options options = {.law = law, .moved = moved};
+  const supine_patient_fit_options options = {.law = law, .scan_motion = moved};
   supine_patient_row *rows = malloc(3 * pairs->count * sizeof *rows);
   supine_error error;
   assert_non_null(rows);
@@ -161,8 +161,8 @@ TEST(test_correct_fitted_points_match_prediction) {
     const supine_patient_place place = supine_patient_find(&found.frame, pairs.from + 3 * i, 0.0);
     supine_patient_motion(&found.power, &place, motion);
     for (size_t k = 0; k < 3; ++k) {
-      const double left = pairs.from[3 * i + k] + u[k] + motion[k] - pairs.to[3 * i + k];
-      square += left * left / (double)pairs.count;
+      const double residual = pairs.from[3 * i + k] + u[k] + motion[k] - pairs.to[3 * i + k];
+      square += residual * residual / (double)pairs.count;
     }
   }
   assert_true(found.centre_count == pairs.count);
@@ -187,7 +187,7 @@ TEST(test_find_side_given_overrides_midline) {
 }
 
 /* Points of the emptier state are mapped back to the fuller one. */
-TEST(test_refer_moved_points_returned) {
+TEST(test_points_to_fuller_moved_points_returned) {
   supine_patient_pairs pairs = scatter(60, 12);
   supine_patient truth = known(&pairs);
   for (size_t k = 0; k < 3; ++k) {
@@ -198,7 +198,7 @@ TEST(test_refer_moved_points_returned) {
   for (size_t i = 0; i < 3 * pairs.count; ++i) {
     pairs.to[i] += truth.power.motion[i % 3];
   }
-  supine_patient_refer(&truth, pairs.count, pairs.to);
+  supine_patient_points_to_fuller(&truth, pairs.count, pairs.to);
   for (size_t i = 0; i < 3 * pairs.count; ++i) {
     assert_true(fabs(pairs.to[i] - pairs.from[i]) < 1e-3);
   }
@@ -246,7 +246,7 @@ TEST(test_power_design_each_unknown_matches_difference) {
     static const double motion[6] = {1.5, -2.5, 3.5, 0.1, 0.2, -0.3};
     law.c[2] = -law.c[2];
     memcpy(law.motion, motion, sizeof motion);
-    const double left = supine_patient_power_design(&law, &rows[i], x);
+    const double residual = supine_patient_power_design(&law, &rows[i], x);
     for (size_t t = 0; t < SUPINE_PATIENT_TERMS; ++t) {
       supine_patient_power other = law;
       for (size_t a = 0; a < 3; ++a) {
@@ -258,7 +258,7 @@ TEST(test_power_design_each_unknown_matches_difference) {
       }
       double unused[SUPINE_PATIENT_TERMS];
       const double difference =
-          (supine_patient_power_design(&other, &rows[i], unused) - left) / step;
+          (supine_patient_power_design(&other, &rows[i], unused) - residual) / step;
       assert_true(fabs(x[t] - difference) < 1e-4 * (1.0 + fabs(difference)));
     }
   }
@@ -329,7 +329,7 @@ TEST(test_pairs_check_impossible_pairs_refused) {
   }
   refused(&pairs, false, "in cm");
   memcpy(pairs.to, pairs.from, 3 * n * sizeof(double));
-  refused(&pairs, false, "the same as rest");
+  refused(&pairs, false, "the two states are the same");
   for (size_t i = 0; i < n; ++i) {
     pairs.to[3 * i + 2] += 5.0;
   }
@@ -400,7 +400,7 @@ TEST(test_fit_fewer_points_than_unknowns_refused) {
   supine_patient_pairs pairs = scatter(14, 3);
   const supine_patient truth = known(&pairs);
   const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER,
-                                              .moved = SUPINE_PATIENT_RIGID};
+                                              .scan_motion = SUPINE_PATIENT_RIGID};
   supine_patient patient = {.frame = truth.frame};
   supine_patient_fit_report report;
   supine_patient_row *rows = malloc(3 * pairs.count * sizeof *rows);
@@ -428,8 +428,8 @@ TEST(test_record_written_and_read_same) {
   supine_patient_record before = record_of(&patient);
   before.stiffness =
       (supine_patient_stiffness){.count = 2,
-                                 .mode = {{1.0, 1.0 / 3.0, {1.0, -2.0, 0.1}, 61.7, 0.0},
-                                          {-1.0, 0.2, {7.0, 8.0, 9.0}, 40.0, 1.0}}};
+                                 .region = {{1.0, 1.0 / 3.0, {1.0, -2.0, 0.1}, 61.7, 0.0},
+                                            {-1.0, 0.2, {7.0, 8.0, 9.0}, 40.0, 1.0}}};
   static supine_patient_record after;
   supine_error error;
   assert_int_equal(supine_patient_write(path, &before, "test", &error), SUPINE_OK);
@@ -442,7 +442,8 @@ TEST(test_record_written_and_read_same) {
                       2 * sizeof(supine_patient_centre));
   assert_memory_equal(&before.force, &after.force, offsetof(supine_force_law, soften));
   assert_int_equal(after.stiffness.count, 2);
-  assert_memory_equal(before.stiffness.mode, after.stiffness.mode, 2 * sizeof(supine_patient_mode));
+  assert_memory_equal(before.stiffness.region, after.stiffness.region,
+                      2 * sizeof(supine_patient_region));
   assert_memory_equal(before.state, after.state, sizeof before.state);
   assert_memory_equal(before.volume, after.volume, sizeof before.volume);
   assert_memory_equal(before.emptier, after.emptier, sizeof before.emptier);
@@ -581,11 +582,11 @@ TEST(test_gain_third_scan_recovers_it) {
     memcpy(other->state.gravity, g, sizeof other->state.gravity);
     assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, moved, other, &error),
                      SUPINE_OK);
-    supine_patient_gain_take(&record);
+    supine_patient_gain_set(&record);
     printf("gain %.2f found %.3f +- %.3f, scales %.3f %.3f, residual %.2f mm, %.2f without\n", gain,
            record.force.gain, record.gain_error, other->scale[0], other->scale[1], other->residual,
            other->residual_without_gain);
-    assert_false(record.gain_open);
+    assert_false(record.gain_undetermined);
     assert_true(fabs(record.force.gain - gain) <= 3.0 * record.gain_error);
     assert_true(record.gain_error < 0.1);
     assert_true(fabs(other->scale[0] - scale[0]) < 0.03);
@@ -600,7 +601,7 @@ TEST(test_gain_third_scan_recovers_it) {
   assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, false, other, &error),
                    SUPINE_OK);
   assert_false(other->fits_gain);
-  supine_patient_gain_take(&record);
+  supine_patient_gain_set(&record);
   assert_true(record.force.gain == kept);
   supine_patient_pairs_free(&pairs);
 }

@@ -246,7 +246,7 @@ refused 1 'name that of the first scan' fit --landmarks full.csv --state prone:r
 refused 1 'rest+500' fit --landmarks full.csv --other supine:500
 refused 2 'exchange --rest and --other' fit p_supine_full.ply p_supine_rest.ply --other supine:full
 refused 2 'exchange --rest and --other' fit --landmarks empty.csv --other supine:full
-refused 2 'the same as the one at rest' fit rest.ply rest.ply
+refused 2 'the two surfaces are the same' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
   '--reach 10'; do
   refused 1 'has its own law and force' precompute p.ply --patient points.json $beside \

@@ -189,7 +189,7 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
     double share = 0.0;
     supine_patient_stiffness_shares(&found.stiffness, rest, i, shares);
     for (size_t k = 0; k < found.stiffness.count; ++k) {
-      share += shares[k] * found.stiffness.mode[k].seen;
+      share += shares[k] * found.stiffness.region[k].seen;
     }
     if (share >= SUPINE_PATIENT_SEEN) {
       const double miss = log(is[i]) - mean[1] - log(should[i]) + mean[0];

@@ -53,7 +53,7 @@ refused 2 'differ by a reflection' --landmarks sides.csv
 changed ras '$4 = -$4; $5 = -$5'
 refused 2 'give both in LPS axes' --landmarks ras.csv --translation
 changed same '$4 = $1; $5 = $2; $6 = $3'
-refused 2 'the same as rest' --landmarks same.csv
+refused 2 'the two states are the same' --landmarks same.csv
 changed shifted '$4 = $1; $5 = $2; $6 = $3 + 5'
 refused 2 'give a state in which the lungs have moved' --landmarks shifted.csv --translation
 changed flat '$2 = 17 + 0.3 * $1; $5 = $2 - 3'
@@ -69,7 +69,7 @@ head -12 good.csv >eleven.csv
 refused 2 'pairs of points: 11, where a law needs at least 12' --landmarks eleven.csv
 refused 2 'pairs of points: 11' --landmarks good.csv --state prone:rest:eleven.csv
 head -15 good.csv >few.csv
-refused 2 '14 points are fewer than the 15 unknowns of the paper law' --landmarks few.csv --law paper --rigid
+refused 2 'points: 14, fewer than the 15 unknowns of the paper law' --landmarks few.csv --law paper --rigid
 refused 1 'takes deep or paper' --landmarks good.csv --law quadratic
 head -1 good.csv >none.csv
 refused 2 'no pairs of points' --landmarks none.csv
@@ -98,7 +98,7 @@ moved() { # NAME AWK: the lung with its vertices changed
 }
 moved state 'y *= 1.05; z *= 1.08'
 "$supine" fit rest.obj state.obj -o good.json >/dev/null || fail "good surfaces"
-refused 2 'the same as the one at rest' rest.obj rest.obj
+refused 2 'the two surfaces are the same' rest.obj rest.obj
 moved far 'z += 400'
 refused 2 'do not overlap along z' rest.obj far.obj
 refused 2 'do not overlap along x' rest.obj other.obj

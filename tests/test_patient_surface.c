@@ -88,7 +88,8 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   assert_true(sqrt(square) <= 0.15);
   /* The force is recovered without use of (18): supine, its heights are 1 - Y. */
   const supine_patient_applied *applied = &fit.applied;
-  printf("force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f, "
+  printf("force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, residual "
+         "%.3f, "
          "%.0f blocks\n",
          applied->correlation, applied->slopes[0], applied->slopes[1], applied->slopes[2],
          applied->spread, applied->residual, applied->blocks);
@@ -175,7 +176,7 @@ static void slide(const supine_lungs *lungs, const supine_patient_power *law, un
     double u[3];
     supine_patient_direction(law, &place, supine_patient_force_at(law, &place), u);
     centre[i] = (supine_patient_centre){.side = place.side, .size = supine_length(u)};
-    memcpy(centre[i].at, place.arm, sizeof centre[i].at);
+    memcpy(centre[i].offset, place.offset, sizeof centre[i].offset);
     for (size_t j = 0; j <= i; ++j) {
       factor[i * n + j] = supine_patient_covariance(&centre[i], &centre[j]) + (i == j ? 1e-6 : 0.0);
     }
@@ -277,7 +278,7 @@ TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
         supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error),
         SUPINE_OK);
     found[k] = fit.applied.correlation;
-    printf("correlation %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, left %.3f\n",
+    printf("correlation %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, residual %.3f\n",
            fit.applied.correlation, fit.applied.slopes[0], fit.applied.slopes[1],
            fit.applied.slopes[2], fit.applied.spread, fit.applied.residual);
     assert_true(fit.applied.residual < 0.1 * fit.applied.spread);
@@ -347,7 +348,7 @@ TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
   moved.vertices = malloc(3 * moved.vertex_count * sizeof(double));
   const size_t n = 3 * moved.vertex_count;
   memcpy(moved.vertices, rest.mesh.vertices, n * sizeof(double));
-  refused(&rest, &moved, "the same as the one at rest");
+  refused(&rest, &moved, "the two surfaces are the same");
   for (size_t i = 0; i < n; ++i) {
     moved.vertices[i] = 0.1 * rest.mesh.vertices[i];
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the force that a measured displacement implies. */
+/* Compute the applied force that a measured displacement implies. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,20 +13,19 @@
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
-/* Length of a direction over the RMS length below which its share of the force is damped. */
+/* Length of a direction, relative to the RMS length, below which its force is damped. */
 static const double damped_below = 0.1;
 
-/* Find the spread force [N]: the law's, corrected by the remaining distance to the other surface
- * along its normal. */
+/* Compute the spread force [N] of the law, corrected by the remaining distance of each match. */
 static void find_spread_force(supine_patient_matching *m, const supine_patient *patient,
                               double *spread) {
   supine_patient law = *patient;
-  double softener = 0.0; /* mm^2 */
+  double damping = 0.0; /* mm^2 */
   double d[3];
   law.centre_count = 0;
   for (size_t v = 0; v < m->count; ++v) {
     supine_patient_direction(&law.power, &m->rows[v].place, 1.0, d);
-    softener += damped_below * damped_below * supine_dot(d, d) / (double)m->count;
+    damping += damped_below * damped_below * supine_dot(d, d) / (double)m->count;
   }
   (void)supine_patient_matching_place(m, &law);
   supine_patient_matching_find(m);
@@ -35,19 +34,20 @@ static void find_spread_force(supine_patient_matching *m, const supine_patient *
     supine_patient_direction(&law.power, &row->place, 1.0, d);
     spread[v] = supine_patient_force_at(&law.power, &row->place) +
                 row->weight * m->match[v].distance * supine_dot(row->axis, d) /
-                    (supine_dot(d, d) + softener);
+                    (supine_dot(d, d) + damping);
   }
 }
 
-/* Sum over blocks, weighted by area, the products of the blocks' means of: the columns of (18), the
- * height along gravity, and the force. */
+/* Compute means over each block of the terms of (18), the height along gravity and the force. Sum
+ * the products of the means over the blocks, weighted by area. */
 static void add_blocks(const supine_patient_matching *m, const double *force,
                        const double gravity[3], const double *vertex_area, size_t blocks,
                        double *means, double products[ALL * ALL]) {
   memset(means, 0, (ALL + 1) * blocks * sizeof *means);
   for (size_t v = 0; v < m->count; ++v) {
-    double *mean = means + (ALL + 1) * m->rows[v].block; /* and the block's area */
-    cblas_daxpy(COLUMNS, vertex_area[v], m->columns + COLUMNS * v, 1, mean, 1);
+    double *mean = means + (ALL + 1) * m->rows[v].block; /* its last element: the area */
+    const supine_patient_place place = supine_patient_find_vertex(m->rest, v);
+    cblas_daxpy(COLUMNS, vertex_area[v], place.force, 1, mean, 1);
     mean[HEIGHT] += vertex_area[v] * supine_dot(gravity, m->rest->mesh.vertices + 3 * v);
     mean[FORCE] += vertex_area[v] * force[v];
     mean[ALL] += vertex_area[v];
@@ -59,13 +59,14 @@ static void add_blocks(const supine_patient_matching *m, const double *force,
   }
 }
 
-/* Return the covariance of two quantities from the products with 1, the first column. */
+/* Compute the covariance of quantities a and b; quantity 0 is the constant 1. */
 static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
   return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
 }
 
-/* Fit (18) to the blocks' force by least squares weighted by area, and find the residual. */
-static bool conclude(const double products[ALL * ALL], supine_patient_applied *applied) {
+/* Fit (18) to the force of the blocks by least squares; return false if they do not determine it.
+ */
+static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied *applied) {
   double matrix[ALL * ALL];
   double k[COLUMNS];
   memcpy(matrix, products, sizeof matrix);
@@ -94,33 +95,32 @@ static bool conclude(const double products[ALL * ALL], supine_patient_applied *a
 supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           const supine_patient *patient, const double gravity[3],
                                           supine_patient_applied *applied, supine_error *error) {
-  supine_patient_matching *m = matching;
-  const size_t n = m->rest->mesh.vertex_count;
+  const size_t n = matching->rest->mesh.vertex_count;
   double products[ALL * ALL];
-  double *caught = malloc(2 * n * sizeof *caught);
+  double *spread = malloc(2 * n * sizeof *spread);
   double *means = malloc((ALL + 1) * n * sizeof *means);
   supine_status status =
-      caught == NULL || means == NULL
+      spread == NULL || means == NULL
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n)
           : SUPINE_OK;
   if (status == SUPINE_OK) {
-    supine_patient_matching_choose(m, n);
-    find_spread_force(m, patient, caught);
-    status = supine_physics_equilibrium_force(m->equilibrium, caught, caught + n, error);
+    supine_patient_matching_choose(matching, n);
+    find_spread_force(matching, patient, spread);
+    status = supine_physics_equilibrium_force(matching->equilibrium, spread, spread + n, error);
   }
   if (status == SUPINE_OK) {
-    const size_t blocks = supine_patient_rows_block(&m->frame, m->rows, n, 1);
+    const size_t blocks = supine_patient_rows_block(&matching->frame, matching->rows, n, 1);
     applied->blocks = (double)blocks;
-    supine_mesh_vertex_area(&m->rest->mesh, caught);
-    add_blocks(m, caught + n, gravity, caught, blocks, means, products);
-    if (!conclude(products, applied)) {
+    supine_mesh_vertex_area(&matching->rest->mesh, spread);
+    add_blocks(matching, spread + n, gravity, spread, blocks, means, products);
+    if (!fit_blocks(products, applied)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
           "the displacement along the law's directions does not determine the force: check "
           "that both surfaces are of the same whole lungs");
     }
   }
-  free(caught);
+  free(spread);
   free(means);
   return status;
 }

@@ -1,34 +1,37 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit expandability to motion, and test whether it improves the prediction of held-out blocks. */
+/* Fit the expandability of regions, and test if it improves the prediction of held-out blocks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cblas.h>
 
 #include "precompute/patient/matching.h"
 
 #include "sh/base/vec3.h"
 
-static const double apart = 35.0; /* largest distance of a vertex from the nearest centre, mm */
-static const double overlapping = 1.5; /* radius of a region over that distance */
+/* Largest distance of a vertex from the nearest centre of a region, mm. */
+static const double distance_most = 35.0;
+static const double radius_over_distance = 1.5;
 
 enum {
-  CANDIDATES = 8192, /* most vertices considered as centres */
-  LANES = 16,        /* regions solved for at once */
-  ROUNDS = 5         /* rounds of fitting and of finding the nearest points */
+  CANDIDATES = 8192, /* largest number of vertices tried as centres */
+  LANES = 16,        /* number of regions solved for together */
+  ROUNDS = 5         /* rounds of fitting and matching */
 };
 
-static const double neighbours_differ = 0.3; /* prior deviation of the factors of neighbours */
-static const double regions_differ = 1.0;    /* prior deviation of a region's factor from 1 */
-static const double noise_least = 0.3;       /* least noise of a surface point, mm */
-static const double together = 10.0;         /* rows with a common error, which count as one */
+/* Prior standard deviation of the expandability from that of a neighbouring region, and from 1. */
+static const double neighbour_deviation = 0.3;
+static const double region_deviation = 1.0;
 
-static const double near_by = 1.7; /* largest distance of neighbouring centres over the least one */
-static const double worth =
-    0.95; /* largest held-out RMS with regions over that without at which they are kept */
+static const double noise_least = 0.3;     /* lower bound on the noise of a row, mm */
+static const double rows_per_error = 10.0; /* number of rows with a common error */
 
-/* Find the vertex of a side farthest from the regions, and its distance, mm. */
+/* Largest distance of neighbouring centres over the smallest distance of any two centres. */
+static const double neighbour_ratio = 1.7;
+
+/* Largest held-out error with the regions, over that of uniform tissue, at which they are kept. */
+static const double kept_ratio = 0.95;
+
+/* Find the vertex of a side that is farthest from all centres, and its distance, mm. */
 static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
                        int side, double *distance) {
   size_t found = 0;
@@ -37,9 +40,9 @@ static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness
   for (size_t i = 0; i < lungs->mesh.vertex_count; i += step) {
     double nearest = supine_patient_side_of(lungs, i) == side ? INFINITY : 0.0;
     for (size_t k = 0; k < stiffness->count; ++k) {
-      if (stiffness->mode[k].side == side) {
-        nearest =
-            fmin(nearest, supine_distance(stiffness->mode[k].centre, lungs->mesh.vertices + 3 * i));
+      if (stiffness->region[k].side == side) {
+        nearest = fmin(nearest,
+                       supine_distance(stiffness->region[k].centre, lungs->mesh.vertices + 3 * i));
       }
     }
     if (nearest > *distance) {
@@ -50,47 +53,47 @@ static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness
   return found;
 }
 
-/* Spread regions with a = 1 over the lungs' surface, some 45 mm apart. */
-static void spread_regions(const supine_lungs *lungs, supine_patient_stiffness *stiffness) {
+/* Distribute regions over the surface, with centres about 45 mm apart and expandability 1. */
+static void place_regions(const supine_lungs *lungs, supine_patient_stiffness *stiffness) {
   *stiffness = (supine_patient_stiffness){0};
   for (int side = 1; side >= -1; side -= 2) {
     const size_t first = stiffness->count;
     double distance;
     size_t vertex = farthest(lungs, stiffness, side, &distance);
-    while (distance > apart && stiffness->count - first < SUPINE_PATIENT_REGIONS_MAX / 2) {
-      supine_patient_mode *mode = &stiffness->mode[stiffness->count++];
-      *mode = (supine_patient_mode){.side = side, .value = 1.0};
-      memcpy(mode->centre, lungs->mesh.vertices + 3 * vertex, sizeof mode->centre);
+    while (distance > distance_most && stiffness->count - first < SUPINE_PATIENT_REGIONS_MAX / 2) {
+      supine_patient_region *region = &stiffness->region[stiffness->count++];
+      *region = (supine_patient_region){.side = side, .value = 1.0};
+      memcpy(region->centre, lungs->mesh.vertices + 3 * vertex, sizeof region->centre);
       vertex = farthest(lungs, stiffness, side, &distance);
     }
     for (size_t k = first; k < stiffness->count; ++k) {
-      stiffness->mode[k].radius = overlapping * distance;
+      stiffness->region[k].radius = radius_over_distance * distance;
     }
   }
 }
 
-/* Compute the prior precision [count, count] of a - 1. */
+/* Compute the prior precision [count, count] of the expandability of the regions. */
 static void find_precision(const supine_patient_stiffness *regions, double *precision) {
-  const supine_patient_mode *mode = regions->mode;
+  const supine_patient_region *region = regions->region;
   const size_t n = regions->count;
   double nearest = INFINITY;
   for (size_t i = 0; i < n * n; ++i) {
-    const double distance = supine_distance(mode[i / n].centre, mode[i % n].centre);
+    const double distance = supine_distance(region[i / n].centre, region[i % n].centre);
     nearest = i / n != i % n ? fmin(nearest, distance) : nearest;
-    precision[i] = i / n == i % n ? pow(regions_differ, -2.0) : 0.0;
+    precision[i] = i / n == i % n ? pow(region_deviation, -2.0) : 0.0;
   }
   for (size_t i = 0; i < n * n; ++i) {
     const size_t j = i / n;
     const size_t k = i % n;
-    if (j != k && mode[j].side == mode[k].side &&
-        supine_distance(mode[j].centre, mode[k].centre) < near_by * nearest) {
-      precision[j * n + j] += pow(neighbours_differ, -2.0);
-      precision[i] -= pow(neighbours_differ, -2.0);
+    if (j != k && region[j].side == region[k].side &&
+        supine_distance(region[j].centre, region[k].centre) < neighbour_ratio * nearest) {
+      precision[j * n + j] += pow(neighbour_deviation, -2.0);
+      precision[i] -= pow(neighbour_deviation, -2.0);
     }
   }
 }
 
-/* Solve for the force on each region alone, LANES at a time. */
+/* Solve for the spread force due to each region of expandability 1: response [rows, regions]. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,
                                     const double gravity[3], double *response,
@@ -99,10 +102,10 @@ static supine_status find_responses(const supine_patient_matching *m,
   const size_t n = m->rest->mesh.vertex_count;
   double range[2];
   double *force = malloc(n * sizeof *force);
-  double *alone = malloc(n * LANES * sizeof *alone);
-  double *caught = malloc(n * LANES * sizeof *caught);
+  double *region_force = malloc(n * LANES * sizeof *region_force);
+  double *spread_force = malloc(n * LANES * sizeof *spread_force);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (force == NULL || alone == NULL || caught == NULL ||
+  if (force == NULL || region_force == NULL || spread_force == NULL ||
       supine_physics_height_range(m->rest, model.force.pair, 1, gravity, range, range + 1) !=
           SUPINE_OK) {
     (void)supine_error_set(error, status, "no memory for %zu vertices", n);
@@ -117,23 +120,24 @@ static supine_status find_responses(const supine_patient_matching *m,
       double shares[SUPINE_PATIENT_REGIONS_MAX];
       supine_patient_stiffness_shares(regions, m->rest, i, shares);
       for (size_t r = 0; r < lanes; ++r) {
-        alone[i * lanes + r] = force[i] * shares[first + r];
+        region_force[i * lanes + r] = force[i] * shares[first + r];
       }
     }
-    status = supine_physics_equilibrium_solve(m->equilibrium, lanes, alone, caught, error);
+    status =
+        supine_physics_equilibrium_solve(m->equilibrium, lanes, region_force, spread_force, error);
     for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
-      memcpy(response + i * regions->count + first, caught + m->match[i].vertex * lanes,
-             lanes * sizeof *caught);
+      memcpy(response + i * regions->count + first, spread_force + m->match[i].vertex * lanes,
+             lanes * sizeof *spread_force);
     }
   }
 cleanup:
   free(force);
-  free(alone);
-  free(caught);
+  free(region_force);
+  free(spread_force);
   return status;
 }
 
-/* Set the rows' force from the regions' a; NULL: uniform tissue. */
+/* Set the force at the rows from the expandability a [count] of the regions; NULL: all 1. */
 static void set_forces(supine_patient_matching *m, size_t count, const double *response,
                        const double *a) {
   for (size_t i = 0; i < m->count; ++i) {
@@ -146,25 +150,24 @@ static void set_forces(supine_patient_matching *m, size_t count, const double *r
   }
 }
 
-/* Alternate between fitting law and regions, and finding the nearest points with full weights: the
- * law's residual is the signal here. */
-static supine_status settle(supine_patient_matching *m, const double *response,
-                            supine_patient_fit_options *options, supine_patient *patient,
-                            supine_patient_stiffness *regions, supine_error *error) {
+/* Alternate between the fit and matching, with full weights: large residuals show the regions. */
+static supine_status iterate(supine_patient_matching *m, const double *response,
+                             supine_patient_fit_options *options, supine_patient *patient,
+                             supine_patient_stiffness *regions, supine_error *error) {
   supine_patient_krige krige = {0};
   double share[SUPINE_PATIENT_REGIONS_MAX];
   supine_patient_matching_find(m);
   supine_status status = supine_patient_matching_weigh(m, INFINITY, error);
   for (size_t round = 0; round < ROUNDS && status == SUPINE_OK; ++round) {
-    options->noise = sqrt(together) * fmax(noise_least, m->rms) / m->rows[0].noise;
+    options->noise = sqrt(rows_per_error) * fmax(noise_least, m->rms) / m->rows[0].noise;
     set_forces(m, regions->count, response, NULL);
     status = supine_patient_krige_fit(options, m->rows, m->count, &krige, error);
     if (status == SUPINE_OK) {
-      supine_patient_krige_take(&krige, patient);
+      supine_patient_krige_copy_law(&krige, patient);
       supine_patient_krige_resolution(&krige, share);
       for (size_t k = 0; k < regions->count; ++k) {
-        regions->mode[k].value = krige.region[k];
-        regions->mode[k].seen = share[k];
+        regions->region[k].value = krige.region[k];
+        regions->region[k].seen = share[k];
       }
       set_forces(m, regions->count, response, krige.region);
       (void)supine_patient_matching_place(m, patient);
@@ -182,10 +185,10 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
                                     supine_patient *patient, supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error) {
   supine_patient_matching *m = matching;
-  supine_patient_fit_options wanted = *options;
-  supine_patient_fit_report scores;
+  supine_patient_fit_options region_options = *options;
+  supine_patient_fit_report fit_report;
   *report = (supine_patient_expand_report){.tried = true};
-  spread_regions(m->rest, stiffness);
+  place_regions(m->rest, stiffness);
   const size_t n = stiffness->count;
   double *response = malloc((m->count * n + 1) * sizeof *response);
   double *precision = malloc((n * n + 1) * sizeof *precision);
@@ -195,22 +198,22 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
           : find_responses(m, stiffness, options->gravity, response, error);
   if (status == SUPINE_OK) {
     find_precision(stiffness, precision);
-    wanted.region_count = n;
-    wanted.precision = precision;
-    status = settle(m, response, &wanted, patient, stiffness, error);
+    region_options.region_count = n;
+    region_options.precision = precision;
+    status = iterate(m, response, &region_options, patient, stiffness, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_patient_fit(&wanted, m->rows, m->count, 0, patient, &scores, error);
+    status = supine_patient_fit(&region_options, m->rows, m->count, 0, patient, &fit_report, error);
   }
   if (status == SUPINE_OK) {
     for (size_t with = 0; with < 2; ++with) {
-      report->fitted[with] = scores.fitted[SUPINE_PATIENT_SCORE_LAW + with];
-      report->held_out[with] = scores.held_out[SUPINE_PATIENT_SCORE_LAW + with];
+      report->fitted[with] = fit_report.fitted[SUPINE_PATIENT_SCORE_LAW + with];
+      report->held_out[with] = fit_report.held_out[SUPINE_PATIENT_SCORE_LAW + with];
     }
-    report->kept = report->held_out[1] < worth * report->held_out[0];
+    report->kept = report->held_out[1] < kept_ratio * report->held_out[0];
     stiffness->count = report->kept ? n : 0;
     for (size_t k = 0; k < stiffness->count; ++k) {
-      report->unseen += stiffness->mode[k].seen < SUPINE_PATIENT_SEEN ? 1.0 : 0.0;
+      report->unseen += stiffness->region[k].seen < SUPINE_PATIENT_SEEN ? 1.0 : 0.0;
     }
     status = supine_patient_matching_solve(m, stiffness, error);
   }

@@ -4,48 +4,117 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <cblas.h>
+#include <gsl/gsl_rng.h>
+#include <lapacke.h>
+
 #include "precompute/patient/krige.h"
 
 #include "sh/base/parallel.h"
 #include "sh/base/vec3.h"
 
 enum {
-  EXPECTED_MAX = 200, /* points at which the expected error is computed, about */
-  FOLDS = SUPINE_PATIENT_FOLDS,
-  ITEMS = SUPINE_PATIENT_SEEDS * FOLDS,
+  EXPECTED_MAX = 200, /* approximate number of points for the expected error */
+  FOLDS = 5,          /* folds of held-out blocks */
+  SEEDS = 3,          /* random divisions into blocks and folds */
+  AFFINE = 12,        /* number of constants of an affine map */
+  ITEMS = SEEDS * FOLDS,
   SCORES = SUPINE_PATIENT_SCORES
 };
 
-/* Half widths of the 95 % interval over the expected error, for a point and for one component. */
+/* Half width of the 95 % band, in expected errors: of a point (3-D) and of one component. */
 static const double band_point = 1.8;
 static const double band_component = 1.96;
 
-/* Factor on the expected error within 8 mm of the surface, measured on ten patients. */
+/* Ratio of the error within 8 mm of the surface to the expected error, measured in ten patients. */
 static const double near_surface = 1.3;
 
-/* Sums over rows of weighted squares, mm^2, and of weights; numbers of points. All are doubles, so
- * that sums can be added. */
+/* Sums over rows of weighted squared residuals and expected variances, mm^2, and of weights;
+ * numbers of points, and of those within the band. */
 typedef struct squares {
-  double of[SCORES], expected, weight, points, within;
+  double residual[SCORES], expected, weight, points, within;
 } squares;
 
-/* Inputs and working space of one fit. */
+/* Inputs and work space of a fit. */
 typedef struct study {
   supine_patient_fit_options options;
   const supine_patient_row *rows;
   size_t row_count, components;
-  size_t *fold;        /* [SEEDS, row_count] */
-  squares held[ITEMS]; /* residuals of held-out folds */
+  size_t *fold;            /* [SEEDS, row_count] fold of each row */
+  squares held_out[ITEMS]; /* sums over each held-out fold */
   supine_status failed[ITEMS];
 } study;
 
-/* Add the squared residuals of rows predicted by a fit, and by maps fitted to the same rows. */
-static void add_rows(const study *s, const supine_patient_row *rows, size_t count,
-                     supine_patient_krige *krige, squares *to) {
+/* Compute the derivatives of axis . (t + M x) by t and M; x is the place's offset in 100 mm. */
+static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
+  for (size_t a = 0; a < 3; ++a) {
+    x[a] = row->axis[a];
+    for (size_t b = 0; b < 3; ++b) {
+      x[3 + 3 * a + b] = row->axis[a] * 0.01 * row->place.offset[b];
+    }
+  }
+}
+
+/* Fit the displacement t or t + M x to rows. `map` is t, mm, then M by rows; 0 if the fit fails. */
+static void affine_fit(const supine_patient_row *rows, size_t count, bool translation,
+                       double map[AFFINE]) {
+  double matrix[AFFINE * AFFINE] = {0.0};
+  double trace = 0.0;
+  const lapack_int size = translation ? 3 : AFFINE;
+  memset(map, 0, AFFINE * sizeof *map);
+  for (size_t i = 0; i < count; ++i) {
+    double x[AFFINE];
+    affine_design(&rows[i], x);
+    cblas_dsyr(CblasColMajor, CblasUpper, AFFINE, rows[i].weight, x, 1, matrix, AFFINE);
+    cblas_daxpy(size, rows[i].weight * rows[i].value, x, 1, map, 1);
+    trace += rows[i].weight * cblas_ddot(AFFINE, x, 1, x, 1);
+  }
+  for (size_t a = 0; a < AFFINE; ++a) {
+    matrix[a * AFFINE + a] += 1e-9 * trace; /* regularisation */
+  }
+  if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, AFFINE, map, AFFINE) != 0) {
+    memset(map, 0, AFFINE * sizeof *map);
+  }
+}
+
+/* Return the displacement by the map along a row, less the measured one, mm. */
+static double affine_residual(const double map[AFFINE], const supine_patient_row *row) {
+  double x[AFFINE];
+  affine_design(row, x);
+  return cblas_ddot(AFFINE, x, 1, map, 1) - row->value;
+}
+
+/* Assign each row to a block and each block at random to a fold; write the fold [count] of each
+ * row. Return the number of blocks; 0: out of memory. */
+static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
+                           size_t count, unsigned long seed, size_t *fold) {
+  const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
+  size_t *fold_of = malloc((blocks + 1) * sizeof *fold_of);
+  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+  const bool able = fold_of != NULL && random != NULL;
+  if (able) {
+    gsl_rng_set(random, 1000 + seed);
+    for (size_t b = 0; b < blocks; ++b) { /* shuffle */
+      const size_t other = gsl_rng_uniform_int(random, b + 1);
+      fold_of[b] = fold_of[other];
+      fold_of[other] = b % FOLDS;
+    }
+    for (size_t i = 0; i < count; ++i) {
+      fold[i] = fold_of[rows[i].block];
+    }
+  }
+  gsl_rng_free(random);
+  free(fold_of);
+  return able ? blocks : 0;
+}
+
+/* Predict rows by a fit, and by maps fitted to the same data; add the squared residuals to sums. */
+static void add_residuals(const study *s, const supine_patient_row *rows, size_t count,
+                          supine_patient_krige *krige, squares *sums) {
   const double band = s->components == 3 ? band_point : band_component;
-  double map[2][SUPINE_PATIENT_AFFINE];
-  supine_patient_affine_fit(krige->rows, krige->count, true, map[0]);
-  supine_patient_affine_fit(krige->rows, krige->count, false, map[1]);
+  double map[2][AFFINE];
+  affine_fit(krige->rows, krige->count, true, map[0]);
+  affine_fit(krige->rows, krige->count, false, map[1]);
   for (size_t i = 0; i < count; i += s->components) {
     double square = 0.0;
     double expected = 0.0;
@@ -54,45 +123,44 @@ static void add_rows(const study *s, const supine_patient_row *rows, size_t coun
       const supine_patient_row *row = &rows[j];
       double variance;
       double x[SUPINE_PATIENT_TERMS];
-      const double residual[SCORES] = {row->value, supine_patient_affine_residual(map[0], row),
-                                       supine_patient_affine_residual(map[1], row),
-                                       supine_patient_power_design(&krige->alone, row, x),
-                                       supine_patient_krige_predict(krige, row, &variance) -
-                                           row->value};
+      const double residual[SCORES] = {
+          row->value, affine_residual(map[0], row), affine_residual(map[1], row),
+          supine_patient_power_design(&krige->uncorrected_law, row, x),
+          supine_patient_krige_predict(krige, row, &variance) - row->value};
       for (size_t k = 0; k < SCORES; ++k) {
-        to->of[k] += row->weight * residual[k] * residual[k];
+        sums->residual[k] += row->weight * residual[k] * residual[k];
       }
       variance += pow(krige->noise * row->noise, 2.0);
-      to->expected += row->weight * variance;
+      sums->expected += row->weight * variance;
       square += pow(residual[SUPINE_PATIENT_SCORE_CORRECTED], 2.0);
       expected += variance;
       weight += row->weight;
     }
-    to->weight += weight;
-    to->points += weight > 0.0 ? 1.0 : 0.0;
-    to->within += weight > 0.0 && square <= band * band * expected ? 1.0 : 0.0;
+    sums->weight += weight;
+    sums->points += weight > 0.0 ? 1.0 : 0.0;
+    sums->within += weight > 0.0 && square <= band * band * expected ? 1.0 : 0.0;
   }
 }
 
-static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *to) {
+static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *sums) {
   const size_t n = s->row_count;
-  supine_patient_row *rows = malloc(n * sizeof *rows); /* kept rows, then held-out rows */
+  supine_patient_row *rows = malloc(n * sizeof *rows); /* fitted rows, then held-out rows */
   supine_patient_krige krige = {0};
   supine_status status = rows == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
-  size_t kept = 0;
+  size_t fitted_count = 0;
   size_t count = 0;
-  for (int held = 0; held < 2 && status == SUPINE_OK; ++held) {
+  for (int held_out = 0; held_out < 2 && status == SUPINE_OK; ++held_out) {
     for (size_t i = 0; i < n; ++i) {
-      if ((fold[i] == which) == (held == 1)) {
+      if ((fold[i] == which) == (held_out == 1)) {
         rows[count++] = s->rows[i];
       }
     }
-    kept = held ? kept : count;
+    fitted_count = held_out ? fitted_count : count;
   }
-  if (status == SUPINE_OK && kept < n) {
-    status = supine_patient_krige_fit(&s->options, rows, kept, &krige, NULL);
+  if (status == SUPINE_OK && fitted_count < n) {
+    status = supine_patient_krige_fit(&s->options, rows, fitted_count, &krige, NULL);
     if (status == SUPINE_OK) {
-      add_rows(s, rows + kept, n - kept, &krige, to);
+      add_residuals(s, rows + fitted_count, n - fitted_count, &krige, sums);
     }
   }
   supine_patient_krige_free(&krige);
@@ -105,31 +173,32 @@ static void hold_out_range(void *context, size_t begin, size_t end, size_t threa
   study *s = context;
   for (size_t item = begin; item < end; ++item) {
     s->failed[item] =
-        hold_out(s, s->fold + item / FOLDS * s->row_count, item % FOLDS, &s->held[item]);
+        hold_out(s, s->fold + item / FOLDS * s->row_count, item % FOLDS, &s->held_out[item]);
   }
 }
 
-static supine_status hold_all_out(study *s, squares *held, supine_error *error) {
+static supine_status hold_all_out(study *s, squares *held_out, supine_error *error) {
   supine_parallel_for(ITEMS, 1, 0, hold_out_range, s);
   for (size_t item = 0; item < ITEMS; ++item) {
-    const squares *of = &s->held[item];
+    const squares *item_sums = &s->held_out[item];
     if (s->failed[item] != SUPINE_OK) {
       return supine_error_set(error, s->failed[item],
                               "fitting without the held-out blocks failed: %s",
                               supine_status_string(s->failed[item]));
     }
-    for (size_t k = 0; k < sizeof *of / sizeof(double); ++k) {
-      ((double *)held)[k] += ((const double *)of)[k];
+    for (size_t k = 0; k < sizeof *item_sums / sizeof(double); ++k) {
+      ((double *)held_out)[k] += ((const double *)item_sums)[k];
     }
   }
   return SUPINE_OK;
 }
 
-/* Compute the expected error of a surface's points in three dimensions, mm RMS, and their mean
- * displacement, mm. Without landmarks, the rows hold nothing of the motion along the surface, so
+/* Compute the expected error of points near a surface in three dimensions, RMS in mm, and their
+ * mean displacement, mm. Without landmarks the displacement along the surface is not observed, so
  * the covariance of g is that of other patients. */
-static supine_status expect(const study *s, size_t triples, const supine_patient_krige *fitted,
-                            double *expected, double *mean, supine_error *error) {
+static supine_status find_expected_error(const study *s, size_t triples,
+                                         const supine_patient_krige *fitted, double *expected,
+                                         double *mean, supine_error *error) {
   const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
   const double share = 1.0 / ceil((double)s->row_count / (double)step);
   supine_patient_fit_options options = s->options;
@@ -150,12 +219,12 @@ static supine_status expect(const study *s, size_t triples, const supine_patient
                              supine_patient_force_at(&fitted->law, &row.place), u);
     *mean += supine_length(u) * share;
     for (size_t a = 0; a < 3; ++a) {
-      double of;
+      double axis_variance;
       for (size_t b = 0; b < 3; ++b) {
         row.axis[b] = a == b ? 1.0 : 0.0;
       }
-      (void)supine_patient_krige_predict(&krige, &row, &of);
-      variance += of * share;
+      (void)supine_patient_krige_predict(&krige, &row, &axis_variance);
+      variance += axis_variance * share;
     }
   }
   *expected = near_surface * sqrt(variance);
@@ -164,47 +233,49 @@ static supine_status expect(const study *s, size_t triples, const supine_patient
 }
 
 static supine_patient_score baseline_of(const study *s) {
-  return s->options.moved != SUPINE_PATIENT_STILL ? SUPINE_PATIENT_SCORE_TRANSLATION
-                                                  : SUPINE_PATIENT_SCORE_NONE;
+  return s->options.scan_motion != SUPINE_PATIENT_STILL ? SUPINE_PATIENT_SCORE_TRANSLATION
+                                                        : SUPINE_PATIENT_SCORE_NONE;
 }
 
-/* Convert sums to RMS; return the share of the squared displacement that is explained, %. */
-static double conclude(const study *s, const squares *sums, double score[SCORES]) {
+/* Convert sums to RMS errors; return the share of the squared displacement that is explained, %. */
+static double find_rms(const study *s, const squares *sums, double score[SCORES]) {
   for (size_t k = 0; k < SCORES; ++k) {
-    score[k] = sqrt(sums->of[k] * (double)s->components / sums->weight);
+    score[k] = sqrt(sums->residual[k] * (double)s->components / sums->weight);
   }
   return 100.0 * (1.0 - pow(score[SUPINE_PATIENT_SCORE_CORRECTED] / score[baseline_of(s)], 2.0));
 }
 
-/* Fit all rows, then without each fold. */
+/* Fit all rows, then repeat the fit without each fold. */
 static supine_status run(study *s, size_t triples, supine_patient *patient,
                          supine_patient_fit_report *report, supine_error *error) {
   squares fitted = {.points = 0};
-  squares held = {.points = 0};
-  double moved = 0.0;
+  squares held_out = {.points = 0};
+  double mean_displacement = 0.0;
   supine_patient_krige krige = {0};
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
   if (status == SUPINE_OK) {
-    add_rows(s, s->rows, s->row_count, &krige, &fitted);
+    add_residuals(s, s->rows, s->row_count, &krige, &fitted);
     s->options.sill = krige.sill;
     s->options.uncorrected = krige.sill == 0.0;
-    status = expect(s, triples, &krige, &report->expected_point, &moved, error);
+    status =
+        find_expected_error(s, triples, &krige, &report->expected_point, &mean_displacement, error);
     supine_patient_krige_errors(&krige, report->error);
-    supine_patient_krige_take(&krige, patient);
+    supine_patient_krige_copy_law(&krige, patient);
   }
   if (status == SUPINE_OK) {
-    status = hold_all_out(s, &held, error);
+    status = hold_all_out(s, &held_out, error);
   }
   if (status == SUPINE_OK) {
-    (void)conclude(s, &fitted, report->fitted);
-    report->explained = conclude(s, &held, report->held_out);
+    (void)find_rms(s, &fitted, report->fitted);
+    report->explained = find_rms(s, &held_out, report->held_out);
     report->baseline = report->held_out[baseline_of(s)];
     if (s->components == 3) {
-      report->expected_point = sqrt(held.expected * 3.0 / held.weight);
+      report->expected_point = sqrt(held_out.expected * 3.0 / held_out.weight);
     }
-    report->expected_constant = moved > 0.0 ? pow(report->expected_point, 2.0) / moved : 0.0;
-    report->band = held.points > 0.0 ? 100.0 * held.within / held.points : 0.0;
+    report->expected_constant =
+        mean_displacement > 0.0 ? pow(report->expected_point, 2.0) / mean_displacement : 0.0;
+    report->band = held_out.points > 0.0 ? 100.0 * held_out.within / held_out.points : 0.0;
   }
   supine_patient_krige_free(&krige);
   return status;
@@ -215,27 +286,27 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
                                  supine_patient_row *rows, size_t single, size_t triples,
                                  supine_patient *patient, supine_patient_fit_report *report,
                                  supine_error *error) {
-  static const size_t motion[] = {0, 3, 6};
   const size_t count = single + 3 * triples;
-  const size_t needed = (options->law == SUPINE_PATIENT_PAPER ? 9 : 1) + motion[options->moved];
+  const size_t needed = (options->law == SUPINE_PATIENT_PAPER ? 9 : 1) + options->scan_motion;
   study s = {.options = *options,
              .rows = rows,
              .row_count = count,
              .components = single > 0 ? 1 : 3,
-             .fold = malloc(SUPINE_PATIENT_SEEDS * count * sizeof(size_t))};
+             .fold = malloc(SEEDS * count * sizeof(size_t))};
   supine_status status = SUPINE_OK;
   *report = (supine_patient_fit_report){.points = (double)(single > 0 ? count : triples)};
   patient->law = options->law;
   if (single + triples < needed) {
-    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%zu points are fewer than the %zu unknowns of the %s law: give "
-                              "more, or --law deep",
-                              single + triples, needed, supine_patient_law_names[options->law]);
+    status =
+        supine_error_set(error, SUPINE_ERROR_FORMAT,
+                         "points: %zu, fewer than the %zu unknowns of the %s law: give more, or "
+                         "use --law deep",
+                         single + triples, needed, supine_patient_law_names[options->law]);
   }
-  for (size_t seed = 0; seed < SUPINE_PATIENT_SEEDS && status == SUPINE_OK; ++seed) {
-    const size_t blocks = s.fold == NULL ? 0
-                                         : supine_patient_rows_fold(&patient->frame, rows, count,
-                                                                    seed, s.fold + seed * count);
+  for (size_t seed = 0; seed < SEEDS && status == SUPINE_OK; ++seed) {
+    const size_t blocks =
+        s.fold == NULL ? 0
+                       : assign_folds(&patient->frame, rows, count, seed, s.fold + seed * count);
     report->blocks = (double)blocks;
     if (blocks == 0) {
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu rows", count);

@@ -10,34 +10,32 @@
 #include "precompute/patient/matching.h"
 #include "sh/base/vec3.h"
 
-static const double gain_least = 0.01, gain_most = 2.0; /* other gains count as undetermined */
-static const double same_posture = 0.05; /* distance of unit vectors of one posture: 3 degrees */
-static const double settled = 1e-4;    /* change of the scales and the gain that ends the rounds */
-static const double unsettled = 1e-2;  /* change in the last round that is an error */
-static const double force_least = 0.2; /* least fitted force, relative to its mean of 1 */
+static const double gain_least = 0.01, gain_most = 2.0; /* range of accepted gains */
+static const double same_posture = 0.05;                /* unit vectors 3 degrees apart */
+static const double converged = 1e-4;     /* change of scales and gain that ends the rounds */
+static const double not_converged = 1e-2; /* change in the last round that is an error */
+static const double force_least = 0.2;    /* lower bound on the fitted force */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, GAIN = 5, UNKNOWNS = 6 };
 
-/* The fitted displacement at a row. */
+/* The fitted law at a row. */
 typedef struct field {
-  double u[3];   /* from full inflation to rest in the fitted posture, mm */
-  double turned; /* relative change of the force by the further state's posture, at a gain of 1 */
+  double u[3];         /* displacement from full inflation to rest, mm */
+  double force_change; /* relative change of the force with posture, at a gain of 1 */
 } field;
 
-/* A further state as rows, axis . (s (1 + gain turned) u + t) = value, with a scale s for each
- * lung, as each has its own volume in the further posture. */
+/* The fit of axis . (s (1 + gain force_change) u + t) = value to the rows of a further state. Each
+ * lung has its own scale s, because it has its own volume in the further posture. */
 typedef struct work {
   const supine_patient_record *record;
-  const supine_mesh *surface;       /* NULL: the state is points */
-  bool moved;                       /* whether t is fitted */
-  double gains[2][3];               /* part of the way from full inflation to rest of the fuller and
-                                     * the emptier state, by axis */
-  supine_patient_matching matching; /* rows, whose blocks are eighths of the lungs; matches */
+  bool fits_translation; /* t is fitted */
+  double gains[2][3];    /* gains of the fuller and the emptier state (supine_patient_path) */
+  supine_patient_matching matching; /* matches and rows; blocks are eighths of the lungs */
   field *field;                     /* [rows] */
   double x[UNKNOWNS];               /* s of the left and the right lung, t, gain */
 } work;
 
-/* Fit the unknowns by linear least squares about the present scales without one eighth of the lungs
- * (EIGHTHS: with all); return the RMS residual, mm. */
+/* Fit the unknowns by linear least squares about the present scales; return the RMS residual, mm.
+ * @param without  eighth of the lungs that is left out; EIGHTHS: none */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
@@ -51,10 +49,10 @@ static double fit(work *w, bool fits_gain, size_t without) {
     const size_t lung = row->place.side > 0.0 ? 0U : 1U;
     double x[UNKNOWNS] = {0.0};
     x[lung] = along;
-    x[GAIN] = fits_gain ? scale[lung] * w->field[i].turned * along : 0.0;
+    x[GAIN] = fits_gain ? scale[lung] * w->field[i].force_change * along : 0.0;
     double value = row->value; /* displacement from full inflation, mm */
     for (size_t a = 0; a < 3; ++a) {
-      x[2 + a] = w->moved ? row->axis[a] : 0.0;
+      x[2 + a] = w->fits_translation ? row->axis[a] : 0.0;
       value += w->gains[0][a] * row->axis[a] * w->field[i].u[a];
     }
     cblas_dsyr(CblasColMajor, CblasUpper, UNKNOWNS, weight, x, 1, matrix, UNKNOWNS);
@@ -63,18 +61,17 @@ static double fit(work *w, bool fits_gain, size_t without) {
     weights += weight;
   }
   memcpy(w->x, right, sizeof right);
-  for (size_t t = 0; t < UNKNOWNS; ++t) { /* an unknown that is not fitted is 0 */
+  for (size_t t = 0; t < UNKNOWNS; ++t) { /* unknowns that are not fitted become 0 */
     matrix[t * UNKNOWNS + t] += matrix[t * UNKNOWNS + t] == 0.0 ? 1.0 : 0.0;
   }
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', UNKNOWNS, 1, matrix, UNKNOWNS, w->x, UNKNOWNS) != 0) {
     memset(w->x, 0, sizeof w->x);
   }
   squares = fmax(0.0, squares - cblas_ddot(UNKNOWNS, w->x, 1, right, 1));
-  return sqrt(squares * (w->surface == NULL ? 3.0 : 1.0) / weights);
+  return sqrt(squares * (w->matching.state == NULL ? 3.0 : 1.0) / weights);
 }
 
-/* Compute the height of a row along gravity over the box, 0 to 1, from the spread columns of the
- * force: coordinates are linear in box coordinates. */
+/* Compute the height along gravity, 0 to 1 in the box, from the terms of the force at a place. */
 static double height_at(const supine_patient_frame *frame, const supine_patient_place *place,
                         const double gravity[3]) {
   const double outer = place->side > 0.0 ? frame->maximum[0] : frame->minimum[0];
@@ -91,17 +88,16 @@ static double height_at(const supine_patient_frame *frame, const supine_patient_
   return height / range;
 }
 
-/* Make the rows: three for each pair, whose force is not spread, or one for each vertex of `rest`
- * that takes part. */
-static supine_status take_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
-                               supine_error *error) {
+/* Make three rows for each pair, or match a surface, with one row for each chosen vertex. */
+static supine_status make_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
+                               const supine_mesh *surface, supine_error *error) {
   supine_status status = SUPINE_OK;
   if (pairs != NULL) {
     w->matching.count = 3 * pairs->count;
     w->matching.rows = malloc(w->matching.count * sizeof *w->matching.rows);
   } else {
-    status = supine_patient_matching_create(rest, w->surface, &w->record->stiffness, VERTICES_MAX,
-                                            0, &w->matching, error);
+    status = supine_patient_matching_create(rest, surface, &w->record->stiffness, VERTICES_MAX, 0,
+                                            &w->matching, error);
   }
   w->field = malloc(w->matching.count * sizeof *w->field);
   if (status == SUPINE_OK && (w->matching.rows == NULL || w->field == NULL)) {
@@ -112,63 +108,64 @@ static supine_status take_rows(work *w, const supine_lungs *rest, const supine_p
   return status;
 }
 
-/* Find the fitted displacement of each row, and the change of the force. */
-static void find_motion(work *w, const supine_lungs *rest, const double gravity[3]) {
+/* Compute the fitted displacement and the change of force at each row; assign rows to eighths. */
+static void find_motion(work *w, const double gravity[3]) {
+  supine_patient_matching *m = &w->matching;
   const supine_patient *patient = &w->record->patient;
   const double *g = w->record->state[1].gravity;
-  const supine_patient_frame *frame = w->surface != NULL ? &w->matching.frame : &patient->frame;
-  for (size_t i = 0; i < w->matching.count; ++i) {
-    supine_patient_place place = w->matching.rows[i].place;
+  const supine_patient_frame *frame = m->state != NULL ? &m->frame : &patient->frame;
+  for (size_t i = 0; i < m->count; ++i) {
+    supine_patient_place place = m->rows[i].place;
     const double *columns = place.force;
-    const double then = 0.5 * columns[0] - g[1] * columns[2] - g[2] * columns[3];
-    w->field[i].turned = (height_at(frame, &place, gravity) - then) /
-                         fmax(force_least, supine_patient_force_at(&patient->power, &place));
-    w->matching.rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
-                                (place.box[2] > 0.5 ? 1U : 0U);
-    if (w->surface != NULL && !w->record->from_surface) {
-      /* the landmarks' box is wider than the surface's */
-      place = supine_patient_find(
-          &patient->frame, rest->mesh.vertices + 3 * w->matching.match[i].vertex, place.side);
+    const double fitted_height = 0.5 * columns[0] - g[1] * columns[2] - g[2] * columns[3];
+    w->field[i].force_change = (height_at(frame, &place, gravity) - fitted_height) /
+                               fmax(force_least, supine_patient_force_at(&patient->power, &place));
+    m->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
+                       (place.box[2] > 0.5 ? 1U : 0U);
+    if (m->state != NULL && !w->record->from_surface) {
+      /* The law was fitted in the box of landmarks, which differs from that of the surface. */
+      place = supine_patient_find(&patient->frame, m->rest->mesh.vertices + 3 * m->match[i].vertex,
+                                  place.side);
     }
     supine_patient_displacement(patient, &place, 1.0, w->field[i].u);
-    for (size_t k = 0; k < 3; ++k) { /* scale to the way from full inflation to rest */
+    for (size_t k = 0; k < 3; ++k) { /* scale to the path from full inflation to rest */
       w->field[i].u[k] /= w->gains[1][k] - w->gains[0][k];
     }
   }
 }
 
-/* Find the nearest points of the surface, with vertices moved by the unknowns. */
+/* Match the surface to vertices displaced by the present unknowns. */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {
     const double scale =
-        w->x[m->rows[i].place.side > 0.0 ? 0U : 1U] * (1.0 + w->x[GAIN] * w->field[i].turned);
+        w->x[m->rows[i].place.side > 0.0 ? 0U : 1U] * (1.0 + w->x[GAIN] * w->field[i].force_change);
     for (size_t k = 0; k < 3; ++k) {
-      m->match[i].moved[k] = m->rest->mesh.vertices[3 * m->match[i].vertex + k] +
-                             (scale - w->gains[0][k]) * w->field[i].u[k] + w->x[2 + k];
+      m->match[i].position[k] = m->rest->mesh.vertices[3 * m->match[i].vertex + k] +
+                                (scale - w->gains[0][k]) * w->field[i].u[k] + w->x[2 + k];
     }
   }
   supine_patient_matching_find(m);
   return supine_patient_matching_weigh(m, 0.0, error);
 }
 
-/* Alternate between finding the nearest points and the fit, then measure the gain's error. */
-static supine_status settle(work *w, supine_patient_further *further, supine_error *error) {
+/* Alternate between matching and the fit, then estimate the standard error of the gain. */
+static supine_status iterate(work *w, supine_patient_further *further, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;
   double sum = 0.0;
   double square = 0.0;
-  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= settled; ++round) {
+  for (size_t round = 0; round < ROUNDS && status == SUPINE_OK && change >= converged; ++round) {
     const double before[UNKNOWNS] = {w->x[0], w->x[1], [GAIN] = w->x[GAIN]};
-    status = w->surface == NULL ? SUPINE_OK : match_surface(w, error);
+    status = w->matching.state == NULL ? SUPINE_OK : match_surface(w, error);
     further->residual = fit(w, further->fits_gain, EIGHTHS);
     change =
         fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]) + fabs(w->x[GAIN] - before[GAIN]);
   }
-  if (status == SUPINE_OK && change >= unsettled) {
+  if (status == SUPINE_OK && change >= not_converged) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a further state does not settle: after %d rounds its gain still "
-                              "changes by %.2g. Check that axes and person are the same",
+                              "a further state does not converge: after %d rounds its gain still "
+                              "changes by %.2g; check that axes and person are the same",
                               ROUNDS, change);
   }
   memcpy(further->scale, w->x, sizeof further->scale);
@@ -186,23 +183,23 @@ static supine_status settle(work *w, supine_patient_further *further, supine_err
 
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
                                       const supine_patient_pairs *pairs, const supine_mesh *surface,
-                                      bool moved, supine_patient_further *further,
+                                      bool scans_moved, supine_patient_further *further,
                                       supine_error *error) {
-  work w = {.record = record, .surface = surface, .moved = moved, .x = {1.0, 1.0}};
+  work w = {.record = record, .fits_translation = scans_moved, .x = {1.0, 1.0}};
   further->fits_gain =
       supine_distance(further->state.gravity, record->state[1].gravity) >= same_posture;
   supine_patient_path(record, w.gains);
-  supine_status status = take_rows(&w, rest, pairs, error);
+  supine_status status = make_rows(&w, rest, pairs, surface, error);
   if (status == SUPINE_OK) {
-    find_motion(&w, rest, further->state.gravity);
-    status = settle(&w, further, error);
+    find_motion(&w, further->state.gravity);
+    status = iterate(&w, further, error);
   }
   supine_patient_matching_free(&w.matching);
   free(w.field);
   return status;
 }
 
-void supine_patient_gain_take(supine_patient_record *record) {
+void supine_patient_gain_set(supine_patient_record *record) {
   double gain = 0.0;
   double precision = 0.0;
   for (size_t k = 0; k < record->further_count; ++k) {
@@ -214,9 +211,9 @@ void supine_patient_gain_take(supine_patient_record *record) {
   if (precision > 0.0) {
     gain /= precision;
     record->gain_error = pow(precision, -0.5);
-    record->gain_open = gain < gain_least || gain > gain_most;
+    record->gain_undetermined = gain < gain_least || gain > gain_most;
   }
-  if (precision > 0.0 && !record->gain_open) {
+  if (precision > 0.0 && !record->gain_undetermined) {
     record->force = supine_patient_force(&record->patient.power, gain, record->state[1].gravity);
   }
 }

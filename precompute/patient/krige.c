@@ -13,24 +13,22 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  LAW = SUPINE_PATIENT_CONSTANTS, /* terms of the constants; those of the motion follow */
-  SCALE = TERMS - 1,
+  LAW = SUPINE_PATIENT_CONSTANTS, /* first term of the motion, after the constants */
+  SCALE = TERMS - 1,              /* the relative size of the law */
   TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
 
-static const double scale_spread = 0.3;  /* prior deviation of the size of a law of known shape,
-                                          * relative */
-static const double settled = 1e-10;     /* relative decrease of the squares that ends the fit */
-static const double damping_most = 1e10; /* damping at which no step decreases the squares: end */
-static const double region_least = 0.02; /* least expandability of a region */
+static const double size_deviation = 0.3; /* prior standard deviation of SCALE */
+static const double converged = 1e-10;    /* relative decrease of the squares that ends a fit */
+static const double damping_most = 1e10;  /* largest damping; above it a fit ends */
+static const double expandability_least = 0.02;
 
-/* Beyond these exponents all motion is at one face; beyond these slopes the force changes sign. */
+/* Bounds on the exponents, and on the slopes c7 to c9, above which the force would change sign. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* Prior standard deviations under each law: of lengths, relative; of exponents' logarithms; of
- * slopes. */
-static const double spread[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
+/* Prior standard deviations of c1, c3, c5 (relative); logarithms of c2, c4, c6; c7 to c9. */
+static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
                                        const supine_patient_place *place) {
@@ -38,31 +36,28 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
   double u[3];
   supine_patient_direction(law, place, supine_patient_force_at(law, place), u);
   centre.size = supine_length(u);
-  memcpy(centre.at, place->arm, sizeof centre.at);
+  memcpy(centre.offset, place->offset, sizeof centre.offset);
   return centre;
 }
 
-/* --- the terms ------------------------------------------------------------------------------- */
-
-/* Return whether the law keeps its known shape. */
-static bool keeps_shape(const supine_patient_krige *k) {
+/* Return whether only the size of the law is fitted. */
+static bool shape_is_fixed(const supine_patient_krige *k) {
   return k->options.size_only || (k->options.law == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
-/* Find the prior standard deviation of a term of the law: 0 known, INFINITY free. */
-static double spread_of(const supine_patient_krige *k, size_t term) {
-  static const size_t motion[] = {0, 3, 6};
+/* Return the prior standard deviation of a term; 0: known, INFINITY: free. */
+static double prior_deviation(const supine_patient_krige *k, size_t term) {
   const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
-  const bool kept = keeps_shape(k);
+  const bool shape_fixed = shape_is_fixed(k);
   return term == SCALE ? (k->options.size_only ? INFINITY
-                          : kept               ? scale_spread
+                          : shape_fixed        ? size_deviation
                                                : 0.0)
-         : term < LAW  ? (kept ? 0.0 : spread[k->options.law][term / 3] * unit)
-         : term - LAW < motion[k->options.moved] ? INFINITY
-                                                 : 0.0;
+         : term < LAW  ? (shape_fixed ? 0.0 : law_deviation[k->options.law][term / 3] * unit)
+         : term - LAW < (size_t)k->options.scan_motion ? INFINITY
+                                                       : 0.0;
 }
 
-static double offset_of(const supine_patient_krige *k, size_t term) {
+static double offset_from_prior(const supine_patient_krige *k, size_t term) {
   const supine_patient_power *law = &k->law;
   const supine_patient_power *mean = &k->mean;
   return term == SCALE ? law->c[0] / mean->c[0] - 1.0
@@ -71,22 +66,20 @@ static double offset_of(const supine_patient_krige *k, size_t term) {
                        : law->c[term] - mean->c[term];
 }
 
-static supine_patient_power moved_by(const supine_patient_power *law, const double step[TERMS]) {
-  supine_patient_power moved = *law;
+static supine_patient_power take_step(const supine_patient_power *law, const double step[TERMS]) {
+  supine_patient_power stepped = *law;
   for (size_t a = 0; a < 3; ++a) {
-    moved.c[2 * a] += step[a] + step[SCALE] * law->c[2 * a];
-    moved.c[2 * a + 1] =
+    stepped.c[2 * a] += step[a] + step[SCALE] * law->c[2 * a];
+    stepped.c[2 * a + 1] =
         fmin(exponent_most, fmax(exponent_least, law->c[2 * a + 1] * exp(step[3 + a])));
-    moved.c[6 + a] = fmin(slope_most, fmax(-slope_most, law->c[6 + a] + step[6 + a]));
-    moved.motion[a] += step[9 + a];
-    moved.motion[3 + a] += step[12 + a];
+    stepped.c[6 + a] = fmin(slope_most, fmax(-slope_most, law->c[6 + a] + step[6 + a]));
+    stepped.motion[a] += step[9 + a];
+    stepped.motion[3 + a] += step[12 + a];
   }
-  return moved;
+  return stepped;
 }
 
-/* --- the rows -------------------------------------------------------------------------------- */
-
-/* Compute the derivative of a row by each term; return the law's value less the row's, mm. */
+/* Call supine_patient_power_design, and add the derivatives by the expandability of the regions. */
 static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
   if (k->options.region_count == 0) {
     return supine_patient_power_design(&k->law, row, x);
@@ -104,13 +97,13 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factor the covariance of the rows: noise plus g. If the law keeps its known shape, the size of
- * g follows the least-squares size of that law.
- * @return half the logarithm of its determinant; NAN if it is not positive definite */
+/* Factor the covariance of the rows, noise plus g. If only the size of the law is fitted, the
+ * covariance of g is that for the prior mean of the size.
+ * @return half the logarithm of the determinant; NAN if it is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
   double logarithm = 0.0;
-  k->scaled_sill = k->sill * (keeps_shape(k) ? fabs(k->mean.c[0] / k->law.c[0]) : 1.0);
+  k->scaled_sill = k->sill * (shape_is_fixed(k) ? fabs(k->mean.c[0] / k->law.c[0]) : 1.0);
   for (size_t i = 0; i < n; ++i) {
     k->centre[i] = centre_of(&k->law, &k->rows[i].place);
     logarithm += k->sill > 0.0 ? 0.0 : log(noise_of(k, &k->rows[i]));
@@ -138,16 +131,16 @@ static double factor(supine_patient_krige *k) {
 static void add_prior(supine_patient_krige *k) {
   const size_t terms = k->terms;
   for (size_t t = 0; t < TERMS; ++t) {
-    const double of = spread_of(k, t);
-    if (of == 0.0) { /* known: the row of the identity */
-      k->right[t] = 0.0;
+    const double deviation = prior_deviation(k, t);
+    if (deviation == 0.0) { /* a known term: replace its equation by the identity */
+      k->right_side[t] = 0.0;
       for (size_t s = 0; s < terms; ++s) {
         k->normal[s < t ? t * terms + s : s * terms + t] = s == t ? 1.0 : 0.0;
       }
-    } else if (isfinite(of)) {
-      k->normal[t * terms + t] += pow(of, -2.0);
-      k->right[t] -= offset_of(k, t) * pow(of, -2.0);
-      k->squares += pow(offset_of(k, t) / of, 2.0);
+    } else if (isfinite(deviation)) {
+      k->normal[t * terms + t] += pow(deviation, -2.0);
+      k->right_side[t] -= offset_from_prior(k, t) * pow(deviation, -2.0);
+      k->squares += pow(offset_from_prior(k, t) / deviation, 2.0);
     }
   }
   for (size_t t = TERMS; t < terms; ++t) {
@@ -157,16 +150,16 @@ static void add_prior(supine_patient_krige *k) {
       gradient += precision[s - TERMS] * (k->region[s - TERMS] - 1.0);
       k->normal[t * terms + s] += s <= t ? precision[s - TERMS] : 0.0;
     }
-    k->right[t] -= gradient;
+    k->right_side[t] -= gradient;
     k->squares += gradient * (k->region[t - TERMS] - 1.0);
   }
 }
 
-/* Build the normal equations of the terms at the present law, and the squared residual. */
+/* Compute the normal equations and the squared residual at the present law. */
 static void linearise(supine_patient_krige *k) {
   const int n = (int)k->count;
   const int terms = (int)k->terms;
-  const int width = terms + 1; /* of the design: the terms, then the residual */
+  const int width = terms + 1; /* a column for each term, and one for the residual */
   for (size_t i = 0; i < k->count; ++i) {
     double *row = k->design + (size_t)width * i;
     row[terms] = -design_row(k, &k->rows[i], row);
@@ -181,17 +174,17 @@ static void linearise(supine_patient_krige *k) {
   cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, terms, n, 1.0, k->design, width, 0.0,
               k->normal, terms);
   cblas_dgemv(CblasRowMajor, CblasTrans, n, terms, 1.0, k->design, width, k->design + terms, width,
-              0.0, k->right, 1);
+              0.0, k->right_side, 1);
   k->squares = cblas_ddot(n, k->design + terms, width, k->design + terms, width);
   add_prior(k);
 }
 
-/* Solve for a damped step; false if the matrix is singular. */
+/* Solve for a damped step of the terms. Return false if the matrix is singular. */
 static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS_MAX]) {
   const lapack_int terms = (lapack_int)k->terms;
   double *matrix = k->normal + k->terms * k->terms;
   memcpy(matrix, k->normal, k->terms * k->terms * sizeof *matrix);
-  memcpy(step, k->right, k->terms * sizeof *step);
+  memcpy(step, k->right_side, k->terms * sizeof *step);
   for (size_t t = 0; t < k->terms; ++t) {
     matrix[t * k->terms + t] *= 1.0 + damping;
   }
@@ -203,7 +196,7 @@ static bool factor_terms(supine_patient_krige *k) {
   return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal, terms) == 0;
 }
 
-/* Minimise the squares over the law; false where the rows do not determine it. */
+/* Minimise the squares. Return false if the rows do not determine the terms. */
 static bool descend(supine_patient_krige *k) {
   double damping = 0.0;
   linearise(k);
@@ -216,17 +209,17 @@ static bool descend(supine_patient_krige *k) {
     if (!isfinite(squares) || !find_step(k, damping, step)) {
       return false;
     }
-    k->law = moved_by(&before, step);
+    k->law = take_step(&before, step);
     for (size_t t = TERMS; t < k->terms; ++t) {
-      k->region[t - TERMS] = fmax(region_least, region[t - TERMS] + step[t]);
+      k->region[t - TERMS] = fmax(expandability_least, region[t - TERMS] + step[t]);
     }
     linearise(k);
-    if (k->squares <= squares && squares - k->squares <= settled * squares) {
+    if (k->squares <= squares && squares - k->squares <= converged * squares) {
       break;
     }
-    const bool nearer = k->squares < squares;
-    damping = nearer ? 0.1 * damping : fmax(1e-3, 10.0 * damping);
-    if (!nearer) {
+    const bool decreased = k->squares < squares;
+    damping = decreased ? 0.1 * damping : fmax(1e-3, 10.0 * damping);
+    if (!decreased) {
       k->law = before;
       memcpy(k->region, region, sizeof region);
       linearise(k);
@@ -235,7 +228,7 @@ static bool descend(supine_patient_krige *k) {
   return true;
 }
 
-/* Find the restricted log likelihood of the rows under a sill and a noise, without its constant. */
+/* Compute the restricted log likelihood of the rows, without its constant term. */
 static double likelihood_of(supine_patient_krige *k, double sill, double noise) {
   const supine_patient_power before = k->law;
   k->sill = sill;
@@ -245,17 +238,16 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
     likelihood = -INFINITY;
   }
   for (size_t t = 0; t < TERMS; ++t) {
-    const double of = spread_of(k, t);
+    const double deviation = prior_deviation(k, t);
     likelihood -= log(k->normal[t * k->terms + t]);
-    likelihood -= of > 0.0 && isfinite(of) ? log(of) : 0.0;
+    likelihood -= deviation > 0.0 && isfinite(deviation) ? log(deviation) : 0.0;
   }
   k->law = before;
   return likelihood - 0.5 * k->squares;
 }
 
-/* Choose the sill and the noise, unless given, that maximise the likelihood: first the sill, then
- * the noise, then the sill again under that noise. */
-static void choose(supine_patient_krige *k, const supine_patient_fit_options *options) {
+/* Choose the most likely sill, then the most likely noise, then the sill again, unless given. */
+static void choose_factors(supine_patient_krige *k, const supine_patient_fit_options *options) {
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
   const bool given[2] = {options->uncorrected || options->sill > 0.0, options->noise > 0.0};
@@ -280,29 +272,31 @@ static void choose(supine_patient_krige *k, const supine_patient_fit_options *op
   k->noise = best[1];
 }
 
-/* Fit the law without g from the prior's mean. */
-static bool fit_alone(supine_patient_krige *k, bool size_only) {
+/* Fit the law without g, starting from the prior mean. */
+static bool fit_uncorrected(supine_patient_krige *k, bool size_only) {
   k->sill = 0.0;
   k->noise = 1.0;
   k->options.size_only = size_only;
   k->law = k->mean;
   k->terms = TERMS;
   (void)factor(k);
-  const bool right = descend(k);
+  const bool determined = descend(k);
   k->options.size_only = false;
   k->terms = TERMS + k->options.region_count;
-  k->alone = k->law;
-  return right;
+  k->uncorrected_law = k->law;
+  return determined;
 }
 
-static supine_status open(supine_patient_krige *k, const supine_patient_fit_options *options,
-                          const supine_patient_row *rows, size_t count, supine_error *error) {
+static supine_status krige_create(supine_patient_krige *k,
+                                  const supine_patient_fit_options *options,
+                                  const supine_patient_row *rows, size_t count,
+                                  supine_error *error) {
   const bool corrected = !options->uncorrected && !options->size_only;
   const size_t terms = TERMS + options->region_count;
   *k = (supine_patient_krige){.rows = rows,
                               .count = count,
                               .options = *options,
-                              .mean = supine_patient_deep(options->gravity, options->way),
+                              .mean = supine_patient_deep(options->gravity, options->path_span),
                               .centre = malloc(count * sizeof *k->centre),
                               .factor = corrected ? malloc(count * count * sizeof(double)) : NULL,
                               .design = malloc((terms + 1) * count * sizeof *k->design),
@@ -338,25 +332,25 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        supine_patient_krige *krige, supine_error *error) {
   supine_patient_krige *k = krige;
   const int n = (int)count;
-  const supine_status status = open(k, options, rows, count, error);
+  const supine_status status = krige_create(k, options, rows, count, error);
   if (status != SUPINE_OK) {
     return status;
   }
-  bool right = fit_alone(k, true);
+  bool determined = fit_uncorrected(k, true);
   k->mean = k->law;
   if (options->size_only) {
-    return right ? SUPINE_OK : undetermined(error);
+    return determined ? SUPINE_OK : undetermined(error);
   }
-  right = right && (k->options.law == SUPINE_PATIENT_DEEP || fit_alone(k, false));
-  if (!right) {
+  determined = determined && (k->options.law == SUPINE_PATIENT_DEEP || fit_uncorrected(k, false));
+  if (!determined) {
     return undetermined(error);
   }
   k->law = k->mean;
-  choose(k, options);
-  /* Fit the law, then the correction of its residual, in units of that law's size. */
-  right = !isnan(factor(k)) && descend(k) && !isnan(factor(k));
+  choose_factors(k, options);
+  /* Scale g to the fitted law, then compute the weights of the kernels. */
+  determined = !isnan(factor(k)) && descend(k) && !isnan(factor(k));
   linearise(k);
-  if (!right || !factor_terms(k)) {
+  if (!determined || !factor_terms(k)) {
     return undetermined(error);
   }
   cblas_dcopy(n, k->design + k->terms, (int)k->terms + 1, k->weight, 1);
@@ -366,7 +360,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   return SUPINE_OK;
 }
 
-/* Compute the variance of the combination x of the terms; x is overwritten. */
+/* Compute the variance of the linear combination x of the terms; x is overwritten. */
 static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
   const int terms = (int)k->terms;
   cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, terms, k->normal, terms, x, 1);
@@ -374,13 +368,12 @@ static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
 }
 
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share) {
-  const supine_patient_krige *k = krige;
-  const lapack_int terms = (lapack_int)k->terms;
-  for (size_t r = 0; r < k->options.region_count; ++r) { /* 1 - (normal^-1 precision)[r, r] */
+  const lapack_int terms = (lapack_int)krige->terms;
+  for (size_t r = 0; r < krige->options.region_count; ++r) { /* 1 - (normal^-1 precision)[r, r] */
     double x[TERMS_MAX] = {0.0};
-    memcpy(x + TERMS, k->options.precision + r * k->options.region_count,
-           k->options.region_count * sizeof *x);
-    (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', terms, 1, k->normal, terms, x, terms);
+    memcpy(x + TERMS, krige->options.precision + r * krige->options.region_count,
+           krige->options.region_count * sizeof *x);
+    (void)LAPACKE_dpotrs(LAPACK_COL_MAJOR, 'U', terms, 1, krige->normal, terms, x, terms);
     share[r] = 1.0 - x[TERMS + r];
   }
 }
@@ -392,56 +385,55 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
     const size_t c = t < 3 ? 2 * t : exponent ? 2 * t - 5 : t;
     double x[TERMS_MAX] = {0.0};
     x[t] = exponent ? krige->law.c[c] : 1.0;
-    error[c] = spread_of(krige, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
+    error[c] = prior_deviation(krige, t) > 0.0 ? sqrt(variance_of(krige, x)) : 0.0;
   }
 }
 
 double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
                                     double *variance) {
-  supine_patient_krige *k = krige;
-  const int n = (int)k->count;
+  const int n = (int)krige->count;
   double x[TERMS_MAX];
-  double value = design_row(k, row, x) + row->value;
+  double value = design_row(krige, row, x) + row->value;
   *variance = 0.0;
-  if (k->sill > 0.0) {
-    const supine_patient_centre at = centre_of(&k->law, &row->place);
-    for (size_t i = 0; i < k->count; ++i) {
-      k->scratch[i] = k->scaled_sill * supine_dot(row->axis, k->rows[i].axis) *
-                      supine_patient_covariance(&at, &k->centre[i]);
+  if (krige->sill > 0.0) {
+    const supine_patient_centre at = centre_of(&krige->law, &row->place);
+    for (size_t i = 0; i < krige->count; ++i) {
+      krige->scratch[i] = krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis) *
+                          supine_patient_covariance(&at, &krige->centre[i]);
     }
-    value += cblas_ddot(n, k->scratch, 1, k->weight, 1);
-    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, k->factor, n, k->scratch,
-                1);
-    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, k->design, TERMS + 1, k->scratch, 1, 1.0,
-                x, 1);
-    *variance = k->scaled_sill * supine_patient_covariance(&at, &at) -
-                cblas_ddot(n, k->scratch, 1, k->scratch, 1);
+    value += cblas_ddot(n, krige->scratch, 1, krige->weight, 1);
+    cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, krige->factor, n,
+                krige->scratch, 1);
+    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, krige->design, TERMS + 1, krige->scratch,
+                1, 1.0, x, 1);
+    *variance = krige->scaled_sill * supine_patient_covariance(&at, &at) -
+                cblas_ddot(n, krige->scratch, 1, krige->scratch, 1);
   }
   for (size_t t = 0; t < TERMS; ++t) {
-    x[t] = spread_of(k, t) > 0.0 ? x[t] : 0.0;
+    x[t] = prior_deviation(krige, t) > 0.0 ? x[t] : 0.0;
   }
-  *variance = fmax(0.0, *variance) + variance_of(k, x);
+  *variance = fmax(0.0, *variance) + variance_of(krige, x);
   return value;
 }
 
-void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient) {
-  const supine_patient_krige *k = krige;
-  patient->power = k->law;
+void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient) {
+  patient->power = krige->law;
   patient->centre_count = 0;
-  for (size_t i = 0; i < k->count && k->sill > 0.0; ++i) {
-    const supine_patient_centre centre = k->centre[i];
+  for (size_t i = 0; i < krige->count && krige->sill > 0.0; ++i) {
+    const supine_patient_centre centre = krige->centre[i];
     supine_patient_centre *last = patient->centre + patient->centre_count;
-    if (k->rows[i].weight <= 0.0) {
+    if (krige->rows[i].weight <= 0.0) {
       continue;
     }
-    /* Rows at one place share a centre. */
-    if ((patient->centre_count == 0 || memcmp(last[-1].at, centre.at, sizeof centre.at) != 0) &&
+    /* The rows of a landmark share a centre. */
+    if ((patient->centre_count == 0 ||
+         memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) &&
         patient->centre_count < SUPINE_PATIENT_CENTRES_MAX) {
       ++patient->centre_count;
       *last++ = centre;
     }
     for (size_t a = 0; a < 3; ++a) {
-      last[-1].weight[a] += k->scaled_sill * k->weight[i] * k->rows[i].axis[a];
+      last[-1].weight[a] += krige->scaled_sill * krige->weight[i] * krige->rows[i].axis[a];
     }
   }
 }

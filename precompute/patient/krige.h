@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a law to measurements. A landmark gives three rows, a point of a surface one, along the
- * normal of the other surface. A law and the kriging of its residual are fitted together to rows:
+/* Fit a law, the motion between the scans and a correction of the residual to measured rows:
  *
  *     value = axis . (u(c) + motion + g) + noise
  *
- * The nine constants c have a normal prior about those of a known law, narrow to keep that law,
- * wide to find a new one. The fit takes the most likely c (generalised least squares,
- * Gauss-Newton with damping); g has the covariance in runtime/kriging.h, or a share of it. */
+ * A landmark gives three rows, one for each axis; a point of a surface gives one, along the normal
+ * of the other surface. u(c) is the displacement by the law with nine constants c, which have a
+ * normal prior about those of a known law: narrow to keep that law, wide to find a new one. The
+ * correction g is kriging; its covariance is a multiple of that in runtime/kriging.h. The fit finds
+ * the most likely c (generalised least squares, damped Gauss-Newton). */
 #ifndef SUPINE_PATIENT_KRIGE_H
 #define SUPINE_PATIENT_KRIGE_H
 
@@ -15,73 +16,48 @@
 #include "precompute/patient/pairs.h"
 #include "precompute/patient/patient.h"
 
-/* --- measurements ---------------------------------------------------------------------------- */
-
+/* One measured component of a displacement. */
 typedef struct supine_patient_row {
   supine_patient_place place;
-  double axis[3];         /* unit */
-  double value;           /* displacement along the axis, mm */
-  double weight;          /* weight of the squared residual */
-  double noise;           /* standard deviation, mm */
-  size_t block;           /* index of the block that it is held out with */
-  const double *response; /* [regions] spread force of each region alone; NULL: none is fitted */
+  double axis[3]; /* direction of the component, unit vector */
+  double value;   /* displacement along the axis, mm */
+  double weight;  /* factor on the squared residual */
+  double noise;   /* standard deviation of the noise, mm */
+  size_t block;   /* index of the block of rows that are held out together */
+  const double
+      *response; /* [regions] spread force due to each region of expandability 1, or NULL */
 } supine_patient_row;
 
-/* Make three rows of each pair into rows [3 count]. */
+/* Make three rows of each pair of landmarks, into rows [3 pairs->count]. */
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
                                   const supine_patient_pairs *pairs, supine_patient_row *rows);
 
-/* Assign each row to a block, a cube of 40 mm of a grid with random origin; return the number of
- * blocks. */
+/* Assign each row to a cube of 40 mm (a block) in a grid with a random origin. Return the number
+ * of blocks; 0: out of memory. */
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed);
 
-/* Assign each row to a block, and each block at random to a fold. Return the number of blocks; 0:
- * no memory.
- * @param fold  [count] written: the fold of each row */
-size_t supine_patient_rows_fold(const supine_patient_frame *frame, supine_patient_row *rows,
-                                size_t count, unsigned long seed, size_t *fold);
-
-/* Folds of the held-out blocks, and grids with other origins for which they are repeated. */
-enum { SUPINE_PATIENT_FOLDS = 5, SUPINE_PATIENT_SEEDS = 3 };
-
-/* --- the law at a row ------------------------------------------------------------------------ */
-
-/* Unknowns: c1, c3, c5; logarithms of c2, c4, c6; c7 to c9; translation; small rotation;
- * scale of the whole law. The expandability of each region follows, where it is fitted. */
+/* Unknowns: c1, c3, c5; logarithms of c2, c4, c6; c7 to c9; translation; small rotation; relative
+ * size of the law. The expandability of each region follows if it is fitted. */
 enum { SUPINE_PATIENT_TERMS = 16, SUPINE_PATIENT_REGIONS_MAX = 256 };
 
-/* Compute the derivative of a row by each unknown; return the law's value less the row's, mm. */
+/* Compute the derivatives x of a row's displacement by the unknowns; return the displacement by the
+ * law and the motion less the measured value, mm. */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]);
 
-/* --- maps without a law ---------------------------------------------------------------------- */
-
-enum { SUPINE_PATIENT_AFFINE = 12 };
-
-/* Fit a displacement t or t + M x, x from the box's centre in units of 100 mm; 0 if the fit fails.
- * @param map  t (mm), then M by rows */
-void supine_patient_affine_fit(const supine_patient_row *rows, size_t count, bool translation,
-                               double map[SUPINE_PATIENT_AFFINE]);
-
-/* Compute the map's value less the row's, mm. */
-double supine_patient_affine_residual(const double map[SUPINE_PATIENT_AFFINE],
-                                      const supine_patient_row *row);
-
-/* --- the fit --------------------------------------------------------------------------------- */
-
-/* Zero-initialised: the deep law, corrected, no motion between the scans. */
+/* Options of the fit; all 0: the deep law with correction g, no motion between the scans. */
 typedef struct supine_patient_fit_options {
   supine_patient_law law;
-  supine_patient_moved moved;
-  bool uncorrected;  /* leave g out */
-  bool size_only;    /* fit only the size of the deep law, and the motion */
-  double gravity[3]; /* of the emptier state; all 0: supine */
-  double way[3];     /* by axis, as for supine_patient_deep */
-  double sill;       /* factor on the covariance of g; 0: the most likely one */
-  double noise;      /* factor on the noise of the rows; 0: the most likely one */
-  /* Regions whose expandability a_k is fitted, and their prior: the force on a row is the sum over
-   * k of a_k response_k, and a - 1 has this precision [regions, regions] and mean 0. */
+  supine_patient_scan_motion scan_motion;
+  bool uncorrected;    /* fit without the correction g */
+  bool size_only;      /* fit only the size of the deep law and the motion */
+  double gravity[3];   /* unit vector in the emptier state; 0,0,0: supine */
+  double path_span[3]; /* difference between the two states' gains (supine_patient_deep) */
+  double sill;         /* factor on the covariance of g; 0: the most likely one */
+  double noise;        /* factor on the noise of the rows; 0: the most likely one */
+  /* Number of regions whose expandability a_k is fitted, and the prior precision of a - 1
+   * [regions, regions]. The force at a row is the sum over k of a_k response_k. */
   size_t region_count;
   const double *precision;
 } supine_patient_fit_options;
@@ -91,29 +67,30 @@ typedef struct supine_patient_krige {
   const supine_patient_row *rows;
   size_t count;
   supine_patient_fit_options options;
-  size_t terms;                              /* unknowns of `design` and `normal` */
-  double region[SUPINE_PATIENT_REGIONS_MAX]; /* expandability of each region; 1 of uniform tissue */
-  double sill, noise;                        /* factors in use; a sill of 0: no g */
-  supine_patient_power mean;                 /* prior mean of the constants */
-  supine_patient_power alone;                /* the law fitted without g */
+  size_t terms;                              /* number of unknowns */
+  double region[SUPINE_PATIENT_REGIONS_MAX]; /* expandability of each region */
+  double sill, noise;                   /* chosen factors on the covariance of g and on the noise */
+  supine_patient_power mean;            /* prior mean of the constants */
+  supine_patient_power uncorrected_law; /* law fitted without g */
   supine_patient_power law;
-  double scaled_sill;            /* factor on the covariance of g, for a law of size 1 */
-  supine_patient_centre *centre; /* [count] kernel of each row, without its weight */
-  double *factor;                /* [count, count] Cholesky factor of the covariance, if g */
-  double *design;                /* [count, terms + 1] whitened derivatives and residual */
-  double *weight;                /* [count] weight of each row's kernel */
-  double *scratch;               /* [count] */
-  double *normal; /* [2, terms, terms] normal matrix, in the end its Cholesky factor; work space */
-  double squares; /* squared whitened residual, plus the prior's */
+  double scaled_sill;            /* sill, scaled to the fitted size of the law */
+  supine_patient_centre *centre; /* [count] kernel of each row; its weight is not set */
+  double *factor; /* [count, count] Cholesky factor of the covariance of the rows; NULL without g */
+  double *design; /* [count, terms + 1] derivatives and residual of each row, whitened */
+  double *weight; /* [count] weight of each row's kernel */
+  double *scratch; /* [count] work space */
+  double *normal;  /* [2, terms, terms] normal matrix (after the fit, its factor) and work space */
+  double squares;  /* whitened squared residual plus squared deviation from the prior */
   /* Right-hand side of the normal equations. */
-  double right[SUPINE_PATIENT_TERMS + SUPINE_PATIENT_REGIONS_MAX];
+  double right_side[SUPINE_PATIENT_TERMS + SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_krige;
 
-/* Fit the size of the deep law, which gives the prior's mean, then the law and g. `deep` keeps the
- * shape of that law if the sill is at least 1, that of other patients; otherwise its constants have
- * a prior deviation of 30 %. Those of `paper` have a wide prior. Rows of weight 0 are ignored.
+/* Fit the size of the deep law, which gives the prior mean, then the law and g. With a sill of at
+ * least 1, SUPINE_PATIENT_DEEP changes only the size of the deep law; with a smaller one, the prior
+ * standard deviation of its constants is 30 %. SUPINE_PATIENT_PAPER has a wide prior. Rows of
+ * weight 0 do not count.
  * @param rows   [count], must outlive the fit
- * @param krige  freed with supine_patient_krige_free, after a failure too
+ * @param krige  release with supine_patient_krige_free, also after a failure
  * @retval SUPINE_ERROR_NUMERICAL  the rows do not determine the law
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
@@ -121,25 +98,23 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
                                        supine_patient_krige *krige, supine_error *error);
 void supine_patient_krige_free(supine_patient_krige *krige);
 
-/* Compute the share [regions] of each region's expandability that the rows determine: the diagonal
- * of the resolution matrix. The remainder comes from neighbouring regions. */
+/* Compute the share [regions] of each region's expandability that the rows determine, the diagonal
+ * of the resolution matrix. The prior determines the remainder. */
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share);
 
-/* Compute the standard errors of c1 to c9; 0 for a constant that is not fitted. */
+/* Compute the standard errors of c1 to c9; 0 for constants that are not fitted. */
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]);
 
-/* Predict a row's value, mm. Overwrites the fit's scratch space, so one thread at a time.
+/* Predict a row's value, mm. Not thread-safe: it overwrites the scratch space.
  * @param variance  written: variance of the prediction without noise, mm^2 */
 double supine_patient_krige_predict(supine_patient_krige *krige, const supine_patient_row *row,
                                     double *variance);
 
-/* Copy the law, its correction and the motion into a patient whose frame is set. */
-void supine_patient_krige_take(const supine_patient_krige *krige, supine_patient *patient);
+/* Copy the law, the correction and the motion into a patient. */
+void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient);
 
-/* --- held-out error -------------------------------------------------------------------------- */
-
-/** Predictions of the displacement: the baselines, the law, and the law with its correction. */
+/** Predictions of the displacement: three baselines, the law, and the law with its correction. */
 typedef enum supine_patient_score {
   SUPINE_PATIENT_SCORE_NONE,
   SUPINE_PATIENT_SCORE_TRANSLATION,
@@ -149,24 +124,24 @@ typedef enum supine_patient_score {
   SUPINE_PATIENT_SCORES
 } supine_patient_score;
 
-/** Result of a fit; errors are in mm RMS. */
+/** Result of a fit; errors are RMS, in mm. */
 typedef struct supine_patient_fit_report {
-  double points;                          /**< number of landmarks, or of points of a surface */
-  double blocks;                          /**< number of cubes of 40 mm with points in them */
-  double fitted[SUPINE_PATIENT_SCORES];   /**< on the fitted points */
-  double held_out[SUPINE_PATIENT_SCORES]; /**< on held-out blocks */
-  double baseline;  /**< on held-out blocks: of a translation if the scans moved, else of none */
-  double band;      /**< % of the held-out points within the 95 % band */
-  double explained; /**< held-out share of the squared displacement that the law explains, % */
-  double expected_point;                  /**< expected error of points in three dimensions */
-  double expected_constant;               /**< its square for each mm of displacement, mm */
+  double points;                          /**< number of landmarks or points of a surface */
+  double blocks;                          /**< number of blocks of 40 mm that contain points */
+  double fitted[SUPINE_PATIENT_SCORES];   /**< error at the fitted points */
+  double held_out[SUPINE_PATIENT_SCORES]; /**< error at held-out points */
+  double baseline;  /**< held-out error of a translation if the scans moved, else of no motion */
+  double band;      /**< share of the held-out points within the 95 % band, % */
+  double explained; /**< share of the squared held-out displacement that the law explains, % */
+  double expected_point;                  /**< expected error of a point, in three dimensions */
+  double expected_constant;               /**< squared expected error over displacement, mm */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
 } supine_patient_fit_report;
 
 /** Fit a law and its correction to rows, and measure its error on held-out blocks of 40 mm.
- * @param rows     [single + 3 triples]; their `block` is written
- * @param single   rows of points with one known component; they come first
- * @param triples  landmarks, three rows each
+ * @param rows     [single + 3 triples]; `block` of each is written
+ * @param single   number of points on surfaces, one row each; they come first
+ * @param triples  number of landmarks, three rows each
  * @param patient  in: the frame of the rows; out: the law and its correction
  * @retval SUPINE_ERROR_FORMAT     fewer points than the law has unknowns
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Match vertices to nearest points with compatible normals, and weight them. */
+/* Match vertices to the nearest points of another surface. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,11 +15,11 @@
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5;    /* least cosine between normals: 60 degrees */
-static const double biweight = 4.685;    /* cutoff over the scale: 95 % efficiency */
-static const double surface_noise = 0.5; /* standard deviation along the normal, mm */
-static const double scale_least = 0.02;  /* least scale, mm: surfaces are no more precise */
-static const double matched_least = 0.3; /* least share of the vertices that match */
+static const double compatible = 0.5;    /* cosine of the largest angle of compatible normals */
+static const double biweight = 4.685;    /* cutoff over the robust scale (95 % efficiency) */
+static const double surface_noise = 0.5; /* standard deviation of a row, mm */
+static const double scale_least = 0.02;  /* lower bound on the robust scale, mm */
+static const double matched_least = 0.3; /* smallest accepted share of vertices with a match */
 
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
@@ -29,7 +29,7 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
     const double *from = m->rest->mesh.vertices + 3 * match->vertex;
     supine_patient_row *row = &m->rows[i];
     supine_inside_place *place = &match->nearest;
-    *place = supine_inside_surface_nearest(m->tree, match->moved, place);
+    *place = supine_inside_surface_nearest(m->tree, match->position, place);
     const uint32_t *corner = m->state->triangles + 3 * place->triangle;
     double normal[3] = {0.0, 0.0, 0.0};
     double cosine = 0.0;
@@ -43,7 +43,7 @@ static void match_range(void *context, size_t begin, size_t end, size_t thread) 
     for (size_t k = 0; k < 3; ++k) {
       row->axis[k] = length > 0.0 ? normal[k] / length : 0.0;
       row->value += row->axis[k] * (place->nearest[k] - from[k]);
-      match->distance += row->axis[k] * (place->nearest[k] - match->moved[k]);
+      match->distance += row->axis[k] * (place->nearest[k] - match->position[k]);
       cosine += row->axis[k] * m->rest_normals[3 * match->vertex + k];
     }
     row->weight = cosine > compatible ? 1.0 : 0.0;
@@ -56,33 +56,32 @@ void supine_patient_matching_find(supine_patient_matching *matching) {
 
 supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
                                             supine_error *error) {
-  supine_patient_matching *m = matching;
   size_t count = 0;
   double squares = 0.0;
   double weights = 0.0;
-  for (size_t i = 0; i < m->count; ++i) {
-    if (m->rows[i].weight > 0.0) {
-      m->space[count++] = fabs(m->match[i].distance);
+  for (size_t i = 0; i < matching->count; ++i) {
+    if (matching->rows[i].weight > 0.0) {
+      matching->space[count++] = fabs(matching->match[i].distance);
     }
   }
-  m->matched = (double)count / (double)m->count;
-  if (m->matched < matched_least) {
+  matching->matched = (double)count / (double)matching->count;
+  if (matching->matched < matched_least) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
                             "only %.0f %% of the vertices find a point that faces the same way on "
                             "the surface of the other state: check that axes and person are the "
                             "same, and that no triangles face inwards",
-                            100.0 * m->matched);
+                            100.0 * matching->matched);
   }
-  gsl_sort(m->space, 1, count);
-  const double most = fmax(fmax(scale_least, scale), 1.4826 * m->space[count / 2]);
-  for (size_t i = 0; i < m->count; ++i) {
-    const double distance = m->match[i].distance;
-    const double t = distance / (biweight * most);
-    m->rows[i].weight *= fabs(t) < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
-    squares += m->rows[i].weight * distance * distance;
-    weights += m->rows[i].weight;
+  gsl_sort(matching->space, 1, count);
+  const double cutoff_scale = fmax(fmax(scale_least, scale), 1.4826 * matching->space[count / 2]);
+  for (size_t i = 0; i < matching->count; ++i) {
+    const double distance = matching->match[i].distance;
+    const double t = distance / (biweight * cutoff_scale);
+    matching->rows[i].weight *= fabs(t) < 1.0 ? (1.0 - t * t) * (1.0 - t * t) : 0.0;
+    squares += matching->rows[i].weight * distance * distance;
+    weights += matching->rows[i].weight;
   }
-  m->rms = sqrt(squares / weights);
+  matching->rms = sqrt(squares / weights);
   return SUPINE_OK;
 }
 
@@ -94,9 +93,10 @@ void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
   double least = INFINITY;
   size_t nearest = 0;
   for (size_t k = 0; k < stiffness->count; ++k) {
-    const supine_patient_mode *mode = &stiffness->mode[k];
-    const double distance = mode->side == side ? supine_distance(mode->centre, point) : INFINITY;
-    const double q = fmin(1.0, fmax(0.0, 2.0 - 2.0 * distance / mode->radius));
+    const supine_patient_region *region = &stiffness->region[k];
+    const double distance =
+        region->side == side ? supine_distance(region->centre, point) : INFINITY;
+    const double q = fmin(1.0, fmax(0.0, 2.0 - 2.0 * distance / region->radius));
     shares[k] = q * q * (3.0 - 2.0 * q);
     sum += shares[k];
     nearest = distance < least ? k : nearest;
@@ -114,7 +114,7 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
     double a = stiffness->count == 0 ? 1.0 : 0.0;
     supine_patient_stiffness_shares(stiffness, lungs, i, shares);
     for (size_t k = 0; k < stiffness->count; ++k) {
-      a += stiffness->mode[k].value * shares[k];
+      a += stiffness->region[k].value * shares[k];
     }
     e[i] = 1.0 / a;
   }
@@ -129,10 +129,14 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   if (e == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
+  for (size_t i = 0; i < n; ++i) {
+    const supine_patient_place place = supine_patient_find_vertex(m->rest, i);
+    memcpy(m->spread + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
+  }
   supine_patient_stiffness_of(stiffness, m->rest, e);
   supine_status status = supine_physics_equilibrium_set_stiffness(m->equilibrium, e, error);
   if (status == SUPINE_OK) {
-    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->columns,
+    status = supine_physics_equilibrium_solve(m->equilibrium, SUPINE_PATIENT_COLUMNS, m->spread,
                                               m->spread, error);
   }
   for (size_t i = 0; i < m->count && status == SUPINE_OK; ++i) {
@@ -143,10 +147,10 @@ supine_status supine_patient_matching_solve(supine_patient_matching *matching,
   return status;
 }
 
-void supine_patient_matching_choose(supine_patient_matching *matching, size_t most) {
+void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit) {
   supine_patient_matching *m = matching;
   const size_t n = m->rest->mesh.vertex_count;
-  m->count = n < most ? n : most;
+  m->count = n < limit ? n : limit;
   m->landmark_row_count = 0;
   for (size_t i = 0; i < m->count; ++i) {
     const size_t v = i * n / m->count;
@@ -155,42 +159,38 @@ void supine_patient_matching_choose(supine_patient_matching *matching, size_t mo
                                       .noise = surface_noise};
     memcpy(m->rows[i].place.force, m->spread + SUPINE_PATIENT_COLUMNS * v,
            sizeof m->rows[i].place.force);
-    memcpy(m->match[i].moved, m->rest->mesh.vertices + 3 * v, sizeof m->match[i].moved);
+    memcpy(m->match[i].position, m->rest->mesh.vertices + 3 * v, sizeof m->match[i].position);
   }
 }
 
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
-                                             const supine_patient_stiffness *stiffness, size_t most,
-                                             size_t landmarks, supine_patient_matching *matching,
+                                             const supine_patient_stiffness *stiffness,
+                                             size_t limit, size_t landmarks,
+                                             supine_patient_matching *matching,
                                              supine_error *error) {
   const size_t n = rest->mesh.vertex_count;
   supine_patient_matching *m = matching;
   *m = (supine_patient_matching){.rest = rest, .state = state};
   m->frame = supine_patient_frame_of_lungs(rest);
-  m->columns = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
   m->spread = malloc(SUPINE_PATIENT_COLUMNS * n * sizeof(double));
   m->rest_normals = malloc(3 * n * sizeof(double));
   m->state_normals = malloc(3 * state->vertex_count * sizeof(double));
   m->match = malloc(n * sizeof *m->match);
   m->rows = malloc((n + 3 * landmarks) * sizeof *m->rows);
   m->space = malloc(n * sizeof(double));
-  if (m->columns == NULL || m->spread == NULL || m->rest_normals == NULL ||
-      m->state_normals == NULL || m->match == NULL || m->rows == NULL || m->space == NULL) {
+  if (m->spread == NULL || m->rest_normals == NULL || m->state_normals == NULL ||
+      m->match == NULL || m->rows == NULL || m->space == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   }
   supine_mesh_vertex_normals(&rest->mesh, m->rest_normals);
   supine_mesh_vertex_normals(state, m->state_normals);
-  for (size_t i = 0; i < n; ++i) {
-    const supine_patient_place place = supine_patient_find_vertex(rest, i);
-    memcpy(m->columns + SUPINE_PATIENT_COLUMNS * i, place.force, sizeof place.force);
-  }
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_status status = supine_physics_model_equilibrium(rest, &model, &m->equilibrium, error);
   if (status == SUPINE_OK) {
     status = supine_patient_matching_solve(m, stiffness, error);
   }
   if (status == SUPINE_OK) {
-    supine_patient_matching_choose(m, most);
+    supine_patient_matching_choose(m, limit);
     status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
                                           false, &m->tree, error);
   }
@@ -198,16 +198,14 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
 }
 
 void supine_patient_matching_free(supine_patient_matching *matching) {
-  supine_patient_matching *m = matching;
-  supine_inside_surface_destroy(m->tree);
-  supine_physics_equilibrium_destroy(m->equilibrium);
-  free(m->columns);
-  free(m->spread);
-  free(m->rest_normals);
-  free(m->state_normals);
-  free(m->match);
-  free(m->rows);
-  free(m->space);
+  supine_inside_surface_destroy(matching->tree);
+  supine_physics_equilibrium_destroy(matching->equilibrium);
+  free(matching->spread);
+  free(matching->rest_normals);
+  free(matching->state_normals);
+  free(matching->match);
+  free(matching->rows);
+  free(matching->space);
 }
 
 static void place_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -223,8 +221,8 @@ static void place_range(void *context, size_t begin, size_t end, size_t thread) 
     m->space[i] = 0.0;
     for (size_t a = 0; a < 3; ++a) {
       const double at = m->rest->mesh.vertices[3 * match->vertex + a] + u[a] + motion[a];
-      m->space[i] += pow(at - match->moved[a], 2.0);
-      match->moved[a] = at;
+      m->space[i] += pow(at - match->position[a], 2.0);
+      match->position[a] = at;
     }
   }
 }

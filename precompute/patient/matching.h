@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Match vertices of the reference surface to the nearest points of the surface in another state, as
- * the data of a fit to surfaces. */
+/* Match vertices of the reference surface to nearest points of the surface in another state. */
 #ifndef SUPINE_PATIENT_MATCHING_H
 #define SUPINE_PATIENT_MATCHING_H
 
@@ -8,11 +7,11 @@
 #include "precompute/patient/patient_file.h"
 #include "precompute/physics/model.h"
 
-/* A vertex of the reference surface that takes part, and its match on the other surface. */
+/* A chosen vertex of the reference surface and its match on the other surface. */
 typedef struct supine_patient_match {
-  size_t vertex;               /* index in the reference surface */
-  double moved[3];             /* position after the displacement by the law, mm */
-  double distance;             /* from there to the other surface along its normal, mm */
+  size_t vertex;      /* index in the reference surface */
+  double position[3]; /* position displaced by the present law, mm */
+  double distance;    /* distance of `position` from the other surface along its normal, mm */
   supine_inside_place nearest; /* nearest point of the other surface */
 } supine_patient_match;
 
@@ -22,80 +21,77 @@ typedef struct supine_patient_matching {
   supine_patient_frame frame;
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
-  double *columns;               /* [N, COLUMNS] columns of the force before spreading */
-  double *spread;                /* [N, COLUMNS] columns of the force after spreading */
+  double *spread;                /* [N, COLUMNS] spread terms of (18) */
   double *rest_normals;          /* [N, 3] unit normals of the reference surface */
   double *state_normals;         /* [state vertices, 3] unit normals of the other surface */
-  size_t count;                  /* number of vertices that take part */
+  size_t count;                  /* number of chosen vertices */
   supine_patient_match *match;   /* [count] */
   supine_patient_row *rows;      /* [count + landmark_row_count] */
   double *space;                 /* [count] working space */
-  double matched;                /* share of the vertices with a compatible normal at the match */
-  double rms;                    /* weighted RMS of the matches' distances, mm */
-  const supine_patient *patient; /* law that moved the vertices last */
-  size_t landmark_row_count;     /* three rows for each landmark */
+  double matched;                /* share of the vertices whose match has a compatible normal */
+  double rms;                    /* weighted RMS distance of the matches, mm */
+  const supine_patient *patient; /* law that last displaced the vertices */
+  size_t landmark_row_count;     /* number of rows of landmarks, three for each */
 } supine_patient_matching;
 
-/* Spread the columns of the force and choose at most `most` vertices of the reference surface;
- * allocate rows for them and for a number of landmarks. Free the matching even after a failure.
- * @retval SUPINE_ERROR_MEMORY, those of the solve */
+/* Spread the terms of (18), choose at most `limit` vertices of the reference surface, and
+ * allocate rows for them and for `landmarks` landmarks. Free the matching also after a failure.
+ * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
-                                             const supine_patient_stiffness *stiffness, size_t most,
-                                             size_t landmarks, supine_patient_matching *matching,
+                                             const supine_patient_stiffness *stiffness,
+                                             size_t limit, size_t landmarks,
+                                             supine_patient_matching *matching,
                                              supine_error *error);
 void supine_patient_matching_free(supine_patient_matching *matching);
 
-/* Choose the vertices that take part, at most `most` at even steps of the index, and initialise
- * their matches and rows. The rows of landmarks are dropped. */
-void supine_patient_matching_choose(supine_patient_matching *matching, size_t most);
+/* Choose at most `limit` vertices at even steps of the index, and initialise their matches and
+ * rows. Rows of landmarks are dropped. */
+void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit);
 
-/* Spread the columns of the force under a stiffness; write them to `spread` and the rows.
- * @retval SUPINE_ERROR_MEMORY, those of the solve */
+/* Spread the terms of (18) through tissue of the given stiffness, into `spread` and the rows.
+ * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const supine_patient_stiffness *stiffness,
                                             supine_error *error);
 
-/* Move the vertices by the law at their rows, with a correction, and return the RMS change of
- * their positions, mm. */
+/* Displace the chosen vertices by a fitted law. Return the RMS change of their positions, mm. */
 double supine_patient_matching_place(supine_patient_matching *matching,
                                      const supine_patient *patient);
 
-/* Set row i to the tangent plane of the other surface at its point nearest to the moved vertex i;
- * weight 1, or 0 if the normals are incompatible. */
+/* Match each displaced vertex to the nearest point of the other surface. Its row becomes the
+ * displacement along the normal at that point, with weight 1, or 0 if the normals are
+ * incompatible. */
 void supine_patient_matching_find(supine_patient_matching *matching);
 
-/* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the distances,
- * and find the matched share and the RMS distance.
- * @param scale  least scale, mm; INFINITY: keep the weights
+/* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the distances;
+ * find the matched share and the RMS distance.
+ * @param scale  lower bound on the robust scale, mm; INFINITY: leave the weights as they are
  * @retval SUPINE_ERROR_MESH  less than 30 % of the vertices match */
 supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
                                             supine_error *error);
 
-/** Find the weights [count] of the regions at a vertex; they sum to 1. */
+/** Compute the weights [stiffness->count] of the regions at a vertex, with sum 1. */
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
                                      const supine_lungs *lungs, size_t vertex, double *shares);
 
-/** Compute the relative stiffness E [N] of every vertex. */
+/** Compute the relative stiffness e [N] of every vertex. */
 void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
                                  const supine_lungs *lungs, double *e);
 
-/** Find the expandability from motion ([Santhanam2008] VI): a stiffness for each region of a lung,
- * such that a known force moves it to the other surface.
+/** Find the expandability a of each region of the lungs from the displacement between two surfaces
+ * ([Santhanam2008] VI).
  *
- * The motion depends only on the product a f of expandability and force, so f is fixed to
- * that of the law deep. The spread force F is then linear in the regions' values a_k, F = sum of
- * a_k F_k, where F_k is the spread force of region k alone: one solve with a right-hand side for
- * each region. The values are fitted together with the constants of the paper law and the motion
- * between the scans (krige.h), with a prior that keeps neighbours alike and a near 1; fit and
- * nearest points alternate. Where the surfaces say little about a region, its neighbours determine
- * it.
+ * The displacement depends only on the product a f of expandability and force, so f is fixed to
+ * the force of the deep law. The spread force F is then linear in the values a_k of the regions:
+ * F = sum over k of a_k F_k, where F_k is the spread force of region k by itself. The values are
+ * fitted together with the constants of the paper's law and the motion between the scans (krige.h),
+ * under a prior that a is near 1 and similar in neighbouring regions. Fits alternate with matching.
  *
- * The result is kept only if it predicts held-out blocks of 40 mm better than uniform tissue
- * does under the same force.
- * @param matching   without landmarks; its force is spread by the stiffness afterwards
- * @param options    of the paper's law; the gravity of the other state
- * @param patient    its frame is set; overwritten
- * @param stiffness  no regions if it was not kept
+ * The regions are kept only if they predict held-out blocks of 40 mm better than uniform tissue.
+ * @param matching   without landmarks; on return its force is spread by the found stiffness
+ * @param options    the paper's law, and gravity in the other state
+ * @param patient    in: the frame; out: the fitted law
+ * @param stiffness  written; without regions if they are not kept
  * @retval SUPINE_ERROR_NUMERICAL, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_expand(supine_patient_matching *matching,
                                     const supine_patient_fit_options *options,
@@ -104,9 +100,9 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
 
 /** Find the force that the displacement to the other surface implies, averaged over blocks, and fit
  * (18) to it.
- * @param matching  solved with the stiffness; afterwards it holds every vertex
- * @param patient   the law fitted to the matching; its correction is not used
- * @param gravity   of the other state
+ * @param matching  its force is spread by the patient's stiffness; on return every vertex is chosen
+ * @param patient   the law fitted to the matching; the correction is not used
+ * @param gravity   unit vector in the other state
  * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine (18)
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_applied_find(supine_patient_matching *matching,

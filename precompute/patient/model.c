@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make the model of a basis from a patient's law, and find the state of its scan. */
+/* Make a model of a patient's law, and find the state of a scan. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,50 +12,49 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between the faces of the surface's box and those of the nearest state's, over
- * the width of the latter: for a state's box of landmarks, which is an estimate, and of a surface.
- */
+/* Largest distance between faces of a surface's box and of a state's box, over the width of the
+ * latter, which was found from landmarks [0] or from a surface [1]. */
 static const double apart_most[2] = {0.45, 0.2};
 
-/* Least force, relative to its mean of 1, that a displacement is divided by. */
+/* Lower bound on a force that a displacement is divided by; the mean force is 1. */
 static const double force_least = 0.2;
 
-/* Least part of the way between the two states; below it they count as full and rest. */
+/* Smallest distance of the two states on the path; if nearer, they count as full and rest. */
 static const double part_least = 0.02;
 
-/* Range of a lung's volume at rest over its full volume. */
+/* Plausible range of the volume at rest over the full volume. */
 static const double share_least = 0.15, share_most = 0.95;
 
-/* --- the path between the states -------------------------------------------------------------- */
-
-/* Find the full volume implied by one of the two states, mL; 0 if unknown. */
+/* Compute the full volume implied by one of the two states, mL; 0 if unknown. */
 static double full_volume(const supine_patient_record *record, size_t state,
                           const supine_resting *resting) {
-  const supine_state *of = &record->state[state];
-  const double held = record->volume[state];
-  return held <= 0.0 ? 0.0
-         : of->volume.kind == SUPINE_VOLUME_FULL
-             ? (held - of->volume.ml) / supine_reference_full_share(of->gravity)
-         : of->volume.kind == SUPINE_VOLUME_REST
-             ? (held - of->volume.ml) / supine_reference_resting_total(resting, of->gravity)
+  const supine_state *shown = &record->state[state];
+  const double lung_volume = record->volume[state];
+  return lung_volume <= 0.0 ? 0.0
+         : shown->volume.kind == SUPINE_VOLUME_FULL
+             ? (lung_volume - shown->volume.ml) / supine_reference_full_share(shown->gravity)
+         : shown->volume.kind == SUPINE_VOLUME_REST
+             ? (lung_volume - shown->volume.ml) /
+                   supine_reference_resting_total(resting, shown->gravity)
              : 0.0;
 }
 
-static double full_of_either(const supine_patient_record *record, const supine_resting *resting) {
+static double either_full_volume(const supine_patient_record *record,
+                                 const supine_resting *resting) {
   const double full = full_volume(record, 0, resting);
   return full > 0.0 ? full : full_volume(record, 1, resting);
 }
 
-/* Find each state's part of the way from full inflation (0) to rest (1). */
+/* Find the part of the path from full inflation (0) to rest (1) at which each state is. */
 static void find_parts(const supine_patient_record *record, double part[2]) {
   supine_resting resting = supine_reference_resting_default();
   supine_patient_resting(record, &resting);
-  const double full = full_of_either(record, &resting);
+  const double full = either_full_volume(record, &resting);
   const double rest = full * supine_reference_resting_total(&resting, record->state[1].gravity);
   for (size_t k = 0; k < 2; ++k) {
-    const supine_volume *of = &record->state[k].volume;
-    part[k] = of->ml == 0.0 && of->kind == SUPINE_VOLUME_REST   ? 1.0
-              : of->ml == 0.0 && of->kind == SUPINE_VOLUME_FULL ? 0.0
+    const supine_volume *stated = &record->state[k].volume;
+    part[k] = stated->ml == 0.0 && stated->kind == SUPINE_VOLUME_REST   ? 1.0
+              : stated->ml == 0.0 && stated->kind == SUPINE_VOLUME_FULL ? 0.0
               : full > 0.0 && record->volume[k] > 0.0
                   ? (cbrt(full) - cbrt(record->volume[k])) / (cbrt(full) - cbrt(rest))
                   : (double)k;
@@ -66,7 +65,7 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   }
 }
 
-/* Compute the gains by axis at two parts of the way. */
+/* Compute the gains along x, y and z at two parts of the path. */
 static void find_gains(const double part[2], double gains[2][3]) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   supine_volume_bend(deep.bend, part[0], gains[0]);
@@ -79,18 +78,15 @@ void supine_patient_path(const supine_patient_record *record, double gains[2][3]
   find_gains(part, gains);
 }
 
-/* --- the model ------------------------------------------------------------------------------- */
-
 typedef struct work {
   const supine_patient_record *record;
-  supine_lungs lungs;  /* present estimate of the lungs in the fuller state */
-  const double *scan;  /* [N, 3] */
-  const double *ratio; /* [N] spread force over (18) at the vertex */
-  double *moved;       /* [N, 3] displacements, mm */
-  bool settle;         /* the scan is the emptier state: find its vertices in the fuller one */
+  supine_lungs lungs;   /* estimate of the lungs in the fuller state */
+  const double *scan;   /* [N, 3] vertices of the scan if it is the emptier state, else NULL */
+  double *ratio;        /* [N] spread force over (18) */
+  double *displacement; /* [N, 3] between the states, mm */
 } work;
 
-/* Find the displacement of each vertex, and its place in the fuller state. */
+/* Compute the displacement of vertices between the states, and positions in the fuller one. */
 static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const work *w = context;
@@ -99,24 +95,24 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
     const double side = supine_patient_side_of(&w->lungs, i);
     const double spread = w->record->from_surface ? w->ratio[i] : 1.0;
     double *at = w->lungs.mesh.vertices + 3 * i;
-    if (w->settle) {
-      supine_patient_settle(patient, w->scan + 3 * i, side, spread, at, w->moved + 3 * i);
+    if (w->scan != NULL) {
+      supine_patient_find_in_fuller(patient, w->scan + 3 * i, side, spread, at,
+                                    w->displacement + 3 * i);
     } else {
       const supine_patient_place place = supine_patient_find(&patient->frame, at, side);
-      supine_patient_displacement(patient, &place, spread, w->moved + 3 * i);
+      supine_patient_displacement(patient, &place, spread, w->displacement + 3 * i);
     }
   }
 }
 
-/* Move the vertices, and the box with them. */
+/* Update displacements, positions and the box. */
 static void move(work *w) {
   supine_parallel_for(w->lungs.mesh.vertex_count, GRAIN, 0, move_range, w);
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Find the ratio of the spread force to (18) at each vertex, in the fitted posture. */
-static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
-                                supine_error *error) {
+/* Compute the ratio [N] of the spread force to (18), in the fitted posture. */
+static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_solution solution = {0};
@@ -127,34 +123,35 @@ static supine_status find_ratio(const work *w, double *stiffness, double *ratio,
       supine_physics_solve(&w->lungs, &model, record->state[1].gravity, &solution, error);
   for (size_t i = 0; i < w->lungs.mesh.vertex_count && status == SUPINE_OK; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(&w->lungs, i);
-    ratio[i] = solution.catch_[i] /
-               fmax(force_least, supine_patient_force_at(&record->patient.power, &place));
+    w->ratio[i] = solution.catch_[i] /
+                  fmax(force_least, supine_patient_force_at(&record->patient.power, &place));
   }
   supine_physics_solution_free(&solution);
   return status;
 }
 
-/* Find the volume gained, mL, by moving from the fuller state along `moved` to full inflation
- * (which 0) or rest (1). */
-static double gain_towards(const supine_volume_form *form, const double part[2], size_t which) {
+/* Compute the volume gained, mL, from the fuller state to full inflation (end 0) or to rest (end 1)
+ * along the displacement between the states. */
+static double volume_to_end(const supine_volume_form *form, const double part[2], size_t end) {
   double gains[2][3];
   double towards[3];
   find_gains(part, gains);
   for (size_t k = 0; k < 3; ++k) {
-    towards[k] = ((double)which - gains[0][k]) / (gains[1][k] - gains[0][k]);
+    towards[k] = ((double)end - gains[0][k]) / (gains[1][k] - gains[0][k]);
   }
   return supine_volume_form_at(form, towards);
 }
 
-/* Find the part of the way from full inflation to rest between the states, by axis, that gives
- * the lungs their volumes at full inflation and at rest. `ones` [N] are 1. */
-static void find_way(const work *w, const supine_resting *resting, const double *ones,
-                     double way[3]) {
+/* Find the difference between the gains of the two states, along x, y and z, for which the path
+ * ends at the volumes of full inflation and of rest.
+ * @param ones  [N] 1 for each vertex */
+static void find_path_span(const work *w, const supine_resting *resting, const double *ones,
+                           double path_span[3]) {
   enum { ROUNDS = 30 };
   static const double step = 1e-4;
   const supine_patient_record *record = w->record;
-  const double held = 1e-3 * supine_mesh_volume(&w->lungs.mesh);
-  const double full = full_of_either(record, resting);
+  const double lung_volume = 1e-3 * supine_mesh_volume(&w->lungs.mesh);
+  const double full = either_full_volume(record, resting);
   const double volume[2] = {
       full, full * supine_reference_resting_total(resting, record->state[1].gravity)};
   const bool known = full > 0.0;
@@ -163,25 +160,25 @@ static void find_way(const work *w, const supine_resting *resting, const double 
   double gains[2][3];
   find_parts(record, part);
   if (known) {
-    supine_physics_volume_of_fields(&w->lungs, NULL, w->moved, ones, 1, form);
+    supine_physics_volume_of_fields(&w->lungs, NULL, w->displacement, ones, 1, form);
     for (size_t i = 0; i < sizeof form[0].of / sizeof *form[0].of; ++i) {
       form[0].of[i] += form[1].of[i];
     }
   }
   for (int round = 0; round < ROUNDS && known; ++round) {
     const size_t k = (size_t)round % 2;
-    const supine_volume *of = &record->state[k].volume;
-    if (of->ml == 0.0 && of->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
-      continue; /* volume known */
+    const supine_volume *stated = &record->state[k].volume;
+    if (stated->ml == 0.0 && stated->kind == (k == 0 ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST)) {
+      continue; /* the state is exactly at this end of the path */
     }
-    const double off = gain_towards(form, part, k) - (volume[k] - held);
+    const double off = volume_to_end(form, part, k) - (volume[k] - lung_volume);
     part[k] += step;
-    const double slope = (gain_towards(form, part, k) - (volume[k] - held) - off) / step;
+    const double slope = (volume_to_end(form, part, k) - (volume[k] - lung_volume) - off) / step;
     part[k] -= step + (isfinite(off / slope) ? fmin(0.05, fmax(-0.05, off / slope)) : 0.0);
   }
   find_gains(part, gains);
   for (size_t k = 0; k < 3; ++k) {
-    way[k] = gains[1][k] - gains[0][k];
+    path_span[k] = gains[1][k] - gains[0][k];
   }
 }
 
@@ -194,53 +191,49 @@ supine_status supine_patient_model(const supine_patient_record *record,
   double *stiffness = arrays + 3 * n;
   work w = {.record = record,
             .lungs = *lungs,
-            .scan = lungs->mesh.vertices,
-            .moved = directions,
-            .settle = state == 1};
-  double *ratio = malloc(2 * n * sizeof *ratio);
-  double way[3];
+            .scan = state == 1 ? lungs->mesh.vertices : NULL,
+            .ratio = malloc(2 * n * sizeof(double)),
+            .displacement = directions};
+  double path_span[3];
   supine_status status = SUPINE_OK;
-  w.ratio = ratio;
   w.lungs.mesh.vertices = malloc(3 * n * sizeof(double));
-  if (ratio == NULL || w.lungs.mesh.vertices == NULL) {
+  if (w.ratio == NULL || w.lungs.mesh.vertices == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
     goto cleanup;
   }
-  memcpy(w.lungs.mesh.vertices, w.scan, 3 * n * sizeof(double));
+  memcpy(w.lungs.mesh.vertices, lungs->mesh.vertices, 3 * n * sizeof(double));
   for (size_t i = 0; i < 2 * n; ++i) {
-    ratio[i] = 1.0;
+    w.ratio[i] = 1.0;
   }
-  if (w.settle) {
+  if (w.scan != NULL) {
     move(&w);
   }
-  for (int pass = 0; pass < (w.settle ? 2 : 1) && status == SUPINE_OK; ++pass) {
-    status = find_ratio(&w, stiffness, ratio, error);
+  for (int pass = 0; pass < (w.scan != NULL ? 2 : 1) && status == SUPINE_OK; ++pass) {
+    status = find_ratio(&w, stiffness, error);
     move(&w);
   }
-  find_way(&w, resting, ratio + n, way);
+  find_path_span(&w, resting, w.ratio + n, path_span);
   for (size_t i = 0; i < n; ++i) {
     const supine_patient_place place = supine_patient_find_vertex(&w.lungs, i);
     const double force =
         fmax(force_least, supine_patient_force_at(&record->patient.power, &place)) *
-        fmax(force_least, ratio[i]);
+        fmax(force_least, w.ratio[i]);
     for (size_t k = 0; k < 3; ++k) {
-      directions[3 * i + k] /= -force * way[k];
+      directions[3 * i + k] /= -force * path_span[k];
     }
   }
   model->force = record->force;
   model->stiffness = record->stiffness.count > 0 ? stiffness : NULL;
   model->direction.vectors = directions;
   for (size_t k = 0; k < 3; ++k) {
-    model->direction.c[2 * k] = -record->patient.power.c[2 * k] / way[k];
+    model->direction.c[2 * k] = -record->patient.power.c[2 * k] / path_span[k];
     model->direction.c[2 * k + 1] = record->patient.power.c[2 * k + 1];
   }
 cleanup:
-  free(ratio);
+  free(w.ratio);
   free(w.lungs.mesh.vertices);
   return status;
 }
-
-/* --- the scan -------------------------------------------------------------------------------- */
 
 supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
@@ -249,7 +242,7 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   const double *low[2] = {frame->minimum, record->emptier[0]};
   const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* largest distance of the boxes' faces, relative to the width */
+  double off[2] = {0.0, 0.0}; /* largest distance from the faces of each state's box */
   size_t axis[2] = {0};
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(
@@ -257,7 +250,7 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
         "the patient's law was fitted to the %s lung alone: give that lung, or fit both",
         frame->only_side > 0 ? "left" : "right");
   }
-  for (size_t s = 0; s < 2; ++s) { /* one lung of two is narrower along x */
+  for (size_t s = 0; s < 2; ++s) { /* x is not compared if only one of two lungs is given */
     for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
       const double apart =
           fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k])) /
@@ -280,16 +273,16 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
 
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {
   for (size_t k = 0; k < 2; ++k) {
-    const supine_state *of = &record->state[k];
+    const supine_state *shown = &record->state[k];
     const double full = record->state[1 - k].volume.kind == SUPINE_VOLUME_FULL
                             ? full_volume(record, 1 - k, resting)
                             : 0.0;
-    if (of->volume.kind != SUPINE_VOLUME_REST || record->volume[k] <= 0.0 || full <= 0.0) {
+    if (shown->volume.kind != SUPINE_VOLUME_REST || record->volume[k] <= 0.0 || full <= 0.0) {
       continue;
     }
-    const double share = (record->volume[k] - of->volume.ml) / full;
+    const double share = (record->volume[k] - shown->volume.ml) / full;
     if (share > share_least && share < share_most) {
-      const double assumed = supine_reference_resting_total(resting, of->gravity);
+      const double assumed = supine_reference_resting_total(resting, shown->gravity);
       for (size_t a = 0; a < 6; ++a) {
         resting->share[0][a] *= share / assumed;
         resting->share[1][a] *= share / assumed;
@@ -300,10 +293,10 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
 
 supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
                                 const supine_resting *resting) {
-  const supine_state *of = &record->state[state];
-  supine_scan scan = {.state = *of};
+  const supine_state *shown = &record->state[state];
+  supine_scan scan = {.state = *shown};
   const double full = full_volume(record, 1 - state, resting);
-  scan.known = of->volume.kind == SUPINE_VOLUME_REST || of->volume.kind == SUPINE_VOLUME_FULL;
+  scan.known = shown->volume.kind == SUPINE_VOLUME_REST || shown->volume.kind == SUPINE_VOLUME_FULL;
   if (!scan.known && full > 0.0) {
     scan.known = true;
     scan.state.volume = (supine_volume){SUPINE_VOLUME_FULL, fmin(0.0, volume - full)};

@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read matched points, check whether they can be two states of one chest, and map them. */
+/* Read pairs of points, check that they can be two states of one chest, and fit maps to them. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include <gsl/gsl_statistics.h>
 #include <lapacke.h>
 
 #include "precompute/patient/pairs.h"
 
-#include "mesh/mesh.h"
 #include "runtime/rigid.h"
 #include "sh/base/csv.h"
 #include "sh/base/vec3.h"
@@ -17,27 +15,24 @@
 enum {
   COLUMNS = 12,
   COORDINATES = 6,
-  PAIRS_LEAST = 12 /* an affine map needs 4 pairs; three times that */
+  PAIRS_LEAST = 12 /* three times as many as an affine map needs */
 };
 
-static const double flat_least = 1.0; /* least RMS distance of points from a plane, mm */
-static const double motion_least =
-    0.05; /* least RMS motion, mm: below the precision of a landmark */
-static const double rotation_most = 25.0; /* largest rotation between two scans, degrees */
-static const double apart_most = 0.5; /* largest distance of the states over the points' spread */
-static const double box_overlap_least = 0.5; /* least overlap of surfaces' boxes over the larger */
-static const double residual_most = 0.7; /* largest residual of the affine map over the spread */
-
-/* --- reading --------------------------------------------------------------------------------- */
+static const double flat_least = 1.0; /* smallest RMS distance of points from a plane, mm */
+static const double displacement_least = 0.05; /* smallest RMS displacement, mm */
+static const double rotation_most = 25.0;      /* largest rotation between two scans, degrees */
+static const double apart_most = 0.5; /* largest distance between the states, over their spread */
+static const double box_overlap_least = 0.5; /* smallest overlap of boxes, over the larger one */
+static const double residual_most = 0.7; /* largest residual of the affine map, over the spread */
 
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
                                              "im1_x", "im1_y", "im1_z", "im2_x", "im2_y", "im2_z"};
 
-/* Find the six columns of the two points, the one at rest first. */
+/* Find the columns of the point in the first state, then those of the second state. */
 static supine_status find_columns(const supine_csv *csv, bool reverse, size_t column[COORDINATES],
                                   supine_error *error) {
   const size_t first = supine_csv_text(csv, 0) != NULL ? 0 : COORDINATES;
-  const bool swap = (first == COORDINATES) != reverse; /* image 2 is at rest */
+  const bool swap = (first == COORDINATES) != reverse; /* image 2 is the first state */
   for (size_t k = 0; k < COORDINATES; ++k) {
     column[k] = first + (swap ? (k + 3) % COORDINATES : k);
     if (supine_csv_text(csv, first + k) == NULL) {
@@ -101,8 +96,6 @@ void supine_patient_pairs_free(supine_patient_pairs *pairs) {
   *pairs = (supine_patient_pairs){0};
 }
 
-/* --- maps ------------------------------------------------------------------------------------ */
-
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
                               double to[3]) {
   for (int a = 0; a < 3; ++a) {
@@ -113,8 +106,8 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
 bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
                             const double *to, supine_patient_affinity *map) {
   double mean[2][3] = {{0.0}};
-  double cross[3][3] = {{0.0}};   /* sum of from_a to_b about the means */
-  double scatter[3][3] = {{0.0}}; /* sum of from_a from_b */
+  double cross[3][3] = {{0.0}};   /* sum of from_a to_b, less the means */
+  double scatter[3][3] = {{0.0}}; /* sum of from_a from_b, less the means */
   double mapped[3];
   bool determined = true;
   *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
@@ -135,11 +128,12 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
   if (kind == SUPINE_PATIENT_MAP_RIGID) {
     supine_rigid_rotation((const double(*)[3])cross, map->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    for (size_t k = 0; k < 9; ++k) { /* by columns, as LAPACKE copies rows to memory of its own */
+    for (size_t k = 0; k < 9; ++k) { /* by columns: LAPACKE would copy rows */
       map->m[k] = cross[k % 3][k / 3];
     }
     determined = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
-    for (size_t k = 0; k < 3; ++k) { /* RMS distance from the plane or line of the axes before */
+    /* Diagonal k is sqrt(count) times the RMS distance from the span of the axes before k. */
+    for (size_t k = 0; k < 3; ++k) {
       determined = determined && scatter[k][k] >= flat_least * sqrt((double)count);
     }
   }
@@ -158,20 +152,18 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs) {
   return found && growth > 0.0 ? growth : 1.0;
 }
 
-/* --- checking -------------------------------------------------------------------------------- */
-
 typedef struct summary {
   double spread[2];    /* RMS distance of each state's points from their mean, mm */
   double size[2];      /* longest side of each state's box, mm */
   double translation;  /* distance between the means of the two states, mm */
   double rotation;     /* angle of the best rotation, degrees */
-  bool flat;           /* the points at rest lie in a plane */
-  double growth;       /* determinant of the best affine map; negative: mirrored */
-  double residual;     /* RMS residual of that map, mm */
-  double displacement; /* RMS, mm; about its mean if motion between the scans is allowed */
+  bool flat;           /* the points of the first state lie in a plane */
+  double growth;       /* determinant of the best affine map; negative: a reflection */
+  double residual;     /* RMS residual of the affine map, mm */
+  double displacement; /* RMS displacement, mm; about the mean if the scans moved */
 } summary;
 
-static summary measure(const supine_patient_pairs *pairs, bool moved) {
+static summary measure(const supine_patient_pairs *pairs, bool scans_moved) {
   const size_t n = pairs->count;
   supine_patient_affinity mean;
   supine_patient_affinity map;
@@ -195,7 +187,8 @@ static summary measure(const supine_patient_pairs *pairs, bool moved) {
     double at[3];
     supine_patient_map_apply(&map, pairs->from + 3 * i, at);
     for (size_t k = 0; k < 3; ++k) {
-      const double u = pairs->to[3 * i + k] - pairs->from[3 * i + k] - (moved ? mean.t[k] : 0.0);
+      const double u =
+          pairs->to[3 * i + k] - pairs->from[3 * i + k] - (scans_moved ? mean.t[k] : 0.0);
       s.residual += pow(pairs->to[3 * i + k] - at[k], 2.0) / (double)n;
       s.displacement += u * u / (double)n;
     }
@@ -205,7 +198,7 @@ static summary measure(const supine_patient_pairs *pairs, bool moved) {
   return s;
 }
 
-supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
+supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error) {
   if (pairs->count < PAIRS_LEAST) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
@@ -213,15 +206,16 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                             "lungs: add more",
                             pairs->count, PAIRS_LEAST);
   }
-  const summary s = measure(pairs, moved);
+  const summary s = measure(pairs, scans_moved);
   for (int state = 0; state < 2; ++state) {
     const char *unit = NULL;
     if (!supine_mesh_unit_is_likely(s.size[state], &unit)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
                               "the points %s extend over %.3g, too small or large for lungs in "
                               "mm%s%s: give landmarks in mm, spread over the lungs",
-                              state == 0 ? "at rest" : "of the other state", s.size[state],
-                              unit == NULL ? "" : ", as if in ", unit == NULL ? "" : unit);
+                              state == 0 ? "of the first state" : "of the second state",
+                              s.size[state], unit == NULL ? "" : ", as if in ",
+                              unit == NULL ? "" : unit);
     }
   }
   if (s.flat) {
@@ -240,17 +234,18 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                             "LPS axes (x to the left, y to the back, z to the head)",
                             s.growth < 0.0 ? "a reflection and " : "", s.rotation);
   }
-  if (!moved && s.translation > apart_most * s.spread[0]) {
+  if (!scans_moved && s.translation > apart_most * s.spread[0]) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "the two states are %.0f mm apart: give both in one frame, or fit the "
                             "motion between the scans with --translation or --rigid",
                             s.translation);
   }
-  if (s.displacement < motion_least) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the other state is the same as rest (%.2g mm RMS%s): give a state "
-                            "in which the lungs have moved",
-                            s.displacement, moved ? " apart from a translation" : "");
+  if (s.displacement < displacement_least) {
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the two states are the same (%.2g mm RMS%s): give a state in which the "
+        "lungs have moved",
+        s.displacement, scans_moved ? " apart from a translation" : "");
   }
   return SUPINE_OK;
 }

@@ -9,49 +9,48 @@
 
 #include "mesh/mesh.h"
 
-/** Points and their places in the other state, mm, LPS. Zero-initialise. */
+/** Positions of the same points in two states, mm, LPS. Initialise to zero. */
 typedef struct supine_patient_pairs {
   size_t count;
-  double *from; /**< [count, 3] at rest */
-  double *to;   /**< [count, 3] in the other state */
-  double *side; /**< [count] +1 left lung, -1 right; NULL: by the midline */
+  double *from; /**< [count, 3] in the first state */
+  double *to;   /**< [count, 3] in the second state */
+  double *side; /**< [count] +1 left lung, -1 right; NULL: the midline decides */
 } supine_patient_pairs;
 
-/** Read matched points from CSV with the columns x,y,z,to_x,to_y,to_z (from rest to the other
- * state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled: from image 2
- * to image 1).
+/** Read pairs of points from a CSV file with the columns x,y,z,to_x,to_y,to_z (first and second
+ * state) or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 is the second state, usually inhaled;
+ * image 2 is the first).
  *
- * @param reverse  read them as from the other state to rest
- * @param pairs    zero-initialised; empty after a failure
+ * @param reverse  exchange the two states
+ * @param pairs    initialised to zero; empty after a failure
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
- * @retval SUPINE_ERROR_FORMAT  no such columns, a number that is not finite (line named), no
- *                              pairs
+ * @retval SUPINE_ERROR_FORMAT  a column is missing, a number is not finite, or there are no pairs
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_patient_pairs *pairs,
                                         supine_error *error);
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
 
-/** Compute the volume ratio of the other state to rest: the determinant of the best affine map.
- * @return 1 if the points do not determine a map, or if it is a reflection */
+/** Compute the volume of the second state over that of the first: the determinant of the best
+ * affine map.
+ * @return 1 if the points do not determine a map, or if the map is a reflection */
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
 /** Check by the best affine map that the pairs can be two states of one chest.
- *
- * @param moved  the fit allows a motion between the scans (translation, rotation)
- * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, all in one plane, units that differ or cannot
- *                              be mm, sides or axes that differ, frames that do not overlap (unless
- *                              moved), no motion */
-supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool moved,
+ * @param scans_moved  the body may have moved between the scans
+ * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, points in one plane, units other than mm, sides
+ *   or axes that differ, frames that do not overlap (unless scans_moved), or no displacement */
+supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error);
 
-/** A prediction, and its baselines: maps of one state fitted to the other. */
+/** A prediction and its baselines: maps from one state to the other. */
 typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_PREDICTED = 0,
   SUPINE_PATIENT_MAP_NONE,
   SUPINE_PATIENT_MAP_TRANSLATION,
   SUPINE_PATIENT_MAP_AFFINE,
   SUPINE_PATIENT_MAP_COUNT,
-  SUPINE_PATIENT_MAP_RIGID = SUPINE_PATIENT_MAP_COUNT /**< not among the baselines */
+  SUPINE_PATIENT_MAP_RIGID =
+      SUPINE_PATIENT_MAP_COUNT /**< rotation and translation; not a baseline */
 } supine_patient_map;
 
 /** The map x -> m x + t, with m by rows. */
@@ -59,15 +58,15 @@ typedef struct supine_patient_affinity {
   double m[9], t[3];
 } supine_patient_affinity;
 
-/** Fit the map of a kind that brings points [count, 3] nearest to others, by least squares.
- * @return false where an affine map is asked for and the points do not determine it */
+/** Fit a map of the given kind from points `from` to points `to` [count, 3], by least squares.
+ * @return false if the points do not determine an affine map */
 bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
                             const double *to, supine_patient_affinity *map);
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
                               double to[3]);
 
 /** Check by their boxes that two surfaces can be two states of the same lungs.
- * @retval SUPINE_ERROR_MESH  boxes of which less than half of the larger overlaps */
+ * @retval SUPINE_ERROR_MESH  along an axis, less than half of the larger box overlaps the other */
 supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
                                          supine_error *error);
 

@@ -11,11 +11,10 @@
 
 const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"deep", "paper", NULL};
 
-/* Distance that a lung extends beyond its landmarks, mm: in ten pairs of images the outermost
- * landmarks are 5 to 15 mm inside. */
+/* Distance by which a lung extends beyond its landmarks, mm: 5 to 15 in ten pairs of images. */
 static const double landmark_margin = 10.0;
 
-static double inside(double box) {
+static double clamp_to_box(double box) {
   return fmin(1.0, fmax(0.0, box));
 }
 
@@ -31,8 +30,8 @@ supine_patient_place supine_patient_find(const supine_patient_frame *frame, cons
     place.box[k] = k == 0
                        ? (point[0] - frame->midline) / (outer - frame->midline)
                        : (frame->maximum[k] - point[k]) / (frame->maximum[k] - frame->minimum[k]);
-    place.arm[k] = point[k] - 0.5 * (frame->minimum[k] + frame->maximum[k]);
-    place.force[1 + k] = inside(place.box[k]) - 0.5;
+    place.offset[k] = point[k] - 0.5 * (frame->minimum[k] + frame->maximum[k]);
+    place.force[1 + k] = clamp_to_box(place.box[k]) - 0.5;
   }
   return place;
 }
@@ -67,15 +66,15 @@ supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_
                              supine_patient_side_of(lungs, vertex));
 }
 
-supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]) {
+supine_patient_power supine_patient_deep(const double gravity[3], const double path_span[3]) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   supine_patient_power law = {.motion = {0.0}};
   const double *g = supine_length(gravity) > 0.0 ? gravity : supine;
   for (size_t k = 0; k < 3; ++k) {
-    law.c[2 * k] = model.direction.c[2 * k] * (supine_length(way) > 0.0 ? way[k] : 1.0);
+    law.c[2 * k] = model.direction.c[2 * k] * (supine_length(path_span) > 0.0 ? path_span[k] : 1.0);
     law.c[2 * k + 1] = model.direction.c[2 * k + 1];
-    /* With gravity along +y the heights fall along Y, along +z they fall along Z (lungs.h). */
+    /* Heights fall along Y if gravity is along +y, and along Z if it is along +z (lungs.h). */
     law.c[6 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
   }
   return law;
@@ -90,13 +89,13 @@ void supine_patient_direction(const supine_patient_power *power, const supine_pa
                               double force, double d[3]) {
   for (int k = 0; k < 3; ++k) { /* (15)-(17) */
     d[k] = force * (k == 0 ? place->side : -1.0) * power->c[2 * k] *
-           pow(inside(place->box[k]), power->c[2 * k + 1]);
+           pow(clamp_to_box(place->box[k]), power->c[2 * k + 1]);
   }
 }
 
 void supine_patient_motion(const supine_patient_power *power, const supine_patient_place *place,
                            double u[3]) {
-  supine_cross(power->motion + 3, place->arm, u);
+  supine_cross(power->motion + 3, place->offset, u);
   for (int k = 0; k < 3; ++k) {
     u[k] += power->motion[k];
   }
@@ -105,8 +104,8 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
 double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b) {
   supine_kriging_point p = {.size = a->size, .lung = a->side > 0.0 ? 0U : 1U};
   supine_kriging_point q = {.size = b->size, .lung = b->side > 0.0 ? 0U : 1U};
-  memcpy(p.position, a->at, sizeof p.position);
-  memcpy(q.position, b->at, sizeof q.position);
+  memcpy(p.position, a->offset, sizeof p.position);
+  memcpy(q.position, b->offset, sizeof q.position);
   return supine_kriging_covariance(&supine_kriging_default, &p, &q);
 }
 
@@ -115,7 +114,7 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
   const supine_patient_power *power = &patient->power;
   supine_patient_direction(power, place, spread * supine_patient_force_at(power, place), u);
   supine_patient_centre here = {.side = place->side, .size = supine_length(u)};
-  memcpy(here.at, place->arm, sizeof here.at);
+  memcpy(here.offset, place->offset, sizeof here.offset);
   for (size_t i = 0; i < patient->centre_count; ++i) {
     const supine_patient_centre *centre = &patient->centre[i];
     const double covariance = supine_patient_covariance(&here, centre);
@@ -125,12 +124,12 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
   }
 }
 
-void supine_patient_settle(const supine_patient *patient, const double point[3], double side,
-                           double spread, double at[3], double u[3]) {
+void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
+                                   double side, double spread, double at[3], double u[3]) {
   enum { STEPS = 60 };
-  static const double settled = 1e-4; /* change in a step that ends the iteration, mm */
+  static const double converged = 1e-4; /* change in a step that ends the iteration, mm */
   double change = INFINITY;
-  for (int step = 0; step < STEPS && change >= settled; ++step) {
+  for (int step = 0; step < STEPS && change >= converged; ++step) {
     const supine_patient_place place = supine_patient_find(&patient->frame, at, side);
     double motion[3];
     supine_patient_displacement(patient, &place, spread, u);
@@ -144,11 +143,11 @@ void supine_patient_settle(const supine_patient *patient, const double point[3],
   }
 }
 
-void supine_patient_refer(const supine_patient *patient, size_t count, double *points) {
+void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points) {
   for (size_t i = 0; i < count; ++i) {
     double u[3];
     const double point[3] = {points[3 * i], points[3 * i + 1], points[3 * i + 2]};
-    supine_patient_settle(patient, point, 0.0, 1.0, points + 3 * i, u);
+    supine_patient_find_in_fuller(patient, point, 0.0, 1.0, points + 3 * i, u);
   }
 }
 
@@ -156,9 +155,7 @@ supine_force_law supine_patient_force(const supine_patient_power *power, double 
                                       const double gravity[3]) {
   supine_force_law law = {.gain = gain, .pair = true};
   const double *slope = power->c + 6;
-  /* Heights fall along Y and grow along Z where the patient lies supine or stands. In a patient
-   * on the side they run along x, opposite in X in the two lungs, so no term of X represents
-   * them. */
+  /* No term of X: with gravity along x, heights grow along X in one lung and fall in the other. */
   law.box[0] = slope[0];
   law.box[1] = slope[1] + gain * gravity[1];
   law.box[2] = slope[2] + gain * gravity[2];

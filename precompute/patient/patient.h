@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file A patient's own law of displacement, from that person's scans and landmarks
- * ([Santhanam2008] IV-B): a law of nine constants, and a correction that interpolates its
- * residual.
+ * ([Santhanam2008] IV-B): a law of nine constants, and a correction that interpolates the residual
+ * of the law.
  *
- * With X, Y, Z the box coordinates of lungs.h in the box of the fuller of two states, side +1
- * left and -1 right, u is the displacement from the fuller state to the emptier one:
+ * The law gives the displacement u from the fuller of two states to the emptier one. X, Y, Z are
+ * the box coordinates of lungs.h in the box of the fuller state; `side` is +1 in the left lung and
+ * -1 in the right; the correction r is a sum of kernels (krige.h):
  *
  *     u = (1 + c7 (X-1/2) + c8 (Y-1/2) + c9 (Z-1/2)) (side c1 X^c2, -c3 Y^c4, -c5 Z^c6) + r
  *
- * `deep` takes c2, c4, c6 to c9 and the ratios of the lengths from the deep law (model.h),
- * `paper` fits all nine. The correction r is a sum of kernels (krige.h). The force is scaled to
- * 1 at the box's centre, as only its product with the directions is observable. */
+ * The first factor is the force (18), scaled to 1 at the box's centre. */
 #ifndef SUPINE_PATIENT_H
 #define SUPINE_PATIENT_H
 
@@ -21,48 +20,48 @@
 #include "precompute/physics/force.h"
 
 typedef enum supine_patient_law {
-  SUPINE_PATIENT_DEEP = 0,
-  SUPINE_PATIENT_PAPER,
+  SUPINE_PATIENT_DEEP = 0, /**< the deep law of model.h, or constants near its own (krige.h) */
+  SUPINE_PATIENT_PAPER,    /**< all nine constants are fitted */
   SUPINE_PATIENT_LAW_COUNT
 } supine_patient_law;
 
 /** "deep", "paper". */
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
-/** Motion between the scans, which is fitted with the law. */
-typedef enum supine_patient_moved {
+/** Motion of the body between the scans; each value is its number of fitted unknowns. */
+typedef enum supine_patient_scan_motion {
   SUPINE_PATIENT_STILL = 0,
-  SUPINE_PATIENT_TRANSLATION,
-  SUPINE_PATIENT_RIGID
-} supine_patient_moved;
+  SUPINE_PATIENT_TRANSLATION = 3,
+  SUPINE_PATIENT_RIGID = 6
+} supine_patient_scan_motion;
 
 /** The box of the fuller state, mm. */
 typedef struct supine_patient_frame {
   double minimum[3], maximum[3];
-  double midline;
-  int only_side; /**< +1 left or -1 right if there is only one lung; else 0 */
+  double midline; /**< x of the plane between the lungs */
+  int only_side;  /**< the side of the only lung, +1 left or -1 right; 0: there are two lungs */
 } supine_patient_frame;
 
 enum {
   SUPINE_PATIENT_CONSTANTS = 9,
-  SUPINE_PATIENT_COLUMNS = 4, /**< columns of the force: 1, X - 1/2, Y - 1/2, Z - 1/2 */
+  SUPINE_PATIENT_COLUMNS = 4, /**< terms of (18): 1, X - 1/2, Y - 1/2, Z - 1/2 */
   SUPINE_PATIENT_CENTRES_MAX = 900
 };
 
 /** The constants of a law, and the motion between the scans. */
 typedef struct supine_patient_power {
-  double c[SUPINE_PATIENT_CONSTANTS]; /**< c1 to c9; c1, c3 and c5 in mm, negative if the lung
-                                         empties; the force is 1 at the box's centre */
-  double motion[6]; /**< translation (mm), small rotation (rad) about the box's centre;
-                        u + motion is what was measured */
+  double c[SUPINE_PATIENT_CONSTANTS]; /**< c1 to c9; c1, c3 and c5 in mm, below 0 if the lung
+                                         empties */
+  double motion[6]; /**< translation (mm) and small rotation (rad) about the box's centre, which
+                        add to u in the measured displacement */
 } supine_patient_power;
 
 /** One kernel of the correction. */
 typedef struct supine_patient_centre {
-  double at[3];     /**< position from the box's centre, mm */
+  double offset[3]; /**< position from the box's centre, mm */
   double side;      /**< lung: +1 left, -1 right */
-  double size;      /**< length of the law's displacement, mm */
-  double weight[3]; /**< 1/mm */
+  double size;      /**< length of the displacement by the law without r, mm */
+  double weight[3]; /**< factor on the kernel's covariance along each axis, 1/mm */
 } supine_patient_centre;
 
 typedef struct supine_patient {
@@ -73,44 +72,45 @@ typedef struct supine_patient {
   supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
 } supine_patient;
 
-/** A point in the coordinates of the laws. */
+/** A point in the coordinates of the law. */
 typedef struct supine_patient_place {
-  double box[3];                        /**< X, Y, Z; 0 to 1 inside */
+  double box[3];                        /**< X, Y, Z, each 0 to 1 in the box */
   double side;                          /**< +1 left, -1 right */
-  double arm[3];                        /**< position from the box's centre, mm */
-  double force[SUPINE_PATIENT_COLUMNS]; /**< columns of the force; of a surface, after spreading */
+  double offset[3];                     /**< position from the box's centre, mm */
+  double force[SUPINE_PATIENT_COLUMNS]; /**< terms of (18); at vertices, spread terms */
 } supine_patient_place;
 
-/** Find a point's place. Its force is not spread; outside the box it is that of the nearest face.
- * @param side  +1 if the point is in the left lung, -1 in the right; 0: by the midline */
+/** Find a point's place. The force is not spread; outside the box it is that at the nearest face.
+ * @param point  mm
+ * @param side   +1 if the point is in the left lung, -1 in the right; 0: the midline decides */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
 
-/** Make a frame from points: their box, 10 mm larger on every side, as lungs extend beyond
- * landmarks.
- * @param midline  mm, or NULL: the box's centre */
+/** Make a frame from landmarks [count, 3], mm: their box, 10 mm larger on every side, because lungs
+ * extend beyond landmarks.
+ * @param midline  x of the plane between the lungs, mm; NULL: the box's centre */
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
                                                     const double *midline);
 
-/** Make the frame of a surface: its lungs' box and midline. */
 supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs);
 
-/** Find the side of a vertex: 1 left, -1 right. */
+/** Return the side of a vertex's lung: +1 left, -1 right. */
 int supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 
-/** Find the place of a vertex in the box of its own lungs. */
+/** Find a vertex's place in the box of these lungs. */
 supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex);
 
-/** Express the deep law by nine constants for gravity along a unit vector (all 0: supine).
- * @param way  factors on its lengths along x, y and z: the difference between the two states' gains
- *             on the path from full inflation to rest (all 0: 1) */
-supine_patient_power supine_patient_deep(const double gravity[3], const double way[3]);
+/** Express the deep law by nine constants.
+ * @param gravity    unit vector; 0,0,0: supine
+ * @param path_span  difference between the gains of the two states on the path from full inflation
+ *                   to rest, along x, y and z; 0,0,0: 1 along each axis */
+supine_patient_power supine_patient_deep(const double gravity[3], const double path_span[3]);
 
-/** Compute (18) of the law at a place. */
+/** Compute the force (18) at a place. */
 double supine_patient_force_at(const supine_patient_power *power,
                                const supine_patient_place *place);
 
-/** Compute (15)-(17) of the law at a place, mm, times a force. */
+/** Compute `force` times the direction (15)-(17) at a place, mm. */
 void supine_patient_direction(const supine_patient_power *power, const supine_patient_place *place,
                               double force, double d[3]);
 
@@ -118,28 +118,29 @@ void supine_patient_direction(const supine_patient_power *power, const supine_pa
 void supine_patient_motion(const supine_patient_power *power, const supine_patient_place *place,
                            double u[3]);
 
-/** Compute the covariance of the correction along one axis between two centres, mm^2. */
+/** Compute the covariance between the corrections at two centres along one axis, mm^2. */
 double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b);
 
 /** Compute the displacement u at a place, mm, with the correction but without the motion between
  * the scans.
- * @param spread  factor on the law's force */
+ * @param spread  factor on the force (18) */
 void supine_patient_displacement(const supine_patient *patient, const supine_patient_place *place,
                                  double spread, double u[3]);
 
-/** Find where a point of the emptier state was in the fuller one, by fixed-point iteration.
- * @param side    +1 left lung, -1 right; 0: by the midline
- * @param spread  factor on the law's force: spread force over (18)
- * @param at      in: a first guess; out: position in the fuller state, mm
- * @param u       written: displacement from there, mm */
-void supine_patient_settle(const supine_patient *patient, const double point[3], double side,
-                           double spread, double at[3], double u[3]);
+/** Find the position in the fuller state of a point of the emptier state, by fixed-point iteration.
+ * @param side    +1 left lung, -1 right; 0: the midline decides
+ * @param spread  factor on the force (18)
+ * @param at      in: initial guess; out: position in the fuller state, mm
+ * @param u       written: displacement between the states, mm */
+void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
+                                   double side, double spread, double at[3], double u[3]);
 
-/** Move points [count, 3] of the emptier state to their places in the fuller one. */
-void supine_patient_refer(const supine_patient *patient, size_t count, double *points);
+/** Move points [count, 3] of the emptier state to their positions in the fuller one, mm. */
+void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points);
 
-/** Split the force of a patient's law into a part that follows gravity, of slope `gain`, and one
- * that is fixed to the body. In the fitted posture their sum does not depend on the gain. */
+/** Split the force (18) into a part that follows gravity, with factor `gain`, and a part that is
+ * fixed to the body. With gravity as in the fitted posture, the sum is (18) for any gain.
+ * @param gravity  in the fitted posture, unit vector */
 supine_force_law supine_patient_force(const supine_patient_power *power, double gain,
                                       const double gravity[3]);
 

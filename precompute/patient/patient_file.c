@@ -15,16 +15,16 @@ static const char format[] = "supine-patient";
 enum {
   VERSION = 3,
   CENTRE = sizeof(supine_patient_centre) / sizeof(double),
-  REGION = sizeof(supine_patient_mode) / sizeof(double)
+  REGION = sizeof(supine_patient_region) / sizeof(double)
 };
 
-/* A number of a record, or an array of numbers. */
+/* A number or an array of numbers in a record and in its file. */
 typedef struct numbers {
-  const char *group; /* key of the object that holds them; NULL: the root */
+  const char *group; /* key of the object that has `key`; NULL: the root */
   const char *key;
-  size_t count;  /* 1: no array */
-  size_t offset; /* in the record, bytes */
-  bool optional; /* left out where all are 0; all others are required when reading */
+  size_t count;  /* 1: a number; more: an array */
+  size_t offset; /* position in the record, bytes */
+  bool optional; /* may be missing, and is left out if all numbers are 0 */
 } numbers;
 
 #define AT(member) offsetof(supine_patient_record, member)
@@ -74,8 +74,6 @@ static const numbers table[] = {
     {"applied_force", "left_rms", 1, AT(applied.residual), true},
     {"applied_force", "spread_rms", 1, AT(applied.spread), true}};
 
-/* --- writing --------------------------------------------------------------------------------- */
-
 static json_t *array_of(const double *values, size_t count) {
   json_t *array = json_array();
   for (size_t i = 0; i < count; ++i) {
@@ -84,7 +82,7 @@ static json_t *array_of(const double *values, size_t count) {
   return array;
 }
 
-/* Find an object of the root, or make it. */
+/* Return an object of the root, which is made if it is missing; key NULL: the root. */
 static json_t *group_of(json_t *root, const char *key) {
   if (key != NULL && json_object_get(root, key) == NULL) {
     (void)json_object_set_new(root, key, json_object());
@@ -100,7 +98,7 @@ static json_t *state_text(const supine_state *state) {
 
 static const char *const sides[3] = {"right", "both", "left"};
 
-/* Make an array of `count` arrays of `width` numbers. */
+/* Encode `count` arrays of `width` numbers. */
 static json_t *list_of(const void *values, size_t width, size_t count) {
   json_t *all = json_array();
   for (size_t i = 0; i < count; ++i) {
@@ -122,11 +120,11 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
       "further_states", further_states, "made_by", made_by);
   for (size_t i = 0; i < sizeof table / sizeof *table && root != NULL; ++i) {
     const double *values = (const double *)((const char *)record + table[i].offset);
-    bool any = !table[i].optional;
+    bool present = !table[i].optional;
     for (size_t k = 0; k < table[i].count; ++k) {
-      any = any || values[k] != 0.0;
+      present = present || values[k] != 0.0;
     }
-    if (any) {
+    if (present) {
       (void)json_object_set_new(group_of(root, table[i].group), table[i].key,
                                 table[i].count == 1 ? json_real(*values)
                                                     : array_of(values, table[i].count));
@@ -142,14 +140,14 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
   }
   if (record->stiffness.count > 0) {
     (void)json_object_set_new(group_of(root, "expandability"), "regions",
-                              list_of(record->stiffness.mode, REGION, record->stiffness.count));
+                              list_of(record->stiffness.region, REGION, record->stiffness.count));
   }
   if (record->expand.tried) {
     (void)json_object_set_new(group_of(root, "expandability"), "kept",
                               json_boolean(record->expand.kept));
   }
   (void)json_object_set_new(group_of(root, "force"), "gain_from",
-                            json_string(record->gain_open
+                            json_string(record->gain_undetermined
                                             ? "the law deep: the states in other postures do not "
                                               "determine it"
                                         : record->gain_error > 0.0
@@ -182,17 +180,15 @@ supine_status supine_patient_write(const char *path, const supine_patient_record
   return status;
 }
 
-/* --- reading --------------------------------------------------------------------------------- */
-
-/* Read finite numbers, one or an array; false if any is missing. */
-static bool take_numbers(const json_t *from, size_t count, double *values) {
-  bool right = count == 1 || json_array_size(from) == count;
-  for (size_t i = 0; right && i < count; ++i) {
+/* Read `count` finite numbers: an array, or a number if the count is 1. */
+static bool read_numbers(const json_t *from, size_t count, double *values) {
+  bool valid = count == 1 || json_array_size(from) == count;
+  for (size_t i = 0; valid && i < count; ++i) {
     const json_t *value = count == 1 ? from : json_array_get(from, i);
     values[i] = json_number_value(value);
-    right = json_is_number(value) && isfinite(values[i]);
+    valid = json_is_number(value) && isfinite(values[i]);
   }
-  return right;
+  return valid;
 }
 
 static const char *text_of(const json_t *root, const char *group, const char *key) {
@@ -201,7 +197,7 @@ static const char *text_of(const json_t *root, const char *group, const char *ke
   return text != NULL ? text : "";
 }
 
-/* Find a word in a list; `count` if it is not there. */
+/* Return the index of a word in a list; `count` if the word is missing. */
 static int find_word(const char *word, const char *const *words, int count) {
   int k = 0;
   while (k < count && strcmp(word, words[k]) != 0) {
@@ -210,66 +206,66 @@ static int find_word(const char *word, const char *const *words, int count) {
   return k;
 }
 
-static bool take_state(const char *text, supine_state *of) {
-  return supine_state_parse(text, of, NULL) == SUPINE_OK &&
-         (of->gravity[0] != 0.0 || of->gravity[1] != 0.0 || of->gravity[2] != 0.0);
+static bool read_state(const char *text, supine_state *state) {
+  return supine_state_parse(text, state, NULL) == SUPINE_OK &&
+         (state->gravity[0] != 0.0 || state->gravity[1] != 0.0 || state->gravity[2] != 0.0);
 }
 
 static bool is_box(const double low[3], const double high[3]) {
   return low[0] < high[0] && low[1] < high[1] && low[2] < high[2];
 }
 
-static bool take_frame(const json_t *root, supine_patient_record *record) {
+static bool read_frame(const json_t *root, supine_patient_record *record) {
   supine_patient_frame *frame = &record->patient.frame;
   const int side = find_word(text_of(root, "frame", "lungs"), sides, 3);
-  const char *of = text_of(root, "frame", "of");
+  const char *measured_on = text_of(root, "frame", "of");
   frame->only_side = side - 1;
-  record->from_surface = strcmp(of, "surface") == 0;
-  return side < 3 && of[0] != '\0' && is_box(frame->minimum, frame->maximum) &&
+  record->from_surface = strcmp(measured_on, "surface") == 0;
+  return side < 3 && measured_on[0] != '\0' && is_box(frame->minimum, frame->maximum) &&
          (frame->only_side != 0 ||
           (frame->midline > frame->minimum[0] && frame->midline < frame->maximum[0]));
 }
 
-/* Read an array of at most `most` arrays of `width` numbers. */
-static bool take_list(const json_t *from, size_t width, size_t most, void *values, size_t *count) {
-  bool right = json_is_array(from) && json_array_size(from) <= most;
+/* Read an array of at most `limit` arrays of `width` numbers. */
+static bool read_list(const json_t *from, size_t width, size_t limit, void *values, size_t *count) {
+  bool valid = json_is_array(from) && json_array_size(from) <= limit;
   *count = 0;
-  for (; right && *count < json_array_size(from); ++*count) {
-    right = take_numbers(json_array_get(from, *count), width, (double *)values + width * *count);
+  for (; valid && *count < json_array_size(from); ++*count) {
+    valid = read_numbers(json_array_get(from, *count), width, (double *)values + width * *count);
   }
-  return right;
+  return valid;
 }
 
-static bool take_correction(const json_t *root, supine_patient *patient) {
-  bool right = take_list(json_object_get(json_object_get(root, "correction"), "centres"), CENTRE,
+static bool read_correction(const json_t *root, supine_patient *patient) {
+  bool valid = read_list(json_object_get(json_object_get(root, "correction"), "centres"), CENTRE,
                          SUPINE_PATIENT_CENTRES_MAX, patient->centre, &patient->centre_count);
   for (size_t i = 0; i < patient->centre_count; ++i) {
-    right = right && patient->centre[i].size >= 0.0;
+    valid = valid && patient->centre[i].size >= 0.0;
   }
-  return right;
+  return valid;
 }
 
-static bool take_regions(const json_t *root, supine_patient_stiffness *stiffness) {
+static bool read_regions(const json_t *root, supine_patient_stiffness *stiffness) {
   const json_t *regions = json_object_get(json_object_get(root, "expandability"), "regions");
-  bool right = regions == NULL || take_list(regions, REGION, SUPINE_PATIENT_REGIONS_MAX,
-                                            stiffness->mode, &stiffness->count);
+  bool valid = regions == NULL || read_list(regions, REGION, SUPINE_PATIENT_REGIONS_MAX,
+                                            stiffness->region, &stiffness->count);
   for (size_t k = 0; k < stiffness->count; ++k) {
-    const supine_patient_mode *mode = &stiffness->mode[k];
-    right = right && fabs(mode->side) == 1.0 && mode->value > 0.0 && mode->radius > 0.0;
+    const supine_patient_region *region = &stiffness->region[k];
+    valid = valid && fabs(region->side) == 1.0 && region->value > 0.0 && region->radius > 0.0;
   }
-  return right;
+  return valid;
 }
 
-/* Read a record; return the key of what is missing or wrong, or NULL. */
-static const char *take(const json_t *root, supine_patient_record *record) {
+/* Read a record; return a key that is missing or invalid, or NULL. */
+static const char *read_record(const json_t *root, supine_patient_record *record) {
   supine_patient *patient = &record->patient;
   for (size_t i = 0; i < sizeof table / sizeof *table; ++i) {
-    const numbers *of = &table[i];
-    const json_t *group = of->group != NULL ? json_object_get(root, of->group) : root;
-    const json_t *value = json_object_get(group, of->key);
-    if (!(of->optional && value == NULL) &&
-        !take_numbers(value, of->count, (double *)((char *)record + of->offset))) {
-      return of->group != NULL ? of->group : of->key;
+    const numbers *entry = &table[i];
+    const json_t *group = entry->group != NULL ? json_object_get(root, entry->group) : root;
+    const json_t *value = json_object_get(group, entry->key);
+    if (!(entry->optional && value == NULL) &&
+        !read_numbers(value, entry->count, (double *)((char *)record + entry->offset))) {
+      return entry->group != NULL ? entry->group : entry->key;
     }
   }
   patient->law = (supine_patient_law)find_word(text_of(root, NULL, "law"), supine_patient_law_names,
@@ -277,12 +273,12 @@ static const char *take(const json_t *root, supine_patient_record *record) {
   record->force.pair = true;
   (void)snprintf(record->name, sizeof record->name, "%s", text_of(root, NULL, "name"));
   return patient->law == SUPINE_PATIENT_LAW_COUNT                            ? "law"
-         : !take_frame(root, record)                                         ? "frame"
-         : !take_state(text_of(root, "fuller", "state"), &record->state[0])  ? "fuller"
-         : !take_state(text_of(root, "emptier", "state"), &record->state[1]) ? "emptier"
+         : !read_frame(root, record)                                         ? "frame"
+         : !read_state(text_of(root, "fuller", "state"), &record->state[0])  ? "fuller"
+         : !read_state(text_of(root, "emptier", "state"), &record->state[1]) ? "emptier"
          : !is_box(record->emptier[0], record->emptier[1])                   ? "emptier_frame"
-         : !take_correction(root, patient)                                   ? "correction"
-         : !take_regions(root, &record->stiffness)                           ? "expandability"
+         : !read_correction(root, patient)                                   ? "correction"
+         : !read_regions(root, &record->stiffness)                           ? "expandability"
                                                                              : NULL;
 }
 
@@ -301,18 +297,18 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
   }
   memset(record, 0, sizeof *record);
   const bool known = strcmp(text_of(root, NULL, "format"), format) == 0 &&
-                     take_numbers(json_object_get(root, "version"), 1, &version) &&
+                     read_numbers(json_object_get(root, "version"), 1, &version) &&
                      version == VERSION;
-  const char *wrong = known ? take(root, record) : NULL;
+  const char *invalid_key = known ? read_record(root, record) : NULL;
   json_decref(root);
   return !known ? supine_error_set(error, SUPINE_ERROR_FORMAT,
                                    "%s: not a patient file of version %d: make a new one with "
                                    "'supine fit'",
                                    path, VERSION)
-         : wrong != NULL
+         : invalid_key != NULL
              ? supine_error_set(error, SUPINE_ERROR_FORMAT,
                                 "%s: \"%s\" is missing or invalid: make a new file with "
                                 "'supine fit'",
-                                path, wrong)
+                                path, invalid_key)
              : SUPINE_OK;
 }

@@ -1,176 +1,173 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Write and read patient.json, a patient's law with its force, states, fit and held-out
- * error, and make the model that the law gives for a surface. */
+/** @file Write and read patient.json, which holds a patient's law with its force, states, fit and
+ * held-out error; make a model of the law for a surface. */
 #ifndef SUPINE_PATIENT_FILE_H
 #define SUPINE_PATIENT_FILE_H
 
-#include <supine/state.h>
-
 #include "precompute/patient/krige.h"
-#include "precompute/physics/model.h"
 #include "precompute/physics/reference.h"
 
 enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_STATE_TEXT = 160 };
 
-/** A further state of the same lungs, as fitted. */
+/** The fit to a further state of the same lungs. */
 typedef struct supine_patient_further {
   supine_state state;
-  bool fits_gain;  /**< the posture differs from the fitted one, so the gain is fitted */
-  double scale[2]; /**< factor on the displacement from full inflation to rest, left and right */
-  double residual; /**< RMS residual of the fit, mm; of a surface along its normals */
-  double residual_without_gain; /**< the same with all of the force fixed to the body */
-  double gain, gain_error;      /**< gain and its standard error, by leaving out each eighth of the
-                                     lungs (jackknife) */
+  bool fits_gain; /**< the gain is fitted, because the posture differs from the fitted one */
+  double
+      scale[2]; /**< factors on the displacement from full inflation to rest, left and right lung */
+  double residual;              /**< RMS residual, mm; along the normals for a surface */
+  double residual_without_gain; /**< RMS residual if all of the force is fixed to the body, mm */
+  double gain, gain_error;      /**< gain and its standard error (jackknife over eighths of the
+                                     lungs) */
 } supine_patient_further;
 
-/** A region of a patient's expandability a = 1/E ([Santhanam2008] VI), which is a weighted mean
- * over some regions of each lung, independent of the mesh:
+/** A region of a lung. The expandability a = 1/E at a point p ([Santhanam2008] VI) is a weighted
+ * mean over the regions of its lung, whatever the mesh:
  *
  *     a(p) = sum over k of w(|p - centre_k| / radius_k) a_k
  *            / sum over k of w(|p - centre_k| / radius_k)
  *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
-typedef struct supine_patient_mode {
+typedef struct supine_patient_region {
   double side;      /**< lung: 1 left, -1 right */
   double value;     /**< a_k > 0 */
   double centre[3]; /**< mm, in the reference surface */
   double radius;    /**< mm, > 0 */
-  double seen;      /**< contribution of the surfaces, 0 to 1; the remainder comes from
-                     * neighbouring regions */
-} supine_patient_mode;
+  double seen;      /**< share of a_k that the surfaces determine, 0 to 1 */
+} supine_patient_region;
 
-/** The regions, of the left lung first; none: uniform tissue. */
+/** The regions of the left lung, then of the right one; none: uniform tissue. */
 typedef struct supine_patient_stiffness {
   size_t count;
-  supine_patient_mode mode[SUPINE_PATIENT_REGIONS_MAX];
+  supine_patient_region region[SUPINE_PATIENT_REGIONS_MAX];
 } supine_patient_stiffness;
 
-/** Least diagonal of the resolution matrix at which a region counts as seen. */
+/** Smallest `seen` at which a region counts as determined. */
 #define SUPINE_PATIENT_SEEN 0.5
 
-/** Fit and held-out error of uniform tissue and of the regions. */
+/** Errors with uniform tissue [0] and with the fitted regions of expandability [1]. */
 typedef struct supine_patient_expand_report {
   bool tried, kept;
-  double fitted[2];   /**< RMS distance between the surfaces along normals, mm, without and with */
-  double held_out[2]; /**< the same on held-out blocks */
+  double fitted[2];   /**< RMS distance between the surfaces along normals, mm */
+  double held_out[2]; /**< RMS distance at held-out points, mm */
   double unseen;      /**< number of regions with `seen` below SUPINE_PATIENT_SEEN */
 } supine_patient_expand_report;
 
-/** The force that a measured displacement implies ([Santhanam2008] IV-B.3), with no assumption
- * about its form. With u the displacement to the other surface and d the fitted directions
- * (15)-(17),
+/** The applied force f that a measured displacement implies ([Santhanam2008] IV-B.3), without an
+ * assumption about its form. With u the displacement to the other surface and d the fitted
+ * directions (15)-(17),
  *
  *     F_i = u_i . d_i / |d_i|^2
- *     f = A F                    inverts the spreading operator (equilibrium.h)
+ *     f = A F                    A inverts the spreading of the force (equilibrium.h)
  *
- * The inversion amplifies the roughness of u by (spreading length / edge length)^2, so f is
- * averaged over blocks of 40 mm of surface: the operator conserves sums. */
+ * A amplifies roughness of u, so f is averaged over blocks of 40 mm of surface. */
 typedef struct supine_patient_applied {
-  double blocks;      /**< number of blocks; 0: not found */
-  double correlation; /**< between force and height along gravity, over the blocks */
-  double slopes[3];   /**< c7 to c9 of (18) fitted to the force, 1 at the box's centre */
-  double residual;    /**< RMS residual of (18), in units of the force at the box's centre */
-  double spread;      /**< RMS of the force about its mean, in the same unit */
+  double blocks;      /**< number of blocks; 0: the force was not computed */
+  double correlation; /**< correlation of force and height along gravity */
+  double slopes[3];   /**< c7 to c9 of (18) fitted to f */
+  double residual;    /**< RMS residual of (18) over the force at the box's centre */
+  double spread;      /**< standard deviation of f over the force at the box's centre */
 } supine_patient_applied;
 
-/** Result of the matching of surfaces. */
+/** Result of matching two surfaces. */
 typedef struct supine_patient_surface_report {
-  double vertices;      /**< number of vertices that took part; 0: no surfaces */
-  double matched;       /**< share of them with a compatible point */
-  double before, after; /**< RMS distance, point to plane, before and after the fit, mm */
+  double vertices;      /**< number of vertices matched; 0: no surfaces */
+  double matched;       /**< share of the vertices whose match has a compatible normal */
+  double before, after; /**< RMS distance along normals before and after the fit, mm */
 } supine_patient_surface_report;
 
-/** What is known of a person; patient.json holds most of it. */
+/** A patient's law, its states and its fit. */
 typedef struct supine_patient_record {
-  char name[SUPINE_PATIENT_TEXT]; /**< name of the patient */
+  char name[SUPINE_PATIENT_TEXT];
   supine_patient patient;
-  supine_force_law force; /**< 1 at the box's centre in the emptier state's posture */
-  supine_state state[2];  /**< the fuller and the emptier */
-  double volume[2];       /**< mL; 0: unknown */
-  double emptier[2][3];   /**< box of the emptier state, mm; the fuller one's is the frame */
-  bool from_surface;      /**< the boxes are of surfaces, else of landmarks */
+  supine_force_law force; /**< (18) with its dependence on gravity */
+  supine_state state[2];  /**< the fuller and the emptier state */
+  double volume[2];       /**< volumes of the two states, mL; 0: unknown */
+  double emptier[2][3];   /**< minimum and maximum of the emptier state's box, mm */
+  bool from_surface;      /**< the boxes are those of surfaces, else of landmarks */
   supine_patient_fit_report report;
   supine_patient_stiffness stiffness; /**< no regions: uniform tissue */
   supine_patient_surface_report surface;
   supine_patient_expand_report expand;
   supine_patient_applied applied;
   double gain_error;    /**< standard error of the gain; 0: not fitted */
-  size_t further_count; /**< number of further states; supine_patient_read leaves it 0 */
+  size_t further_count; /**< number of further states; 0 after supine_patient_read */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
-  bool gain_open; /**< the fitted gain is not between 0.01 and 2, so the force keeps its own */
+  bool gain_undetermined; /**< the fitted gain is not used, as it is not between 0.01 and 2 */
 } supine_patient_record;
 
-/** Write the record whole or not at all.
+/** Write the record to a file, whole or not at all.
  * @param made_by  command line, or NULL
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_patient_write(const char *path, const supine_patient_record *record,
                                    const char *made_by, supine_error *error);
 
-/** Convert a record to the JSON value of its file, which the caller releases; NULL: no memory. */
+/** Encode a record as JSON. The caller releases it. Return NULL if out of memory. */
 struct json_t *supine_patient_encode(const supine_patient_record *record, const char *made_by);
 
-/** Print the text of the file; the caller frees it. NULL: no memory. */
+/** Encode a record as JSON text. The caller frees it. Return NULL if out of memory. */
 char *supine_patient_text(const supine_patient_record *record, const char *made_by);
 
-/** Read a record.
- * @retval SUPINE_ERROR_READ
- * @retval SUPINE_ERROR_FORMAT  the message names the key that is missing or invalid */
+/** Read a record from a file.
+ * @retval SUPINE_ERROR_READ    the file cannot be opened
+ * @retval SUPINE_ERROR_FORMAT  a key is missing or invalid (named) */
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
-/** Set force, directions and stiffness of a model to a patient's. With u the displacement between
- * the two states, scaled to the whole way from full inflation to rest, and F the spread force in
- * the fitted posture, at least 0.2 of its mean, the directions are
+/** Set force, directions and stiffness of a model to those of a patient. The directions are
  *
- *     d = -u / F               so that F d is the person's displacement
+ *     d = -u / F
  *
- * @param resting     volumes at rest
- * @param state       of the surface: 0 the fuller, 1 the emptier
- * @param arrays      [4 N], written: the directions [N, 3], mm, then the relative E [N] by the
- *                    record's regions; must outlive the model
+ * with u the displacement between the two states, scaled to the path from full inflation to rest,
+ * and F the spread force in the fitted posture, at least 0.2 of its mean.
+ *
+ * @param resting  volumes at rest
+ * @param lungs    the scan of one of the two states
+ * @param state    the state of the scan: 0 the fuller, 1 the emptier
+ * @param arrays   [4 N], written: the directions [N, 3], mm, then the relative stiffness E [N];
+ * must outlive the model
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
 supine_status supine_patient_model(const supine_patient_record *record,
                                    const supine_resting *resting, const supine_lungs *lungs,
                                    size_t state, double *arrays, supine_model *model,
                                    supine_error *error);
 
-/** Find the state of a surface from its box.
- * @param state  0 the fuller, 1 the emptier
- * @retval SUPINE_ERROR_MESH  the surface lies elsewhere, or is the other lung */
+/** Find by its box which of the two states a surface shows.
+ * @param state  written: 0 the fuller, 1 the emptier
+ * @retval SUPINE_ERROR_MESH  neither: the surface lies elsewhere, or is that of the other lung */
 supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
                                          supine_error *error);
 
-/** Compute the gains of the two states along x, y and z: 0 at full inflation, 1 at rest, on the
- * deep law's path between them (supine_volume_bend), by their states or the cube roots of their
- * volumes. Where both are unknown, the fuller state counts as full and the emptier one as rest. */
+/** Compute the gains of the two states along x, y and z on the deep law's path from full inflation
+ * (0) to rest (1) (supine_volume_bend). A state other than these two is placed by the cube root of
+ * its volume. If that is unknown, the fuller state counts as full and the emptier one as rest. */
 void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
-/** Scale the resting shares to that of the two states, if one of them is at rest and the volume of
- * the other is relative to full inflation. */
+/** Scale the volumes at rest to those of the patient, if one of the two states is relative to rest
+ * and the other to full inflation. */
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting);
 
-/** Find the state and volume of a scan of one of the two states.
- * @param volume  of the scan, mL
- * @return `known` is false if its distance from full inflation is undetermined */
+/** Describe a scan that shows one of the two states.
+ * @param volume  volume of the scan, mL
+ * @return the scan; `known` is false if its distance from full inflation is undetermined */
 supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
                                 const supine_resting *resting);
 
-/* --- from surfaces --------------------------------------------------------------------------- */
-
-/** Fit a law to a surface in another state, of any meshing; write patient, reports, stiffness and
- * applied force into the record.
+/** Fit a law to a surface in another state, whose triangles may differ; write patient, reports,
+ * stiffness and applied force into the record.
  *
- * Each round moves every vertex of the reference surface by the present law. The nearest point
- * of the other surface, if its normal is compatible, gives a row along that normal (point to
- * plane, so that surfaces may slide), with a robust weight (Tukey's biweight). The law is then
- * fitted to the rows. Rounds repeat until no vertex moves.
+ * Each round displaces vertices of the reference surface by the present law and matches them to
+ * the nearest points of the other surface. A match with a compatible normal gives a row along that
+ * normal, so that surfaces may slide, with a robust weight (Tukey's biweight). The law is then
+ * fitted to the rows. Rounds end when the vertices change by less than 0.002 mm (RMS).
  *
- * A small distance between surfaces does not prove the motion of points: sliding along the
- * surface is not observed.
- * @param rest           surface of the fuller state
- * @param state          the same lungs, mm, same frame
- * @param landmarks      fitted as well, unless empty or with expandability
- * @param expandability  fit it too (supine_patient_expand), with the paper's law, uncorrected
+ * A small distance between the surfaces does not prove the displacement of points, because sliding
+ * along the surface is not observed.
+ * @param rest           the reference surface, in the fuller state
+ * @param state          the same lungs in the emptier state, mm, in the same frame
+ * @param landmarks      pairs to fit as well; ignored with `expandability`
+ * @param expandability  also fit the expandability (supine_patient_expand), with the paper's law
+ * and no correction
  * @retval SUPINE_ERROR_MESH  no overlap (frames, units or sides differ), equal surfaces, or too
  *   few compatible points
  * @retval those of supine_patient_fit */
@@ -180,30 +177,26 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
                                          bool expandability, supine_patient_record *record,
                                          supine_error *error);
 
-/* --- from scans in other postures ------------------------------------------------------------ */
-
-/** Fit the gain to a further state, with the fitted field u of the law, scaled to the whole way
- * from full inflation to rest (supine_patient_path):
+/** Fit the gain to a further state j. Its displacement from full inflation is
  *
- *     u_j(p) = s_j (1 + gain_j (h_j(p) - h(p)) / f(p)) u(p) (+ t_j)
+ *     u_j(p) = s_j (1 + gain_j (h_j(p) - h(p)) / f(p)) u(p) + t_j
  *
- * minus the displacement of the fuller state from full inflation, if known; h are heights along
- * gravity in that posture and the fitted one, f is the fitted force, and of a surface all of them
- * are spread. s_j, s_j gain_j and t_j come from linear least squares; the nearest points of a
- * surface are found again each round.
- * @param rest     the surface of the fuller state; NULL if `surface` is
- * @param pairs    points of the fuller state and of this one; NULL: give `surface`
- * @param moved    also fit a translation between the scans
- * @param further  in: its state; out: the fit
+ * with u the fitted displacement, scaled to the path from full inflation to rest
+ * (supine_patient_path); s_j the scale of each lung; h_j and h the heights along gravity in this
+ * posture and in the fitted one; f the fitted force. On a surface, heights and force are spread.
+ * Scales, gain and t_j are fitted by iterated least squares, in rounds that match a surface again.
+ * @param rest     the surface of the fuller state; NULL without `surface`
+ * @param pairs    points in the fuller state and in this one; NULL with `surface`
+ * @param scans_moved  also fit a translation t_j between the scans
+ * @param further  in: the state; out: the fit
  * @retval SUPINE_ERROR_MESH    too few compatible points
  * @retval SUPINE_ERROR_MEMORY, those of the solve */
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
                                       const supine_patient_pairs *pairs, const supine_mesh *surface,
-                                      bool moved, supine_patient_further *further,
+                                      bool scans_moved, supine_patient_further *further,
                                       supine_error *error);
 
-/** Set the gain of the record's force to the mean over its further states in other postures,
- * weighted by the inverse variances. */
-void supine_patient_gain_take(supine_patient_record *record);
+/** Set the gain of the force to the mean of the further states, weighted by inverse variance. */
+void supine_patient_gain_set(supine_patient_record *record);
 
 #endif

@@ -1,26 +1,26 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a law to surfaces by iterated nearest points, point to plane, with robust weights. */
+/* Fit a law to surfaces by iterated nearest points (point to plane) with robust weights. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include <gsl/gsl_statistics.h>
 
 #include "precompute/patient/matching.h"
 
 enum {
-  VERTICES_MAX = 600,  /* most vertices of a fit: kriging has a length of 90 mm */
-  EXPANDED_MAX = 2000, /* the same with expandability, of regions some 45 mm apart */
+  VERTICES_MAX = 600,  /* enough for kriging with a correlation length of 90 mm */
+  EXPANDED_MAX = 2000, /* enough for regions of expandability about 45 mm apart */
   ROUNDS_MAX = 60
 };
 
-static const double settled = 2e-3;    /* RMS change between rounds that ends the fit, mm */
-static const double near_by = 0.5;     /* RMS change that ends the fit of the law's size, mm */
-static const double outlying = 1.0;    /* least scale of the weights, mm: kriging corrects the
-                                        * law's residual, which weights must not remove */
-static const double same_state = 0.02; /* RMS distance of equal surfaces, mm */
+static const double converged = 2e-3;     /* RMS change in a round that ends the fit, mm */
+static const double size_converged = 0.5; /* RMS change that ends the fit of size only, mm */
 
-/* Make the first rows by mapping the lungs' box to that of the other state. */
+/* Lower bound on the robust scale, mm. Smaller residuals are left to kriging. */
+static const double scale_least = 1.0;
+static const double same_state = 0.02; /* largest RMS distance of equal surfaces, mm */
+
+/* Initialise the rows by mapping the box of the lungs to that of the other state. */
 static void start_rows(supine_patient_matching *m) {
   const double *low = m->rest->minimum;
   double to[2][3];
@@ -28,7 +28,7 @@ static void start_rows(supine_patient_matching *m) {
   for (size_t i = 0; i < m->count; ++i) {
     supine_patient_row *row = &m->rows[i];
     const double *from = m->rest->mesh.vertices + 3 * m->match[i].vertex;
-    const size_t k = i % 3; /* one axis for each vertex, in turn */
+    const size_t k = i % 3; /* axis of the row */
     const double t = (from[k] - low[k]) / (m->rest->maximum[k] - low[k]);
     row->axis[0] = row->axis[1] = row->axis[2] = 0.0;
     row->axis[k] = 1.0;
@@ -37,8 +37,7 @@ static void start_rows(supine_patient_matching *m) {
   }
 }
 
-/* Fit the size of the deep law to the rows; or, if `shaped`, its constants and the correction,
- * whose sill is chosen the first time. */
+/* Fit only the size of the deep law, or the law and its correction if `shaped`. */
 static supine_status refit(const supine_patient_matching *m, bool shaped,
                            supine_patient_fit_options *options, supine_patient *patient,
                            supine_error *error) {
@@ -47,7 +46,7 @@ static supine_status refit(const supine_patient_matching *m, bool shaped,
   const supine_status status =
       supine_patient_krige_fit(options, m->rows, m->count + m->landmark_row_count, &krige, error);
   if (status == SUPINE_OK) {
-    supine_patient_krige_take(&krige, patient);
+    supine_patient_krige_copy_law(&krige, patient);
   }
   if (status == SUPINE_OK && shaped) {
     options->sill = krige.sill;
@@ -58,24 +57,24 @@ static supine_status refit(const supine_patient_matching *m, bool shaped,
   return status;
 }
 
-/* Alternate between nearest points and the fit. Fit the law's size first: the motion along the
- * surfaces, which they do not show, then starts from the law's. */
-static supine_status settle(supine_patient_matching *m, const supine_patient_fit_options *wanted,
-                            supine_patient *patient, supine_patient_surface_report *report,
-                            supine_error *error) {
+/* Alternate between matching and the fit. Fit only the size first, so that the displacement along
+ * the surfaces, which is not observed, starts from that of the deep law. */
+static supine_status iterate(supine_patient_matching *m, const supine_patient_fit_options *wanted,
+                             supine_patient *patient, supine_patient_surface_report *report,
+                             supine_error *error) {
   supine_patient_fit_options options = *wanted;
   supine_status status = SUPINE_OK;
   double change = INFINITY;
   bool shaped = false;
   start_rows(m);
-  for (size_t round = 0; status == SUPINE_OK && round < ROUNDS_MAX && !(shaped && change < settled);
-       ++round) {
-    shaped = shaped || change < near_by;
+  for (size_t round = 0;
+       status == SUPINE_OK && round < ROUNDS_MAX && !(shaped && change < converged); ++round) {
+    shaped = shaped || change < size_converged;
     status = refit(m, shaped, &options, patient, error);
     if (status == SUPINE_OK) {
       change = supine_patient_matching_place(m, patient);
       supine_patient_matching_find(m);
-      status = supine_patient_matching_weigh(m, outlying, error);
+      status = supine_patient_matching_weigh(m, scale_least, error);
     }
   }
   report->matched = m->matched;
@@ -83,7 +82,7 @@ static supine_status settle(supine_patient_matching *m, const supine_patient_fit
   return status;
 }
 
-/* Find the distance of the surfaces before the fit; fail if they are equal. */
+/* Measure the distance of the surfaces before the fit, and check that they are not equal. */
 static supine_status check_apart(supine_patient_matching *m, supine_patient_surface_report *report,
                                  supine_error *error) {
   report->vertices = (double)m->count;
@@ -93,15 +92,16 @@ static supine_status check_apart(supine_patient_matching *m, supine_patient_surf
       sqrt(gsl_stats_tss_m(&m->match->distance, stride, m->count, 0.0) / (double)m->count);
   return report->before >= same_state
              ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the other surface is the same as the one at rest (%.2g mm RMS "
-                                "apart): give two different states",
-                                report->before);
+             : supine_error_set(
+                   error, SUPINE_ERROR_MESH,
+                   "the two surfaces are the same (%.2g mm RMS apart): give two different "
+                   "states",
+                   report->before);
 }
 
-/* Fit and judge the law, and find the force that the displacement implies. */
-static supine_status judge(supine_patient_matching *m, const supine_patient_fit_options *wanted,
-                           supine_patient_record *record, supine_error *error) {
+/* Fit the law, measure its held-out error, and compute the applied force. */
+static supine_status measure(supine_patient_matching *m, const supine_patient_fit_options *wanted,
+                             supine_patient_record *record, supine_error *error) {
   supine_patient_fit_report *report = &record->report;
   supine_status status = supine_patient_fit(wanted, m->rows, m->count, m->landmark_row_count / 3,
                                             &record->patient, report, error);
@@ -114,22 +114,22 @@ static supine_status judge(supine_patient_matching *m, const supine_patient_fit_
                              : status;
 }
 
-/* Match the nearest points, then fit and judge the law. */
+/* Match the surfaces, then fit the law and measure its error. */
 static supine_status run(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                          bool expandability, supine_patient_record *record, supine_error *error) {
   record->patient = (supine_patient){.law = wanted->law, .frame = m->frame};
   supine_status status = check_apart(m, &record->surface, error);
   if (status == SUPINE_OK) {
-    status = settle(m, wanted, &record->patient, &record->surface, error);
+    status = iterate(m, wanted, &record->patient, &record->surface, error);
   }
   if (status == SUPINE_OK && expandability) {
     status = supine_patient_expand(m, wanted, &record->patient, &record->stiffness, &record->expand,
                                    error);
-    if (status == SUPINE_OK) { /* the law again, with the force spread over that tissue */
-      status = settle(m, wanted, &record->patient, &record->surface, error);
+    if (status == SUPINE_OK) { /* the found stiffness changes the spread force */
+      status = iterate(m, wanted, &record->patient, &record->surface, error);
     }
   }
-  return status == SUPINE_OK ? judge(m, wanted, record, error) : status;
+  return status == SUPINE_OK ? measure(m, wanted, record, error) : status;
 }
 
 supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_mesh *state,
@@ -140,7 +140,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   const size_t landmark_count = expandability ? 0 : landmarks->count;
   supine_patient_matching m = {0};
   supine_patient_fit_options wanted = *options;
-  if (expandability) { /* the stiffness replaces the correction */
+  if (expandability) { /* regions take the place of the correction */
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }
@@ -154,7 +154,8 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   if (status == SUPINE_OK && landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
     m.landmark_row_count = 3 * landmark_count;
-    for (size_t i = 0; i < m.landmark_row_count; ++i) { /* of the same weight as the surface */
+    for (size_t i = 0; i < m.landmark_row_count;
+         ++i) { /* together they weigh as much as the surface */
       m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
     }
   }
