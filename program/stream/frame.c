@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 #include <meshoptimizer.h>
 
@@ -19,7 +20,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
 /* PIECE: number of vertices computed together, so that they stay in the L1 cache. GRAIN: smallest
  * number of vertices for which a thread is worth starting. */
-enum { PIECE = 1024, GRAIN = 64 * PIECE, THREADS_MAX = 256 };
+enum { PIECE = 1024, GRAIN = 64 * PIECE, THREADS_MAX = 256, HUGE_PAGE = 1 << 21 /* bytes */ };
 
 struct supine_stream_frames {
   const supine_basis *basis;
@@ -113,12 +114,17 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
   } else {
     const size_t count = frames->info->vertex_count;
     const size_t size = 12 * count + SUPINE_STREAM_ATTRIBUTE + 4 * count;
+    const size_t page = size < 2 * (size_t)HUGE_PAGE ? 64 : HUGE_PAGE;
+    const size_t whole = (size + page - 1) / page * page;
     frame = calloc(1, sizeof *frame);
-    float *points = aligned_alloc(64, (size + 63) / 64 * 64);
+    float *points = aligned_alloc(page, whole);
     if (frame == NULL || points == NULL) {
       free(frame);
       free(points);
       return NULL;
+    }
+    if (page == HUGE_PAGE) {
+      (void)madvise(points, whole, MADV_HUGEPAGE); /* fewer address translations */
     }
     frame->points = points;
     frame->errors = (unsigned char *)(points + 3 * count);
@@ -127,7 +133,6 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
   frame->number = ++frames->number;
   frame->snapshot = *snapshot;
   frame->points_crc = 0;
-  frame->next = NULL;
   return frame;
 }
 

@@ -38,9 +38,7 @@ void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *fram
   }
   supine_stream_frame_release(frames, peer->frame);
   free(peer->body);
-  peer->socket = -1;
-  peer->frame = NULL;
-  peer->body = NULL;
+  *peer = (supine_stream_peer){.socket = -1};
 }
 
 /* Receive up to `size` bytes; return their number, 0 if none are there, -1 if the peer is gone. */
@@ -75,16 +73,15 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
                                               supine_stream_receive *receive, void *context,
                                               uint64_t *skipped, supine_error *error) {
-  unsigned char skipped_bytes[4096];
-  size_t allowed = 65536;
+  size_t allowed = SUPINE_STREAM_BODY_MAX;
   while (allowed > 0) {
     unsigned char *into =
         peer->in_body ? peer->body + peer->received : peer->header_bytes + peer->received;
     size_t size =
         (peer->in_body ? (size_t)peer->header.size : SUPINE_STREAM_HEADER) - peer->received;
     if (peer->to_skip > 0) {
-      into = skipped_bytes;
-      size = peer->to_skip < sizeof skipped_bytes ? (size_t)peer->to_skip : sizeof skipped_bytes;
+      into = peer->body;
+      size = peer->to_skip < allowed ? (size_t)peer->to_skip : allowed;
     }
     ssize_t got = 0;
     if (size > 0) {
@@ -106,15 +103,13 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
     if ((size_t)got < size) {
       continue;
     }
-    if (!peer->in_body) {
-      if (!begin_body(peer, skipped, error)) {
-        return SUPINE_STREAM_LOST;
-      }
-      continue;
+    if (peer->in_body) {
+      peer->in_body = false;
+      peer->received = 0;
+      receive(context, peer);
+    } else if (!begin_body(peer, skipped, error)) {
+      return SUPINE_STREAM_LOST;
     }
-    peer->in_body = false;
-    peer->received = 0;
-    receive(context, peer);
   }
   return SUPINE_STREAM_MORE;
 }
