@@ -1,14 +1,14 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# On a bare Debian 12, as root: install what is needed, build, then
-#   sh cmake/debian.sh demo    make a pair of lungs, precompute and deform them
-#   sh cmake/debian.sh build   build with the tests
-#   sh cmake/debian.sh test    the same, and pass them
+# Install the packages that are needed, on a bare Debian 12 as root, then build and
+#   sh cmake/debian.sh demo    make a pair of synthetic lungs, precompute and deform them
+#   sh cmake/debian.sh build   build the tests, too
+#   sh cmake/debian.sh test    run the tests
 #   sh cmake/debian.sh count   print which lines the quick tests reach
 set -eu
 cd "$(dirname "$0")/.."
 
-# The one list of packages: what building needs, and what the tests need on top.
+# Packages needed to build, and further packages needed by the tests.
 build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
   libopenblas-dev liblapacke-dev libsuitesparse-dev libxxhash-dev libcairo2-dev libwebp-dev
   libwebsockets-dev libteem-dev libnifti2-dev zlib1g-dev libdeflate-dev
@@ -45,14 +45,14 @@ demo)
   exec sh cmake/demo.sh build/release/supine demo
   ;;
 build | test)
-  # Tests open exported files in node and Chromium; use those on PATH if there are any.
+  # Tests run exported files in node and Chromium; install them only if they are not on PATH.
   command -v npm >/dev/null || tests="$tests nodejs npm"
   command -v chromium >/dev/null || tests="$tests chromium"
   # shellcheck disable=SC2086
   install_missing $build $tests
   [ -d tests/export/node_modules/vtk.js ] ||
     npm install --prefix tests/export --no-package-lock --no-audit --no-fund --silent ||
-    echo "npm's packages are missing: the tests that need them are skipped" >&2
+    echo "packages of npm could not be installed: tests that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
   [ "$1" = build ] || exec ctest --preset release

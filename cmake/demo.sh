@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Make synthetic lungs, precompute their basis and deform them: demo.sh PROGRAM FOLDER
+# Make synthetic lungs, precompute their basis, and deform and draw them: demo.sh PROGRAM FOLDER
 set -eu
 supine=$1
 folder=$2
@@ -14,19 +14,19 @@ done
 picture=""
 if "$supine" render "$folder/lungs.safetensors" --posture supine,prone,left,right \
   -o "$folder/postures.png"; then
-  picture="  postures.png         the four, side by side"
+  picture="  postures.png         the four postures side by side"
 fi
 cat <<END
 
 Made in $folder/:
   lungs.ply            a pair of lungs at full inflation
-  lungs.safetensors    their basis: every direction of gravity, every volume
+  lungs.safetensors    their basis, for every direction of gravity and every volume
   supine.vtp prone.vtp left.vtp right.vtp
-                       the lungs at rest, lying on back, belly and either side
-  lungs.html           the same lungs to turn and breathe in a browser
+                       the lungs at rest, lying on the back, the belly and either side
+  lungs.html           a page for a browser, in which the lungs turn and breathe
 $picture
 
-To look at them: open $folder/lungs.html in any browser, or the four .vtp files in ParaView,
+To view them, open $folder/lungs.html in any browser, or the four .vtp files in ParaView,
 coloured by displacement_magnitude.
-To go on: $supine deform $folder/lungs.safetensors --gravity 0.6,0,-0.8 --volume rest+800 -o mine.ply
+A further example: $supine deform $folder/lungs.safetensors --gravity 0.6,0,-0.8 --volume rest+800 -o mine.ply
 END

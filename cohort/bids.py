@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""BIDS App: make bases and comparisons of all lungs of a dataset, and one page of all subjects.
+"""BIDS App: make a basis and a comparison for each subject of a dataset, and one page of all subjects.
 
     bids.py BIDS_DIR OUTPUT_DIR participant [--participant_label LABEL...] [-- PRECOMPUTE OPTIONS]
     bids.py BIDS_DIR OUTPUT_DIR group
 
-A subject's lungs are found anywhere in its folder sub-LABEL: label maps (*_dseg.nii.gz), else masks
-(*_mask.nii.gz), else surfaces (*_mesh.ply, .stl, .obj, .off); several files make one model. For each subject,
-write sub-LABEL/basis.safetensors, report.html and result.json; a subject that fails is named on the page of
-the group and does not stop the others. The program is $SUPINE, or supine."""
+The lungs of a subject may be anywhere in its folder sub-LABEL: label maps (*_dseg.nii.gz), or else masks
+(*_mask.nii.gz), or else surfaces (*_mesh.ply, .stl, .obj, .off). All files of a subject make one model. For each
+subject, write sub-LABEL/basis.safetensors, report.html and result.json. A subject that fails is named on the page
+of the group and does not stop the others. The program is $SUPINE (default: supine)."""
 import argparse
 import json
 import os
@@ -30,7 +30,7 @@ def lungs_of(folder):
 
 
 def describe(output):
-    """Write dataset_description.json, which makes the output a derivative dataset."""
+    """Write dataset_description.json, which BIDS requires of a derivative dataset."""
     output.mkdir(parents=True, exist_ok=True)
     program = os.environ.get("SUPINE", "supine")
     said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
@@ -45,9 +45,9 @@ def participant(dataset, output, labels, options):
     folders = [dataset / f"sub-{label}" for label in labels] if labels else sorted(
         path for path in dataset.glob("sub-*") if path.is_dir())
     if not folders:
-        sys.exit(f"{dataset}: no folder sub-*")
+        sys.exit(f"{dataset}: it has no folder sub-*")
     for folder in folders:
-        # Without lungs, give a missing file, so that the subject's result names it.
+        # If there are no lungs, name a file that does not exist, so that the failure in result.json names it.
         meshes = lungs_of(folder) or [str(folder / "*_dseg.nii.gz")]
         subprocess.run([sys.executable, HERE / "subject.py", output / folder.name / "result.json",
                         "rest", "yes", " ".join(options), *meshes], check=True)
@@ -56,7 +56,7 @@ def participant(dataset, output, labels, options):
 def group(output):
     results = sorted(output.glob("sub-*/result.json"))
     if not results:
-        sys.exit(f"{output}: no sub-*/result.json: run participant first")
+        sys.exit(f"{output}: no sub-*/result.json: run the level 'participant' first")
     subprocess.run([sys.executable, HERE / "group.py", output / "group.csv", output / "group.html",
                     *results], check=True)
 

@@ -3,8 +3,8 @@
 
     python3 group.py GROUP.csv GROUP.html RESULT.json...
 
-An outlier is farther from the cohort's median than 3.5 times 1.4826 median absolute deviations
-(Iglewicz and Hoaglin's rule)."""
+An outlier differs from the median of the cohort by more than 3.5 times 1.4826 median absolute deviations
+(rule of Iglewicz and Hoaglin)."""
 import csv
 import html
 import json
@@ -12,11 +12,11 @@ import statistics
 import sys
 
 LIMIT = 3.5
-TO_SIGMA = 1.4826  # of a median absolute deviation, for normal numbers
+TO_SIGMA = 1.4826  # standard deviation / median absolute deviation of a normal distribution
 
 
 def numbers(result):
-    """Return the columns of one subject, in order."""
+    """Return the numbers of one subject as a dict from the name of a column to its value."""
     info, comparison = result["info"], result["comparison"]
     found = {"vertices": info["vertices"], "error_rms_percent": info["error"].get("rms_percent")}
     lungs = info["lungs"].split(",")
@@ -66,8 +66,8 @@ thead th {{ vertical-align: bottom; }} tbody th {{ text-align: left; white-space
 <h1>{len(subjects) + len(failures)} subjects: {len(subjects)} done, {len(failures)} failed</h1>
 {'<h2>Failed</h2><ul>' + failed + '</ul>' if failures else ''}
 <h2>Results</h2>
-<p>{strange} with an outlier (shaded: farther from the median than {LIMIT} times
-{TO_SIGMA} median absolute deviations); {warned} with a warning (the last column).</p>
+<p>Subjects with an outlier: {strange} (shaded: differs from the median by more than {LIMIT} times
+{TO_SIGMA} median absolute deviations). Subjects with a warning (the last column): {warned}.</p>
 <div><table><thead><tr><th></th>{head}<th>warnings</th></tr></thead><tbody>
 {body}</tbody></table></div></body></html>
 """
@@ -80,7 +80,7 @@ def main(table_path, page_path, *paths):
             results.append(json.load(file))
     names = [r["subject"] for r in results]
     if len(set(names)) < len(names):
-        sys.exit(f"results given twice: {', '.join(sorted({n for n in names if names.count(n) > 1}))}")
+        sys.exit(f"more than one result for {', '.join(sorted({n for n in names if names.count(n) > 1}))}")
     failures = [(r["subject"], r["failure"]) for r in results if "failure" in r]
     done = [r for r in results if "failure" not in r]
     rows = [numbers(r) for r in done]

@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make the basis and the comparison of one subject, and record the results or the failure.
+"""Make a basis and a comparison for one subject, and record the results or the failure.
 
     python3 subject.py FOLDER/result.json VOLUME yes|no 'PRECOMPUTE OPTIONS' MESH...
 
-Write basis.safetensors, report.html (if yes) and result.json into the folder. A failure of the subject (bad
-input, impossible numbers) is recorded in result.json with the program's message. If an output cannot be
-written or a signal ends the program, exit with 1, so that the subject is computed again. The program is
-$SUPINE, or supine."""
+Write basis.safetensors, report.html (if yes) and result.json into the folder. If the program refuses
+the input or its numbers, write its message to result.json as the failure. If an output cannot be written or a
+signal ends the program, exit with 1, so that the next run computes the subject again. The program is $SUPINE
+(default: supine)."""
 import json
 import os
 import shlex
 import subprocess
 import sys
 
-OUTPUT_FAILED = 4  # supine's exit code
+OUTPUT_FAILED = 4  # exit code of supine
 
 
 def run(*arguments):
     done = subprocess.run([os.environ.get("SUPINE", "supine"), *arguments], capture_output=True,
                           text=True, check=False)
     if done.returncode == OUTPUT_FAILED or done.returncode < 0:
-        sys.exit(f"{done.stderr.strip()} (ended with {done.returncode})")
+        sys.exit(f"{done.stderr.strip()} (exit status {done.returncode})")
     if done.returncode != 0:
-        lines = done.stderr.strip().splitlines() or ["no message"]
+        lines = done.stderr.strip().splitlines() or ["the program failed without a message"]
         errors = [line for line in lines if not line.startswith("Try ") and " note: " not in line]
         raise ValueError((errors or lines)[-1])
     return done.stdout

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Print docs/paper.md, the paper row by row, with the numbers of this build:
+"""Print docs/paper.md, which compares this build with the paper row by row:
 
     python3 docs/paper.py build/release > docs/paper.md
 
-Everything is measured on the synthetic lungs ('supine phantom'), so that it needs no data."""
+All numbers are measured on synthetic lungs ('supine phantom'), so that no other data are needed."""
 import csv
 import json
 import math
@@ -21,7 +21,7 @@ def run(*words):
 
 
 def info(*options):
-    """Return the output of 'supine info --json' for a basis of the lungs under the paper's law."""
+    """Return the output of 'supine info --json' for a basis of the lungs made by the paper's law."""
     run("precompute", "lungs.ply", "--law", "paper", "-o", "basis.safetensors", *options)
     return json.loads(run("info", "basis.safetensors", "--json"))
 
@@ -38,13 +38,13 @@ def visits(method):
 
 
 def apart(name, a, b):
-    """Return the RMS difference of two columns, as a share of the first column's RMS."""
+    """Return the RMS difference of the columns a and b of a table divided by the RMS of a."""
     of = [(float(row[a]), float(row[b])) for row in rows(name)]
     return math.sqrt(sum((x - y) ** 2 for x, y in of) / sum(x * x for x, _ in of))
 
 
 def off_line():
-    """Return the largest distance of displacement from the straight line through 0 and 500 mL, in four postures.
+    """Return the largest deviation of the displacement from the straight line through 0 and 500 mL, in four postures.
 
     In percent of the displacement at 500 mL."""
     of = [row for row in rows("linearity") if float(row["volume_mL"]) <= 500]
@@ -65,7 +65,7 @@ ring = rows("fig9_ring")
 
 
 def radius(column):
-    """Return the mean distance from the centre of the ring whose x is in a column and whose y is in the next."""
+    """Return the mean radius of the ring whose x is in the given column and whose y is in the next one."""
     keys = list(ring[0])
     x, y = keys[keys.index(column)], keys[keys.index(column) + 1]
     return sum(math.hypot(float(row[x]), float(row[y])) for row in ring) / len(ring)
@@ -87,30 +87,30 @@ def operations(basis):
 print(f"""# The paper, row by row
 
 Santhanam, Imielinska, Davenport, Kupelian and Rolland, "Modeling Real-Time 3-D Lung Deformations for Medical
-Visualization", IEEE Trans. Inf. Technol. Biomed. 12(2), 2008. Each row names the command or program that shows it,
-its result, and what differs here. Made by `python3 docs/paper.py build/release > docs/paper.md`, on synthetic
-lungs of {best['vertices']:,} vertices.
+Visualization", IEEE Trans. Inf. Technol. Biomed. 12(2), 2008. Each row names the command or program that
+reproduces a part of the paper, its result, and what differs here. `python3 docs/paper.py build/release > docs/paper.md`
+makes this file from synthetic lungs of {best['vertices']:,} vertices.
 
-| in the paper | shown by | result | difference |
+| in the paper | reproduced by | result | difference |
 |---|---|---|---|
-| III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other curves are fitted to under 1 % (`test_pv_fit`) | the paper leaves the control functions open; here they are Legendre polynomials (`<supine/breath.h>`) |
-| III-C, displacement at one orientation against volume | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | at most {off_line():.1f} % of the displacement at 500 mL off a straight line, 0 to 500 mL, four postures | with `deep` the path bends on purpose; with `paper` each vertex moves on a line |
-| III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | springs are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes |
+| III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other curves are fitted with errors below 1 % (`test_pv_fit`) | the paper does not define the control functions; here they are Legendre polynomials (`<supine/breath.h>`) |
+| III-C, displacement as a function of volume at one orientation | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | at most {off_line():.1f} % of the displacement at 500 mL away from a straight line, from 0 to 500 mL in four postures | with `deep` the path bends, as that of real lungs does; with `paper` each vertex moves on a line |
+| III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | the spring nodes are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes |
 | (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row per vertex | |
-| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits to an error of 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare it with the paper's iteration |
-| (9)-(14), all paths | `supine solve --law paper` | the same fixed point (`test_equilibrium`) | solved, not enumerated |
-| (15)-(17), directions | `--law`, `--constants`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits a person's own |
-| (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | in `deep` only a part of the gradient follows gravity |
+| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits to an error of 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare the solution with the paper's iteration |
+| (9)-(14), all paths | `supine solve --law paper` | the fixed point of (5), (6) (`test_equilibrium`) | the paths are not enumerated; the linear system is solved |
+| (15)-(17), directions | `--law`, `--constants`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits those of a person |
+| (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | in `deep` only a part of the gradient of the force follows gravity |
 | Fig. 4, lungs in postures | `supine render BASIS --posture supine,prone,left,right -o postures.png` | | drawn by the processor |
-| IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as (5), (6) | |
-| IV, Fig. 8, a plane | the same, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, to the nine digits written | |
-| IV, Fig. 9, a ring, a third of it stiffer | the same, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} uniform, {radius('x2'):.1f} with a third twice as stiff, {radius('x4'):.1f} four times | |
-| IV-B, expandability from displacement | `supine fit --expandability` | a known law is recovered (`test_inverse`, `test_patient_expand`) | regions instead of single vertices: surfaces do not determine more |
-| IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, for larger breaths of other people | |
-| V, spherical harmonics of the orientation, l <= 3 | `supine precompute --law paper --band 3 --modes harmonics` | error {percent(first)} RMS on held-out directions; {operations(first)} a vertex | |
-| V, the same number of operations or fewer | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} a vertex | the best functions of orientation instead of the first |
+| IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as for (5), (6) | |
+| IV, Fig. 8, a plane | `tests/bench/bench_validation`, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, in the nine digits written | |
+| IV, Fig. 9, a ring with a stiffer third | `tests/bench/bench_validation`, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} with uniform stiffness, {radius('x2'):.1f} with a third twice as stiff, {radius('x4'):.1f} with a third four times as stiff | |
+| IV-B, expandability from displacement | `supine fit --expandability` | a known law is recovered (`test_inverse`, `test_patient_expand`) | found for regions, as surfaces do not determine it for single vertices |
+| IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, which has larger breaths of other people | |
+| V, spherical harmonics of the orientation, l <= 3 | `supine precompute --law paper --band 3 --modes harmonics` | error {percent(first)} RMS on held-out directions; {operations(first)} per vertex | |
+| V, with at most the same number of operations | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} per vertex | the best functions of orientation instead of the first harmonics |
 | V, with stiffness that follows gravity | `--reach 10 --soften 1` | {percent(soft_first)} with the first 16 harmonics, {percent(soft_best)} with {soft_best['modes']} modes | |
 | V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement; the transfer matrix is applied once, to the best modes |
-| V, a breath of 500 mL over 5 s in steps of 1.5 mL, 15 ms a frame | `supine breathe --course flow`, `supine_step` | three additions a vertex a step (`test_deform`) | |
+| V, a breath of 500 mL over 5 s in steps of 1.5 mL, 15 ms per frame | `supine breathe --course flow`, `supine_step` | three additions per vertex and step (`test_deform`) | |
 | VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | |
 """.rstrip())

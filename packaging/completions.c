@@ -38,8 +38,8 @@ static void bash_words(const supine_option *option, FILE *file) {
   }
 }
 
-/* Write the case that completes an option's value in bash: its choices, names of files, or nothing.
- */
+/* Write the bash case that completes the value of an option by its choices, by names of files, or
+ * not at all. */
 static void bash_value(void *given, const supine_option *option, size_t base) {
   const context *c = given;
   (void)base;
@@ -70,7 +70,7 @@ static void bash_name(void *given, const supine_option *option, size_t base) {
 }
 
 static void write_bash(FILE *file) {
-  (void)fputs("# bash completion for supine; made from its tables of options\n"
+  (void)fputs("# bash completion for supine, generated from its tables of options\n"
               "_supine() {\n"
               "  local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]} words=\n"
               "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
@@ -101,8 +101,8 @@ static void write_bash(FILE *file) {
               file);
 }
 
-/* Write a text within zsh's '...[...]...': up to the first of ; : . or the end of the line, with a
- * space for each character that zsh would interpret. */
+/* Write a text for use within '...[...]...' of zsh: up to the first ; : . or line end, with a space
+ * in place of each character that zsh would interpret. */
 static void zsh_text(const char *text, FILE *file) {
   const size_t length = strcspn(text, ";:\n.");
   for (size_t i = 0; i < length; ++i) {
@@ -141,7 +141,7 @@ static void zsh_option(void *given, const supine_option *option, size_t base) {
 }
 
 static void write_zsh(FILE *file) {
-  (void)fputs("#compdef supine\n# made from supine's tables of options\n"
+  (void)fputs("#compdef supine\n# zsh completion for supine, generated from its tables of options\n"
               "if (( CURRENT == 2 )); then\n  local -a commands=(\n",
               file);
   for (size_t i = 0; supine_command_list[i] != NULL; ++i) {

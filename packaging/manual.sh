@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Make a manual page of every command from its --help-all: manual.sh PROGRAM FOLDER VERSION. Needs help2man.
+# Make the manual page of every command from its --help-all: manual.sh PROGRAM FOLDER VERSION. Needs help2man.
 set -eu
 mkdir -p "$2"
 out=$(cd "$2" && pwd)

@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Test a package in a clean Debian 12, as root: try_package.sh supine_*.deb EXAMPLE.c
-# Install it by apt, run the program, compile the example with the library, purge the package, and check that
-# no file is left.
+# Install the package by apt, run the program, compile the example with the library, purge the package, and check
+# that no file is left.
 set -eu
 package=$1
 example=$2
@@ -25,4 +25,4 @@ inside 'cd /srv; supine phantom --vertices 2000 -o lungs.ply; supine precompute 
 inside 'apt-get purge -y -qq supine >/dev/null 2>&1'
 inside 'find / -xdev -name "*supine*" ! -path "/srv/*" ! -path "/proc/*" ! -path "/var/log/*"' >"$root/after"
 cmp "$root/before" "$root/after"
-echo "installed, run, compiled against and purged: nothing is left"
+echo "installed, run, compiled against and purged: no file is left"

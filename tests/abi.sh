@@ -11,7 +11,8 @@ revision=${1:-$(git -C "$source" describe --tags --abbrev=0 2>/dev/null ||
   git -C "$source" log -1 --format=%h -G'define SUPINE_VERSION "' -- runtime/include/supine/version.h)}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-build() { # build REVISION: its library and headers in $work/REVISION's place
+# build REVISION NAME: build the library of a revision in $work/NAME.
+build() {
   mkdir "$work/$2"
   git -C "$source" archive "$1" | tar -x -C "$work/$2"
   (cd "$work/$2" && cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DBUILD_TESTING=OFF \

@@ -22,7 +22,7 @@ if [ "$what" = all ] || [ "$what" = clang ]; then
 fi
 if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
   command -v clang-tidy >/dev/null || { echo "clang-tidy is not installed"; exit 1; }
-  # All sources of the build; the source that defines supine_error_set does not get analyse.h.
+  # Check all sources of the build. status.c defines supine_error_set, so it is checked without analyse.h.
   {
     sed -n 's|^ *"file": "\(.*\)",*$|\1|p' build/clang/compile_commands.json | sort -u |
       grep -E "^$PWD/(sh|mesh|precompute|runtime|program|packaging)/" | grep -v '/sh/base/status\.c$' |

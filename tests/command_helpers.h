@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run a command of the program in the test's own process. */
+/* Run a command of the program within the process of the test. */
 #ifndef SUPINE_COMMAND_HELPERS_H
 #define SUPINE_COMMAND_HELPERS_H
 
@@ -7,10 +7,11 @@
 
 #include "program/options/command.h"
 
-/* The streams that are captured; the others are discarded. */
+/* Output streams to capture; the output of others is discarded. */
 enum { KEPT_OUT = 1, KEPT_ERR = 2, KEPT_BOTH = 3 };
 
-/* Run the command with `words`. Return its exit code, and what it printed in text [size]. */
+/* Run the command with `words`, ended by NULL. Return its exit code, and in text [size] its output
+ * on the streams `kept`. */
 static inline int command_run(const supine_command *command, const char *const *words, int kept,
                               char *text, size_t size) {
   char *argv[24] = {strdup(command->name)};
@@ -26,7 +27,7 @@ static inline int command_run(const supine_command *command, const char *const *
   assert_true(file != NULL && dropped != NULL);
   assert_true(dup2(fileno(kept & KEPT_OUT ? file : dropped), STDOUT_FILENO) >= 0);
   assert_true(dup2(fileno(kept & KEPT_ERR ? file : dropped), STDERR_FILENO) >= 0);
-  optind = 0; /* getopt starts anew */
+  optind = 0; /* tells getopt to start again at the first argument */
   const int code = supine_options_run(command, argc, argv);
   (void)fflush(stdout);
   (void)fflush(stderr);
@@ -43,7 +44,7 @@ static inline int command_run(const supine_command *command, const char *const *
   return code;
 }
 
-/* Run with the words as arguments; `text` must be an array. */
+/* Run the command with the remaining arguments as its words; `text` must be an array. */
 #define COMMAND_RUN(command, kept, text, ...)                                                      \
   command_run(command, (const char *const[]){__VA_ARGS__, NULL}, kept, text, sizeof(text))
 

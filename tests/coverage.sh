@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Count the lines that the tests reach: tests/coverage.sh [quick]
 #
-# Build with gcov, run all tests (or the quick ones, two minutes), and print the unreached lines of each
-# file and the total share; with the quick tests it is a lower bound. Needs gcovr (in Debian). Exit with 1
-# if the share is below 90 %.
+# Build with gcov, run all tests (with `quick` those that together take two minutes), and print the lines of each
+# file that no test reaches, and the share of lines reached; the quick tests give a lower bound. Needs gcovr
+# (in Debian). Exit with an error if the share is below 90 %.
 set -eu
 cd "$(dirname "$0")/.."
-# Tests that are slow with gcov and reach few lines that others do not reach.
+# Tests left out by `quick`: they are slow with gcov and reach few lines that no other test reaches.
 slow='precompute|thread_count|field|patient_expand|program|breathe|projection|deform|deform_lung|cohort'
 slow="$slow|inside|no_data_lost|labels_orientation|lit_angles|faults|bids|reference|validation_lungs|house"
 slow="$slow|readme_example|series_vtk|stream_page|stream_slicer|stream_link|stream_unity.*|export_.*_node|mesh_hostile"

@@ -2,8 +2,8 @@
 supine_test(export_glb runtime_fixture supine_commands PkgConfig::JANSSON supine_gsl)
 supine_test(export_html runtime_fixture supine_commands supine_gsl ${MESHOPT_LINK_LIBRARIES})
 
-# Open exported files in other programs and compare with the C evaluator. Needs node, the packages of
-# tests/export/package.json (npm install in that folder), and Chromium for the page; skipped if they are missing.
+# Open exported files in other programs, and compare them with the C evaluator. The tests need node, the packages in
+# tests/export/package.json (npm install in that folder) and, for pages, Chromium; otherwise they are skipped.
 add_executable(export_positions export/positions.c)
 target_link_libraries(export_positions PRIVATE supine_build supine_runtime)
 find_program(NODE_PROGRAM NAMES node nodejs)
@@ -15,7 +15,7 @@ if(NODE_PROGRAM)
 else()
   set(SUPINE_NODE sh -c "echo 'skipped: node is not installed'; exit 77")
 endif()
-foreach(what colour glb pages) # pages.mjs: everything that a browser shows, in one process
+foreach(what colour glb pages) # pages.mjs runs all tests in a browser, in one process
   add_test(NAME export_${what}_node COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/export/${what}.mjs)
   set_tests_properties(export_${what}_node PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")

@@ -13,7 +13,7 @@ static inline int folder_make(void **state) {
   return mkdtemp(folder) != NULL ? 0 : -1;
 }
 
-/* Remove the folder with all that is in it, after the last test. */
+/* Remove the folder and its content after the last test. */
 static inline int folder_remove(void **state) {
   char command[64];
   (void)state;
@@ -21,7 +21,7 @@ static inline int folder_remove(void **state) {
   return system(command); /* NOLINT(cert-env33-c) */
 }
 
-/* Return the path of a file in the folder, valid for seven more calls. */
+/* Return the path of a file in the folder; the next seven calls do not overwrite it. */
 static inline const char *in_folder(const char *name) {
   static char path[8][128];
   static size_t next;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build I - A over all nodes (masses and springs) entry by entry from definitions (3) and (8), as
- * an independent reference for the solver. */
+/* Build the matrix I - A over all nodes (masses and springs), entry by entry from definitions (3)
+ * and (8) of [Santhanam2008], as an independent reference for the solver. */
 #ifndef SUPINE_FULL_OPERATOR_H
 #define SUPINE_FULL_OPERATOR_H
 
@@ -12,14 +12,14 @@
 #include "mesh/mesh.h"
 
 typedef struct full_operator {
-  size_t node_count;  /* masses, then springs */
-  size_t entry_count; /* off the diagonal */
+  size_t node_count;  /* masses come first, then springs */
+  size_t entry_count; /* number of entries off the diagonal */
   size_t *row, *column;
-  double *value; /* Te[column->row] */
-  double *own;   /* Te[j->j] */
+  double *value; /* [entries] transfer Te[column->row] */
+  double *own;   /* [nodes] share Te[j->j] that a node keeps */
 } full_operator;
 
-/* Compute Te of every pair of linked nodes for stiffness E [N], without scaling E. */
+/* Compute Te of every pair of linked nodes for stiffness E [N], used as given. */
 static inline full_operator full_operator_create(const supine_mesh *mesh,
                                                  const supine_topology *topology, const double *e) {
   const size_t n = mesh->vertex_count;
@@ -78,7 +78,7 @@ static inline void full_operator_free(full_operator *op) {
   free(op->own);
 }
 
-/* A sparse direct factorisation of I - A. */
+/* Sparse LU factorisation of I - A, by UMFPACK. */
 typedef struct direct_solver {
   int *ap, *ai;
   double *ax, *right, *solution;
@@ -117,7 +117,7 @@ static inline direct_solver direct_solver_create(const full_operator *op) {
   return d;
 }
 
-/* Solve for F of the masses under one applied force. */
+/* Solve for the catch of the masses, `caught` [masses], under an applied force [masses]. */
 static inline void direct_solver_solve(direct_solver *d, const full_operator *op, size_t masses,
                                        const double *force, double *caught) {
   for (size_t j = 0; j < op->node_count; ++j) {

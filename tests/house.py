@@ -3,9 +3,9 @@
 
     python3 house.py SOURCE_FOLDER BUILD_FOLDER
 
-Each row of the table names a folder, says what it is for and lists the folders above it in the table
-that its files may include from. It may also use what those may use. So includes between folders form no circle.
-Check also the names and the cycles of files, and the sizes of functions."""
+Each row of the table names a folder, says what it is for, and lists the folders above it in the table from which
+its files may include. A folder may also use the folders that those may use. Check also that files do not depend on
+each other in cycles, the prefix of external names, and the sizes of functions."""
 import os
 import re
 import subprocess
@@ -14,7 +14,7 @@ import sys
 source, build = sys.argv[1:3]
 faults = []
 
-# Folders whose external names begin otherwise than supine_<folder>_.
+# Prefixes of external names in folders where they differ from supine_<folder>_.
 PREFIX = {"sh/base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": ("supine_",),
           "mesh/io": ("supine_mesh_", "supine_image_"), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_"),
           "precompute/physics": ("supine_physics_", "supine_reference_"),
@@ -32,12 +32,12 @@ def read_table():
     for line in table:
         row = re.fullmatch(r"\| `([a-z/]+)` \|([^|]*)\|([^|]*)\|", line)
         if row is None:
-            faults.append(f"ARCHITECTURE.md: no row of three cells: {line}")
+            faults.append(f"ARCHITECTURE.md: not a row of three cells: {line}")
         else:
             rows.append(row.groups())
     for folder, what, uses in rows:
         if not what.strip():
-            faults.append(f"ARCHITECTURE.md does not say what {folder} is")
+            faults.append(f"ARCHITECTURE.md does not say what {folder} is for")
         folders[folder] = set()
         for used in re.findall(r"`([a-z/]+)`", uses):
             if used == folder or used not in folders:
@@ -59,7 +59,7 @@ def tracked():
 
 
 def included(file):
-    """Return the folders that a file includes from."""
+    """Yield the folder and the name of each included file of the project."""
     with open(os.path.join(source, file), encoding="utf-8") as text:
         for name in re.findall(r'^#\s*include\s+[<"]([^>"]+)[>"]', text.read(), re.M):
             for path in [name] + [f"{folder[:-len('/supine')]}/{name}" for folder in PUBLIC]:
@@ -78,18 +78,18 @@ def check_includes(folders, files):
 
 
 def check_systems(files):
-    """Check that only posix.c and windows.c of the library use the operating system."""
+    """Check that in the library only posix.c and windows.c include headers of the operating system."""
     library = PUBLIC + ("runtime", "runtime/safetensors", "runtime/kernels", "runtime/compare")
     for file in files:
         if os.path.dirname(file) in library and os.path.basename(file) not in ("posix.c", "windows.c"):
             with open(os.path.join(source, file), encoding="utf-8") as text:
                 for name in re.findall(r"^#\s*include\s+<((?:sys/|unistd|fcntl|dirent|pthread|strings|windows).*?)>",
                                        text.read(), re.M):
-                    faults.append(f"{file} includes {name}, which posix.c and windows.c are for")
+                    faults.append(f"{file} includes {name}: only posix.c and windows.c may")
 
 
 def check_files_apart(files):
-    """Check that files do not include each other in circles."""
+    """Check that files do not include each other in cycles."""
     graph = {f: set() for f in files}
     for file in files:
         for used, name in included(file):
@@ -99,11 +99,11 @@ def check_files_apart(files):
     while leaves := {f for f, out in graph.items() if not out & set(graph)}:
         graph = {f: out for f, out in graph.items() if f not in leaves}
     if graph:
-        faults.append(f"files that include each other in circles: {sorted(graph)}")
+        faults.append(f"files that include each other in cycles: {sorted(graph)}")
 
 
 def objects():
-    """Yield the names that each object file defines and uses: (source without its ending, names, names)."""
+    """Yield (source file without its ending, names that it defines, names that it uses) of each object file."""
     for folder, _, names in os.walk(build):
         match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
         for name in names if match else []:
@@ -116,7 +116,7 @@ def objects():
 
 
 def check_names(folders):
-    """Check that external names begin with the name of their folder, and files do not use each other in circles."""
+    """Check that external names begin with the prefix of their folder, and that files do not use each other in cycles."""
     listed = list(objects())
     home = {name: file for file, defined, _ in listed for name in defined}
     for file, defined, _ in listed:
@@ -131,14 +131,14 @@ def check_names(folders):
     while roots := set(graph) - {f for out in graph.values() for f in out}:
         graph = {f: out for f, out in graph.items() if f not in roots}
     if graph:
-        faults.append(f"files that use each other in circles: {sorted(graph)}")
+        faults.append(f"files that use each other in cycles: {sorted(graph)}")
     if len(listed) < len(folders):
-        faults.append(f"only {len(listed)} objects in {build}")
+        faults.append(f"only {len(listed)} object files in {build}")
 
 
 def check_sizes(files):
-    """Check that functions have at most 60 lines and 7 parameters, unless the comment above says why, in a
-    sentence with the word "lines" or "parameters"."""
+    """Check that functions have at most 60 lines and 7 parameters, unless the comment above gives a reason with the
+    word "lines" or "parameters"."""
     begin = re.compile(r"^(?!(?:typedef|struct|enum|union)\b)(?:\w[\w ]*\n)?[A-Za-z_][^\n;:{}=#]*(?:\n +[^\n;{}=#]*)*\) \{$", re.M)
     head = re.compile(r"\b(\w+)\(([^;{}]*)\) \{$")
     for file in files:

@@ -11,10 +11,11 @@
 #include "mesh/io/image.h"
 #include "mesh/mesh.h"
 
-enum { HELPER_CROSSINGS = 32 }; /* largest number of crossings of a row with one surface */
+/* largest number of crossings of a row of voxels with one surface */
+enum { HELPER_CROSSINGS = 32 };
 
 /* Return an image of zeros over the box of a mesh, with voxels of `spacing` mm along LPS and an
- * origin off the corner of the box. */
+ * irregular margin. */
 static inline supine_image helper_image_over(const supine_mesh *mesh, const double spacing[3]) {
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};
   double low[3];
@@ -35,7 +36,8 @@ static inline int helper_compare_doubles(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* Return the x at which the line of row (y, z) crosses the triangle; NAN if it does not. */
+/* Return the x at which the line along x through (y, z) crosses triangle p, q, r; NAN if it does
+ * not. */
 static inline double helper_crossing(const double *p, const double *q, const double *r, double y,
                                      double z) {
   const double whole = (q[1] - p[1]) * (r[2] - p[2]) - (r[1] - p[1]) * (q[2] - p[2]);
@@ -45,7 +47,7 @@ static inline double helper_crossing(const double *p, const double *q, const dou
 }
 
 /* Set the label of all voxels whose centres are inside the surface of triangles begin <= t < end.
- * The image has bytes, along LPS. */
+ * The image has 8-bit voxels and axes along LPS. */
 static inline void helper_voxelise(const supine_mesh *mesh, size_t begin, size_t end, uint8_t label,
                                    supine_image *image) {
   const size_t rows = image->size[1] * image->size[2];
@@ -87,8 +89,9 @@ static inline void helper_voxelise(const supine_mesh *mesh, size_t begin, size_t
   free(count);
 }
 
-/* Return two ellipsoids side by side, 1 right and 2 left as lungmask writes them, in voxels of
- * `spacing` mm along LPS. The right one is larger. Both widen towards the feet and the back. */
+/* Return a map of two ellipsoids side by side, labelled 1 (right) and 2 (left) as by lungmask, in
+ * voxels of `spacing` mm along LPS. The right ellipsoid is larger. Both widen towards the feet,
+ * where they reach backwards. */
 static inline supine_image helper_two_lungs(double spacing) {
   const double size[3] = {280.0, 180.0, 240.0};
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};
@@ -107,7 +110,8 @@ static inline supine_image helper_two_lungs(double spacing) {
       p[a] = image.origin[a] + (double)index[a] * spacing;
     }
     const double half = p[0] < 0.0 ? 58.0 : 53.0;
-    const double narrow = 1.0 - 0.2 * p[2] / 100.0; /* towards the head */
+    /* Width relative to that at z = 0: narrower towards the head. */
+    const double narrow = 1.0 - 0.2 * p[2] / 100.0;
     const double x = (fabs(p[0]) - 66.0) / (half * narrow);
     const double y = (p[1] + 0.25 * p[2]) / 60.0;
     const double z = p[2] / 100.0;

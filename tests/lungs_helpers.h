@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Surfaces and comparisons of numbers for several tests. */
+/* Synthetic and real lungs, and comparisons of numbers, shared by tests. */
 #ifndef SUPINE_LUNGS_HELPERS_H
 #define SUPINE_LUNGS_HELPERS_H
 
@@ -21,8 +21,8 @@ static inline double helper_random(uint64_t *seed) {
   return 0.5 + 0.5 * random_signed(seed);
 }
 
-/* Return a closed, lumpy surface without symmetry, of 10 f^2 + 2 vertices, about 200 mm across,
- * centred at x. */
+/* Return a closed surface without symmetry of 10 frequency^2 + 2 vertices, about 250 mm high,
+ * centred at `x` mm from the midline. */
 static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed) {
   supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
                       .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
@@ -40,7 +40,7 @@ static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed)
   return mesh;
 }
 
-/* Load real surfaces (README.md) as one model; return false if they are missing. */
+/* Load real surfaces (tests/README.md) as one model; return false if a file is missing. */
 static inline bool helper_real_lungs(const char *const *names, size_t count, supine_axes axes,
                                      supine_lungs *lungs) {
   supine_mesh meshes[2] = {0};
@@ -49,7 +49,7 @@ static inline bool helper_real_lungs(const char *const *names, size_t count, sup
     char path[512];
     (void)snprintf(path, sizeof path, "%s/%s", SUPINE_TEST_DATA, names[i]);
     if (access(path, R_OK) != 0) {
-      printf("skipped: %s is not there\n", names[i]);
+      printf("skipped: %s is missing\n", names[i]);
       loaded = false;
       break;
     }
@@ -69,8 +69,8 @@ static inline bool helper_real_lungs(const char *const *names, size_t count, sup
   return loaded;
 }
 
-/* Load a real left lung at 5,000 vertices and at full resolution, each as one model; return false,
- * with both empty, if the files are missing. */
+/* Load a real left lung at 5,000 and at 20,000 vertices, each as a model; return false, with both
+ * empty, if a file is missing. */
 static inline bool helper_real_left_lung(supine_lungs *coarse, supine_lungs *fine) {
   static const char *const name[2] = {"lungs/chaste_left_5k.obj", "lungs/chaste_left.ply"};
   const bool loaded = helper_real_lungs(&name[0], 1, SUPINE_AXES_LPS, coarse) &&
@@ -82,7 +82,7 @@ static inline bool helper_real_left_lung(supine_lungs *coarse, supine_lungs *fin
   return loaded;
 }
 
-/* Return the largest |a - b|. */
+/* Return the largest |a[i] - b[i]|. */
 static inline double helper_difference(size_t count, const double *a, const double *b) {
   double largest = 0.0;
   for (size_t i = 0; i < count; ++i) {

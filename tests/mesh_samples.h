@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Small surfaces of known properties, and a folder of temporary files. */
+/* Small surfaces with known volume, and a folder for temporary files. */
 #ifndef SUPINE_TEST_MESH_SAMPLES_H
 #define SUPINE_TEST_MESH_SAMPLES_H
 
 #include "mesh/mesh.h"
 #include "test.h"
 
-/* Copy arrays into a mesh; release it by supine_mesh_free. */
+/* Return a mesh with copies of the arrays; free it by supine_mesh_free. */
 static inline supine_mesh sample_make(size_t vertex_count, const double *vertices,
                                       size_t triangle_count, const uint32_t *triangles) {
   supine_mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count};
@@ -23,7 +23,8 @@ static inline supine_mesh sample_make(size_t vertex_count, const double *vertice
   return mesh;
 }
 
-/* Return the corner of the first octant with legs of 120 mm: volume 120^3 / 6 = 288000 mm^3. */
+/* Return the tetrahedron of the origin and the points at 120 mm on each axis: volume 120^3 / 6 =
+ * 288000 mm^3. */
 static inline supine_mesh sample_tetrahedron(void) {
   static const double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
   static const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
@@ -39,13 +40,14 @@ static inline supine_mesh sample_box(void) {
   return sample_make(8, vertices, 12, triangles);
 }
 
-/* Header of an ASCII PLY file. Append the vertices' rows "x y z" and the faces' rows "3 a b c". */
+/* Header of an ASCII PLY file. Append a row "x y z" for each vertex and a row "3 a b c" for each
+ * face. */
 #define SAMPLE_PLY(vertices, faces)                                                                \
   "ply\nformat ascii 1.0\nelement vertex " #vertices                                               \
   "\nproperty float x\nproperty float y\nproperty float z\nelement face " #faces                   \
   "\nproperty list uint int vertex_indices\nend_header\n"
 
-/* Set `path` to folder/name and return it. */
+/* Set `path` to the path of a file in the folder, and return it. */
 static inline const char *sample_path(void **state, const char *name, char path[256]) {
   (void)snprintf(path, 256, "%s/%s", (const char *)*state, name);
   return path;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Compare the JavaScript package with the C library, in node and in Chromium, if clang and wasi-libc are installed.
+# Compare the JavaScript package with the C library, in node and in Chromium, if the tools to make it are installed.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   set(tarball ${PROJECT_BINARY_DIR}/runtime/npm/supine-${PROJECT_VERSION}.tgz)
   add_executable(npm_native npm/native.c)

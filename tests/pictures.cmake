@@ -6,6 +6,6 @@ target_compile_definitions(test_pictures_command PRIVATE SUPINE_PROGRAM="$<TARGE
   SUPINE_GOLDEN="${CMAKE_CURRENT_SOURCE_DIR}/golden")
 pkg_check_modules(WEBPDEMUX REQUIRED IMPORTED_TARGET libwebpdemux)
 target_link_libraries(test_pictures_command PRIVATE PkgConfig::CAIRO PkgConfig::WEBPDEMUX)
-# For sanitizer builds: ignore memory that fontconfig keeps.
+# In builds with a sanitizer, ignore memory that fontconfig keeps.
 set_tests_properties(pictures_command PROPERTIES
   ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/lsan.supp:print_suppressions=0")

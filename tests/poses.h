@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Poses with given weights and one gain for each lung. */
+/* Poses from weights and one gain (scale) for each lung, and volumes at such poses. */
 #ifndef SUPINE_TESTS_POSES_H
 #define SUPINE_TESTS_POSES_H
 
@@ -8,7 +8,8 @@
 #include <supine/runtime.h>
 #include <supine/volume.h>
 
-/* A pose of weights [K] and one gain for each lung [G]; it lives in the caller's scope. */
+/* Make a pose of weights [K] and one gain for each lung [G]. It lives as long as the caller's
+ * block. */
 #define POSED(of, by, at) posed(of, by, at, &(supine_pose){.weights = {0}})
 
 static inline supine_pose *posed(const supine_basis *basis, const double *weights,
@@ -33,7 +34,8 @@ static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
   return poses;
 }
 
-/* Add the coefficients of a lung's volume as a cubic of its scale, mL beyond the reference. */
+/* Add to cubic [3] the coefficients of s, s^2 and s^3 in the volume that a lung gains beyond the
+ * reference at scale s, mL. */
 static inline void posed_cubic(const supine_basis *basis, size_t lung, const double *weights,
                                double cubic[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -65,7 +67,7 @@ static inline supine_status posed_lung_scale(const supine_basis *basis, size_t l
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
-/* Compute the common scale at which the lungs' total volume is `volume` mL beyond the reference. */
+/* Compute the common scale at which the lungs together gain `volume` mL beyond the reference. */
 static inline supine_status posed_scale(const supine_basis *basis, const double *weights,
                                         double volume, double *scale, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -76,7 +78,8 @@ static inline supine_status posed_scale(const supine_basis *basis, const double 
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
-/* Compute the total volume in a state, mL beyond the reference; return the status of its pose. */
+/* Compute the volume that the lungs together gain beyond the reference in a state, mL; return the
+ * status of its pose. */
 static inline supine_status posed_volume(const supine_basis *basis, const double gravity[3],
                                          supine_volume volume, double *beyond) {
   supine_pose pose;
@@ -98,7 +101,7 @@ static inline supine_status posed_rest(const supine_basis *basis, const double g
   return posed_volume(basis, gravity, (supine_volume){SUPINE_VOLUME_REST, 0.0}, beyond);
 }
 
-/* Return the volume of the scan, mL beyond the reference. */
+/* Return the volume that the lungs together gain beyond the reference in the scan, mL. */
 static inline double posed_scan(const supine_basis *basis) {
   const supine_state scan = supine_basis_scan(basis);
   double beyond;

@@ -4,7 +4,7 @@ supine_test(inverse supine_precompute supine_lungs supine_mesh_io)
 supine_test(force supine_precompute supine_lungs supine_mesh_io)
 supine_test(lit_angles supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(deform_lung supine_precompute supine_lungs supine_mesh_io)
-# Effects of posture and breath on real lungs, within the ranges that evidence.py prints.
+# Effects of posture and breathing on real lungs are within the ranges that evidence.py prints.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME evidence COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/evidence.py --check
     ${PROJECT_BINARY_DIR} ${SUPINE_LUNGS}/lungs ${SUPINE_LUNGS}/covid:RAS)
@@ -19,14 +19,14 @@ target_compile_definitions(test_program PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:su
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
 set_tests_properties(command_output PROPERTIES TIMEOUT 900)
-# Manual pages and completions, made from the tables of options.
+# Check manual pages and completions, which are made from the tables of options.
 add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_manual.sh $<TARGET_FILE:supine>
   ${PROJECT_BINARY_DIR}/packaging/manual)
-# Forty subjects in the cohort workflow, if snakemake is installed.
+# Run the cohort workflow on forty subjects, if snakemake is installed.
 add_test(NAME cohort COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_cohort.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
 set_tests_properties(cohort PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
-# The same for a dataset in BIDS's folders.
+# Run the BIDS app on a small dataset.
 if(Python3_FOUND)
   add_test(NAME bids COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_bids.sh $<TARGET_FILE:supine>
     ${PROJECT_SOURCE_DIR}/cohort)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the program in a folder of its own. */
+/* Run the program in a temporary folder. */
 #ifndef SUPINE_PROGRAM_HELPERS_H
 #define SUPINE_PROGRAM_HELPERS_H
 
@@ -10,7 +10,7 @@
 
 #include <supine/status.h>
 
-static char printed[65536]; /* by the last run, to stdout and stderr */
+static char printed[65536]; /* output of the last run on stdout and stderr */
 
 /* Run "supine ARGUMENTS" in the folder; return its exit code, or -1 after a signal or a timeout. */
 SUPINE_PRINTF(1, 2)
@@ -36,7 +36,7 @@ static void expect(int code, const char *words, int got) {
   }
 }
 
-/* Run, and assert the exit code and that the output contains `words`. */
+/* Run "supine ARGUMENTS", and assert its exit code and that its output contains `words`. */
 #define EXPECT(code, words, ...) expect(code, words, run(__VA_ARGS__))
 
 /* Count the files of the folder whose names begin with `prefix`. */

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Check that two builds, in different folders and at different times, install the same bytes.
+# Check that two builds of the last commit, in different folders and at different times, install the same bytes.
 #
 #     tests/reproducible.sh
 #
@@ -20,7 +20,7 @@ for place in one/here another/place/altogether; do
   (cd "$work/$place/installed" && find . -type f | LC_ALL=C sort | xargs sha256sum) >"$work/$(basename "$place").sums"
 done
 if cmp "$work/here.sums" "$work/altogether.sums"; then
-  echo "$(wc -l <"$work/here.sums") installed files, the same bytes from either folder"
+  echo "$(wc -l <"$work/here.sums") installed files, same bytes from both folders"
 else
   diff "$work/here.sums" "$work/altogether.sums"
   exit 1

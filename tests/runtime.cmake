@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-# Synthetic bases, and reference evaluations of them.
+# Synthetic bases and reference evaluations.
 add_library(runtime_fixture STATIC runtime_fixture.c)
 target_link_libraries(runtime_fixture
   PRIVATE supine_build PkgConfig::CMOCKA
@@ -23,7 +23,7 @@ supine_test(runtime_basis runtime_fixture)
 supine_test(deform runtime_fixture)
 supine_test(deform_lit runtime_fixture)
 
-# The installed library, used by CMake and pkg-config.
+# Use the installed library by CMake and by pkg-config.
 add_executable(make_basis example/make_basis.c)
 target_include_directories(make_basis PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
 target_link_libraries(make_basis PRIVATE supine_build runtime_fixture PkgConfig::CMOCKA)
@@ -36,14 +36,14 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
   set_tests_properties(install PROPERTIES TIMEOUT 900)
 endif()
 
-# The Python package, by Debian's python.
+# Test the Python package with Debian's python.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
   set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 endif()
 
-# The library for Windows, if a compiler for it is installed.
+# Build the library for Windows, if a compiler for it is installed.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME windows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_windows.sh ${CMAKE_COMMAND}
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER})
@@ -56,23 +56,23 @@ foreach(name malloc calloc realloc aligned_alloc strdup free mmap munmap open cl
 endforeach()
 supine_test(runtime_threads runtime_fixture Threads::Threads)
 
-# The GPU shader, if EGL can run it without a window; not under the thread sanitizer, which does not know the
-# driver's threads.
+# Test the GPU shader, if EGL can run it without a window, but not with the thread sanitizer, which does not know the
+# threads of the driver.
 pkg_check_modules(EGL IMPORTED_TARGET egl glesv2)
 if(EGL_FOUND AND NOT SUPINE_SANITIZE MATCHES "thread")
   supine_test(glsl runtime_fixture PkgConfig::EGL)
   target_compile_definitions(test_glsl PRIVATE SUPINE_GLSL="${PROJECT_SOURCE_DIR}/runtime/supine.glsl")
-  # Ignore leaks of the driver.
+  # Ignore memory leaks of the driver.
   set_tests_properties(glsl PROPERTIES ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;LIBGL_ALWAYS_SOFTWARE=1")
 endif()
 
-# Includes follow the table of folders in ARCHITECTURE.md, and external names begin with the folder's name.
+# Check that the sources follow the table of folders in ARCHITECTURE.md.
 if(Python3_FOUND)
   add_test(NAME house COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/house.py
     ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
 endif()
 
-# README.md shows the program that the test `install` builds.
+# Check that README.md shows the program that the test `install` builds.
 add_test(NAME readme_example COMMAND sh -c
   "sed -n '/^```c$/,/^```$/p' README.md | sed '1d;$d' | cmp - tests/example/example.c"
   WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})

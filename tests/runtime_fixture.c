@@ -14,14 +14,14 @@ void *fixture_allocate(size_t count, size_t size) {
 }
 
 double fixture_random(uint64_t *state) {
-  /* splitmix64 */
   uint64_t z = (*state += UINT64_C(0x9E3779B97F4A7C15));
   z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
   z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
   return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-/* Write a bipyramid over a polygon to vertices begin <= i < end, and its triangles. */
+/* Make a lung from the vertices begin <= i < end: a bipyramid over a polygon with its triangles, or
+ * points without triangles if there are fewer than 5. */
 static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_t *state) {
   const size_t corners = end - begin >= 5 ? end - begin - 2 : 0;
   for (size_t i = begin; i < end; ++i) {
@@ -47,7 +47,7 @@ static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_
   }
 }
 
-/* Return field k of vertex i, mm. */
+/* Compute the displacement u of vertex i by field k at weight 1, mm. */
 static void field(const fixture *f, size_t i, size_t k, double u[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = f->vector
@@ -61,8 +61,8 @@ static double det(const double *a, const double *b, const double *c) {
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* Add the volume forms of one triangle: the determinant of three corners, each rest + s * sum of
- * w_k u_k; mm^3 / 1000. */
+/* Add the volume forms of one triangle, mL. Its part of the enclosed volume is a sixth of the
+ * determinant of its deformed corners p + s * sum over k of w_k u_k, for reference positions p. */
 static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
   const size_t K = f->modes;
   double r[3][3];
@@ -151,8 +151,8 @@ fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed) 
   fixture *f = fixture_create(vertices, modes, 1, 2, false, false, 1, seed);
   memset(f->mode, 0, 4 * modes * sizeof *f->mode);
   memset(f->coefficient, 0, vertices * modes * sizeof *f->coefficient);
-  f->mode[0] = 1 / 0.28209479177387814;     /* weight 1 */
-  f->mode[4 + 1] = 1 / 0.48860251190291992; /* weight g_y */
+  f->mode[0] = 1 / 0.28209479177387814;     /* makes the weight of mode 0 equal to 1 */
+  f->mode[4 + 1] = 1 / 0.48860251190291992; /* makes the weight of mode 1 equal to g_y */
   for (size_t i = 0; i < vertices; ++i) {
     const float *p = f->vertex + 3 * i;
     const double middle = 150.3 * ((double)f->lung[i] - 0.5);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A synthetic basis of any size, closed bipyramids with random fields, and its evaluation in double
+/* Synthetic bases of any size: bipyramids with random fields, and their evaluation in double
  * precision. */
 #ifndef SUPINE_TEST_RUNTIME_FIXTURE_H
 #define SUPINE_TEST_RUNTIME_FIXTURE_H
@@ -12,16 +12,17 @@ typedef struct fixture {
   size_t vertices, triangles, modes, band, lungs;
   bool vector, volume;
   size_t lung_begin[17];
-  float *vertex;       /* [N, 3] */
+  float *vertex;       /* [N, 3], mm */
   uint32_t *triangle;  /* [M, 3] */
   float *direction;    /* [N, 3] */
   float *coefficient;  /* [N, K] or [N, 3, K] */
-  double *mode;        /* [K, (L+1)^2] */
+  double *mode;        /* [K, (L+1)^2] coefficients of the weight of each mode, L the band */
   unsigned char *lung; /* [N] */
   double *linear, *quadratic, *cubic;
-  const double *resting; /* [9], owned by the caller; NULL: rest volumes are unknown */
-  bool fields;           /* metadata states fields of another simulator */
-  size_t normals;        /* Q; 0 unless fixture_add_normals set it */
+  /* [9] coefficients of the rest volume, owned by the caller; NULL if it is unknown */
+  const double *resting;
+  bool fields;           /* whether the metadata says that the fields are from another simulator */
+  size_t normals;        /* number Q of modes of normals; 0 unless set by fixture_add_normals */
   int16_t *normal;       /* [N, 3, Q] */
   double *normal_weight; /* [G, Q, (K + 1)(K + 2) / 2] */
 } fixture;
@@ -32,25 +33,26 @@ __attribute__((returns_nonnull)) void *fixture_allocate(size_t count, size_t siz
 /* Return a pseudo-random number in [-1, 1); the caller keeps the state. */
 double fixture_random(uint64_t *state);
 
-/* Create lungs of about 10 cm radius with `vertices` / `lungs` vertices each (closed if at least
- * 5), random fields of about `amplitude` mm, and volume forms if `volume`. */
+/* Create lungs of about 10 cm radius with `vertices` / `lungs` vertices each, which are closed if
+ * there are at least 5. Their fields are random, of about `amplitude` mm; `volume` adds volume
+ * forms. */
 fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);
 
-/* Create two closed lungs that shrink towards their apex by up to a third, depending on gravity. */
+/* Create two closed lungs that shrink towards their apex, by an amount that depends on gravity. */
 fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed);
 
 /* Add volume forms to a fixture created without them. */
 void fixture_add_forms(fixture *f);
 
-/* Add random modes of normals: they match no surface, but their evaluation can be compared. */
+/* Add random modes of normals, which are not normals of the surface but test their evaluation. */
 void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
 
-/* Write the basis file; assert success. */
+/* Write the basis file, and assert that this succeeds. */
 void fixture_write(const fixture *f, const char *path);
 
-/* Return the content of the basis file (malloc). */
+/* Return the bytes of the basis file (malloc), and set their number. */
 unsigned char *fixture_bytes(const fixture *f, size_t *size);
 
 /* Compute deformed positions [N, 3] in double precision. */
@@ -59,7 +61,8 @@ void fixture_deform(const fixture *f, const double *weights, const double *scale
 /* Return the volume of a lung at given positions, mL. */
 double fixture_volume(const fixture *f, size_t lung, const double *xyz);
 
-/* Make a temporary folder (malloc); remove it with every file in it. */
+/* Make a temporary folder and return its path (malloc); remove the folder with its files and free
+ * the path. */
 char *fixture_folder(void);
 void fixture_folder_remove(char *folder);
 

@@ -4,8 +4,8 @@
 #
 #     tests/same_bytes.sh build/release/supine [build/debug/supine ...]
 #
-# Run each writer with each number of threads in each build, on inputs made by the first build. Exit with 1
-# if threads make a difference; print outputs that differ between builds.
+# Run each command with each number of threads in each build, on inputs made by the first build. Exit with 1 if an
+# output depends on the number of threads; print which outputs differ between builds.
 set -eu
 export SOURCE_DATE_EPOCH=0
 work=$(mktemp -d)
@@ -35,15 +35,15 @@ made() {
     done
     # shellcheck disable=SC2086
     if [ "$(printf '%s\n' $each | sort -u | wc -l)" -ne 1 ]; then
-      echo "$1 .$ending: threads make a difference in $program:$each"
+      echo "$1 .$ending: depends on the number of threads in $program:$each"
       failed=1
     fi
     sums="$sums ${each##* }"
   done
   # shellcheck disable=SC2086
   case $(printf '%s\n' $sums | sort -u | wc -l) in
-  1) echo "$1 .$ending: the same bytes" ;;
-  *) echo "$1 .$ending: differs from build to build" ;;
+  1) echo "$1 .$ending: same bytes in all builds" ;;
+  *) echo "$1 .$ending: differs between builds" ;;
   esac
 }
 made ply phantom --vertices 9000

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare the output of a session with the golden one: same_output.py GOLDEN NOW.
+"""Compare the output of a session with its golden file: same_output.py GOLDEN NOW.
 
-Output piped through `rounded` may differ by one in the last of the four digits of a decimal number, as processors
-round halves differently; everything else must be identical."""
+In output piped through `rounded`, the last of the four digits of a decimal number may differ by one, as results
+differ slightly between processors; everything else must be identical."""
 import difflib
 import math
 import re
@@ -17,7 +17,7 @@ def lines_of(path):
 
 
 def close(a, b):
-    """Return whether two numbers of four digits differ by at most one in the last."""
+    """Return whether two numbers of four digits differ by at most one in the last digit."""
     a, b = float(a), float(b)
     largest = max(abs(a), abs(b))
     return a == b or abs(a - b) < 1.5 * 10.0 ** (math.floor(math.log10(largest)) - 3)

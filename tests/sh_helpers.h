@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Repeatable random numbers, directions and rotations. */
+/* Pseudo-random numbers, directions and rotations from a seed. */
 #ifndef SH_HELPERS_H
 #define SH_HELPERS_H
 
 #include <math.h>
 #include <stdint.h>
 
-/* Return a uniform number in (-1, 1). G. Marsaglia, "Xorshift RNGs", J. Stat. Software 8(14), 2003.
- */
+/* Return a uniform number in [-1, 1). G. Marsaglia, "Xorshift RNGs", J. Stat. Software 8(14),
+ * 2003. */
 static inline double random_signed(uint64_t *seed) {
   *seed ^= *seed << 13;
   *seed ^= *seed >> 7;
@@ -15,7 +15,8 @@ static inline double random_signed(uint64_t *seed) {
   return (double)(*seed >> 11) * 0x1p-52 - 1;
 }
 
-/* Draw a uniform direction: height and longitude are uniform (Archimedes). */
+/* Draw a direction that is uniform on the sphere: its z and its longitude are uniform
+ * (Archimedes). */
 static inline void random_direction(uint64_t *seed, double direction[3]) {
   const double z = random_signed(seed);
   const double longitude = M_PI * random_signed(seed);
@@ -25,7 +26,7 @@ static inline void random_direction(uint64_t *seed, double direction[3]) {
   direction[2] = z;
 }
 
-/* Draw a rotation matrix, from a random unit quaternion. */
+/* Draw a rotation matrix r from a random unit quaternion. */
 static inline void random_rotation(uint64_t *seed, double r[3][3]) {
   double q[4];
   double length = 0;

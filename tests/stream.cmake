@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# supine_stream_test(NAME LIBRARIES...): the cmocka program stream/test_stream_NAME.c.
+# supine_stream_test(NAME LIBRARIES...): add the cmocka program stream/test_stream_NAME.c as a test.
 function(supine_stream_test name)
   add_executable(test_stream_${name} stream/test_stream_${name}.c)
   target_link_libraries(test_stream_${name} PRIVATE supine_build runtime_fixture supine_stream
@@ -13,7 +13,7 @@ supine_stream_test(gravity)
 supine_stream_test(poses)
 supine_stream_test(server supine_base Threads::Threads)
 
-# Programs tested with a real server.
+# Run clients with a real server.
 find_package(Python3 COMPONENTS Interpreter)
 set(samples ${PROJECT_SOURCE_DIR}/program/stream)
 set(with_server ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/with_server.py
@@ -28,7 +28,7 @@ if(Python3_EXECUTABLE)
   add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
     ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${samples})
   set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
-  # The Unity sample, compiled by Mono; UnityStub.cs replaces the types of the engine.
+  # Test the Unity sample, compiled by Mono with stubs for the types of the engine.
   find_program(MCS_PROGRAM mcs)
   find_program(MONO_PROGRAM mono)
   if(MCS_PROGRAM AND MONO_PROGRAM AND NOT SUPINE_SANITIZE)
@@ -45,7 +45,7 @@ if(Python3_EXECUTABLE)
     add_test(NAME csharp COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_csharp.sh ${PROJECT_SOURCE_DIR}
       $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER} ${MCS_PROGRAM} ${MONO_PROGRAM})
   endif()
-  # The live page, in headless Chromium.
+  # Test the live page in headless Chromium.
   if(NODE_PROGRAM)
     add_test(NAME stream_page COMMAND ${with_server} 1000 "--volume rest+300 --web 0"
       ${NODE_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_page.mjs {page} {port})
@@ -54,7 +54,7 @@ if(Python3_EXECUTABLE)
   endif()
 endif()
 
-# Comparison with the public library of the protocol.
+# Compare messages with those of the public OpenIGTLink library.
 find_library(IGTL_LIBRARY OpenIGTLink)
 find_path(IGTL_INCLUDE igtlMessageBase.h PATH_SUFFIXES openigtlink)
 if(IGTL_LIBRARY AND IGTL_INCLUDE)

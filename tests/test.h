@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Headers and macros of every test program. test_main.c has the main function. */
+/* Headers, macros and helpers of every test program. test_main.c has the main function. */
 #ifndef SUPINE_TEST_H
 #define SUPINE_TEST_H
 
@@ -17,7 +17,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Define a test: TEST(test_name) { ... }. `*state` is what the setup of the group made. */
+/* Define a test: TEST(test_name) { ... }. The setup of the group may set `*state`. */
 #define TEST(name)                                                                                 \
   static void name(void **state);                                                                  \
   __attribute__((constructor)) static void name##_add(void) {                                      \
@@ -34,7 +34,8 @@
 void test_add(const char *name, CMUnitTestFunction test);
 void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
 
-/* Print both values in double on failure; assert_float_equal of cmocka 1.1.5 prints float. */
+/* Assert |value - expected| <= tolerance. On failure print both in double precision, where
+ * assert_float_equal of cmocka 1.1.5 prints floats. */
 #define assert_close(value, expected, tolerance)                                                   \
   do {                                                                                             \
     const double value_ = (value);                                                                 \
@@ -45,7 +46,7 @@ void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
     }                                                                                              \
   } while (0)
 
-/* Write a text as a file. */
+/* Write a text into a file. */
 static inline void test_write(const char *path, const char *text) {
   FILE *file = fopen(path, "wb");
   assert_non_null(file);
@@ -53,7 +54,7 @@ static inline void test_write(const char *path, const char *text) {
   assert_int_equal(fclose(file), 0);
 }
 
-/* Read a whole file, and append a NUL (malloc). */
+/* Return the content of a file with a NUL appended (malloc), and set its size without the NUL. */
 static inline void *test_read(const char *path, size_t *size) {
   FILE *file = fopen(path, "rb");
   assert_non_null(file);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Status strings, output files and threads. */
+/* Status strings, output files, threads and the comparison of endings. */
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -40,7 +40,7 @@ TEST(test_error_set_long_message_cut) {
   assert_int_equal(supine_error_set(NULL, SUPINE_ERROR_READ, "none"), SUPINE_ERROR_READ);
 }
 
-TEST(test_text_ends_in_with_something_before) {
+TEST(test_text_ends_in_needs_text_before_ending) {
   assert_true(supine_text_ends_in("pairs.csv", ".csv"));
   assert_false(supine_text_ends_in("pairs.CSV", ".csv"));
   assert_false(supine_text_ends_in("pairs.csv.gz", ".csv"));
@@ -78,10 +78,10 @@ TEST(test_output_commit_replaces_abandon_keeps) {
   read_text(path, text, sizeof text);
   assert_string_equal(text, "first");
   assert_int_equal(unlink(path), 0);
-  assert_int_equal(rmdir(folder), 0); /* fails where a temporary file is left */
+  assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left */
 }
 
-TEST(test_output_full_or_missing_target_reports_write) {
+TEST(test_output_full_or_missing_target_reports_write_error) {
   supine_output output;
   supine_error error;
   assert_int_equal(supine_output_open("/nonexistent-folder/x", &output, &error),
@@ -94,7 +94,7 @@ TEST(test_output_full_or_missing_target_reports_write) {
   assert_non_null(strstr(error.message, "/dev/full"));
 }
 
-/* If true, open fails as on a file system without unnamed files. */
+/* Whether open fails for unnamed files, as on file systems without O_TMPFILE. */
 static bool nameless_missing;
 
 int __real_open(const char *path, int flags, ...);
@@ -135,7 +135,7 @@ static void check_modes(void) {
     write_output(path, "new");
     assert_int_equal(mode_of(path), 0666 & ~masks[i]);
     assert_int_equal(chmod(path, 0640), 0);
-    write_output(path, "old"); /* keeps its own mode */
+    write_output(path, "old"); /* an existing file keeps its mode */
     assert_int_equal(mode_of(path), 0640);
     assert_int_equal(umask(before), masks[i]);
     assert_int_equal(unlink(path), 0);
@@ -162,7 +162,7 @@ static void check_links(void) {
   (void)snprintf(over, sizeof over, "%s/over", folder);
   assert_int_equal(symlink("target", link), 0);
   assert_int_equal(symlink(link, over), 0);
-  for (int i = 0; i < 2; ++i) { /* first the target of the link is missing, then it exists */
+  for (int i = 0; i < 2; ++i) { /* the target is missing at first, then it exists */
     struct stat status;
     write_output(over, i == 0 ? "first" : "second");
     read_text(target, text, sizeof text);
@@ -174,7 +174,8 @@ static void check_links(void) {
   assert_int_equal(rmdir(folder), 0);
 }
 
-/* Enough for several buffers, so that a write fails before the last one, and at it. */
+/* Write several buffers to a small disk: the failure of any write is reported, and no file is
+ * left. */
 static void check_full_disk(void) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   char path[64];
@@ -232,7 +233,7 @@ TEST(test_output_abandon_all_removes_temporary_names) {
   nameless_missing = false;
   assert_int_equal(access(output.temporary, F_OK), 0);
   supine_output_abandon_all();
-  assert_int_equal(rmdir(folder), 0); /* fails where a temporary file is left */
+  assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left */
   supine_output_abandon(&output);
   assert_int_equal(supine_output_try("/nonexistent-folder/x", NULL), SUPINE_ERROR_WRITE);
 }
@@ -242,7 +243,7 @@ TEST(test_thread_count_bounded_and_nonsense_ignored) {
   const size_t own = supine_thread_count();
   static const struct {
     const char *text;
-    size_t count; /* 0: as if it were unset */
+    size_t count; /* expected number of threads; 0: the value is ignored */
   } cases[] = {{"1", 1},   {"7", 7},          {"255", 255}, {"256", 256}, {"257", 0},
                {"0", 0},   {"-1", 0},         {"2 x", 0},   {"", 0},      {"many", 0},
                {"1e2", 0}, {"4294967297", 0}, {"3.", 0},    {"0x10", 0}};

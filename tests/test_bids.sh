@@ -21,7 +21,7 @@ done
 head -c 3000 data/sub-03/anat/*.ply >cut && mv cut data/sub-03/anat/sub-03_desc-lungs_mesh.ply
 mkdir data/sub-04
 
-python3 "$cohort/bids.py" data out group >said 2>&1 && fail "a group without participants"
+python3 "$cohort/bids.py" data out group >said 2>&1 && fail "the group level succeeds without participants"
 grep -q 'run participant first' said || fail "$(cat said)"
 python3 "$cohort/bids.py" data out participant --participant_label 02 -- --band 2 >said 2>&1 ||
   fail "one participant: $(cat said)"

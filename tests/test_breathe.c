@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine breathe: volumes of each frame measured on its surface; files written and refused input.
- */
+/* supine breathe: volumes measured on the surface of each frame, files, and refused input. */
 #include <dirent.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -23,9 +22,10 @@
 
 static char folder[] = "/tmp/supine-breathe-XXXXXX";
 static char basis[64], breath[64], series[64];
-static char text[16384]; /* output of the command, stdout and stderr */
+static char text[16384]; /* output of the last command on stdout and stderr */
 
-static double left_share = 1.0; /* of the collapsed left lung, in the next bases */
+/* volume of the left lung, relative to a healthy one, in bases made next */
+static double left_share = 1.0;
 
 static supine_status make_basis(const supine_lungs *lungs, const char *path) {
   supine_precompute_options options = {
@@ -53,7 +53,7 @@ static int setup(void **state) {
   return good ? 0 : -1;
 }
 
-/* Remove the entries of a folder, and count them. */
+/* Remove the entries of a folder, and return their number. */
 static size_t empty(const char *path) {
   size_t count = 0;
   DIR *entries = opendir(path);
@@ -76,7 +76,7 @@ static int teardown(void **state) {
   return rmdir(folder);
 }
 
-/* Count the entries of the folder whose names begin with `prefix`. */
+/* Return the number of entries of the folder whose names begin with `prefix`. */
 static size_t count_names(const char *prefix) {
   size_t count = 0;
   DIR *entries = opendir(folder);
@@ -91,8 +91,8 @@ static size_t count_names(const char *prefix) {
 
 #define RUN(...) COMMAND_RUN(&supine_command_breathe, KEPT_BOTH, text, __VA_ARGS__)
 
-/* Compute the volume between the triangles with vertices begin <= i < end and the centre of their
- * box, mL. */
+/* Return the volume that the triangles with vertices begin <= i < end enclose with the centre of
+ * their box, mL. */
 static double measure(const float *xyz, const uint32_t *triangles, size_t count, size_t begin,
                       size_t end) {
   const double centre[3] = {0.0, -150.0, -95.0};
@@ -114,8 +114,8 @@ static double measure(const float *xyz, const uint32_t *triangles, size_t count,
   return sum / 6000.0;
 }
 
-/* Assert that the volumes measured on the frames of `breath` are those it states for each lung, and
- * that their sums are `wanted` [T], mL. */
+/* Assert that `breath` states for each lung the volume measured on the surface of each frame, and
+ * that the gains of both lungs sum to `wanted` [frames], mL. */
 static void check_volumes(const char *basis_path, const double *wanted, size_t frames) {
   supine_safetensors *file = NULL;
   supine_basis *opened = NULL;
@@ -147,14 +147,15 @@ static void check_volumes(const char *basis_path, const double *wanted, size_t f
     }
     total = fmax(total, fabs(sum - wanted[t]));
   }
-  printf("%zu frames: volumes within %.4f mL by lung, %.4f mL in all\n", frames, by_lung, total);
+  printf("%zu frames: volumes within %.4f mL for each lung, %.4f mL in total\n", frames, by_lung,
+         total);
   assert_true(by_lung < 0.05);
   assert_true(total < 0.05);
   supine_safetensors_close(file);
   supine_basis_close(opened);
 }
 
-/* Compute V(t) of the default breath, as `supine pv` prints it. */
+/* Return the volume of each frame of a breath, mL (malloc). */
 static double *breath_of(const supine_pv_breath *course, double fps, size_t frames) {
   double *time = malloc(frames * sizeof *time);
   double *volume = malloc(frames * sizeof *volume);
@@ -190,9 +191,9 @@ TEST(test_breathe_real_lungs_turning_volumes_exact_in_every_frame) {
   supine_lungs_free(&lungs);
 }
 
-/* A program that uses the installed library alone gets the same frames as the command, bit for bit.
- */
-TEST(test_breathe_library_calls_same_frames) {
+/* A program that uses only the installed library computes the frames of the command, bit for
+ * bit. */
+TEST(test_breathe_frames_equal_library_calls) {
   enum { FRAMES = 21 };
   supine_safetensors *file = NULL;
   supine_basis *opened = NULL;
@@ -210,7 +211,8 @@ TEST(test_breathe_library_calls_same_frames) {
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   assert_non_null(xyz);
   for (size_t t = 0; t < FRAMES; ++t) {
-    supine_state frame = {.volume = {SUPINE_VOLUME_SCAN, 0.0}}; /* as the law is the paper's */
+    /* The paper's law has no rest, so volumes are relative to the scan. */
+    supine_state frame = {.volume = {SUPINE_VOLUME_SCAN, 0.0}};
     supine_pose pose;
     memcpy(frame.gravity, gravity + 3 * t, sizeof frame.gravity);
     assert_int_equal(supine_breath_evaluate(supine_breath_normal(), &wanted, 1, &time[t],
@@ -248,7 +250,7 @@ TEST(test_breathe_constant_flow_volumes_exact_in_every_frame) {
   free(wanted);
 }
 
-TEST(test_breathe_options_shape_the_breath) {
+TEST(test_breathe_options_give_stated_volumes) {
   const supine_pv_breath course = {.tidal = 300.0,
                                    .rate = 20.0,
                                    .inhale_fraction = 0.4,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Verify the checksum of basis files by the description in supine/safetensors.h, independently of the C code.
+"""Verify the checksums of basis files by an implementation from the description in supine/safetensors.h.
 
     python3 test_checksum.py BASIS...
 

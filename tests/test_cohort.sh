@@ -12,7 +12,7 @@ command -v snakemake >/dev/null || { echo "skipped: snakemake is not installed";
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-export HOME="$work" # snakemake keeps a cache there
+export HOME="$work" # for snakemake's cache
 failures=0
 fail() {
   echo "FAILED: $*"
@@ -26,10 +26,10 @@ for i in $(seq -w 1 40); do
   "$supine" phantom --vertices 300 --volume "$volume" -o "meshes/$i.ply" >/dev/null || exit 1
   echo "sub-$i,meshes/$i.ply,--band 2" >>subjects.csv
 done
-rm meshes/05.ply                                            # missing
-head -c 3000 meshes/11.ply >cut && mv cut meshes/11.ply     # cut short
+rm meshes/05.ply                                            # a missing file
+head -c 3000 meshes/11.ply >cut && mv cut meshes/11.ply     # a truncated file
 printf 'v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 3 2\nf 1 2 4\nf 2 3 4\n' >meshes/23.obj
-sed -i 's/23.ply/23.obj/' subjects.csv                      # open
+sed -i 's/23.ply/23.obj/' subjects.csv                      # an open surface
 
 flow() {
   snakemake -s "$cohort/Snakefile" --nocolor "$@" --config table=subjects.csv out=results \
@@ -42,15 +42,15 @@ grep -q '<h1>40 subjects: 37 done, 3 failed</h1>' results/group.html || fail "$(
 for failed in 'sub-05.*05.ply' 'sub-11.*11.ply' 'sub-23.*volume'; do
   grep -q "^$failed" results/group.csv || fail "no failure like $failed: $(grep "${failed%%.*}" results/group.csv)"
 done
-tr -d '\r' <results/group.csv | grep '^sub-17' | grep -q 'left_lung_ml' || fail "sub-17 does not stand apart"
+tr -d '\r' <results/group.csv | grep '^sub-17' | grep -q 'left_lung_ml' || fail "sub-17 is not reported as an outlier"
 flow "$@" || fail "the second run"
-grep -q 'Nothing to be done' said || fail "the second run did something: $(cat said)"
+grep -q 'Nothing to be done' said || fail "the second run computed something: $(cat said)"
 cp results/sub-08/result.json before.json
 "$supine" phantom --vertices 300 --volume 2222 -o meshes/07.ply >/dev/null
 flow "$@" || fail "the third run"
-grep -q '^subject *1' said || fail "one changed input redid: $(grep -A6 '^job' said)"
-cmp -s before.json results/sub-08/result.json || fail "another subject was done again"
+grep -q '^subject *1' said || fail "one changed input recomputed: $(grep -A6 '^job' said)"
+cmp -s before.json results/sub-08/result.json || fail "another subject was computed again"
 rm -r results/sub-09
 flow "$@" || fail "the fourth run"
-grep -q '^subject *1' said || fail "one missing result redid: $(grep -A6 '^job' said)"
+grep -q '^subject *1' said || fail "one missing result recomputed: $(grep -A6 '^job' said)"
 [ $failures -eq 0 ] || exit 1

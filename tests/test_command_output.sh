@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Compare the whole output of commands with golden files: test_command_output.sh PROGRAM FOLDER
 #
-# Each FOLDER/*.txt is a session: lines "$ COMMAND", each followed by its output on both streams and its
+# Each FOLDER/*.txt is a session: lines "$ COMMAND", each followed by the output on both streams and by the
 # exit code if it is not 0. Sessions run in a folder with lungs.ply, a phantom of about 500 vertices, and
-# lungs.safetensors, its basis. Numbers that depend on the processor are cut by the filter `rounded`
-# (same_output.py lets the last digit differ by one); times and residuals are masked by sed. Both stand in
-# the session. To accept the current output:
+# lungs.safetensors, its basis. In the sessions, the filter `rounded` cuts numbers that depend on the
+# processor (same_output.py lets their last digit differ by one), and sed masks times and residuals. To
+# accept the current output:
 #
 #   SUPINE_GOLDEN_UPDATE=1 ctest --preset release -R command_output
 set -u
@@ -18,8 +18,8 @@ mkdir "$work/bin"
 ln -s "$program" "$work/bin/supine"
 cat >"$work/bin/rounded" <<'END'
 #!/bin/sh
-# rounded [DIGITS] [FILE]: cut decimal numbers to four digits, and rounding errors to 0. Give fewer DIGITS
-# if a number is halfway between two numbers of four digits.
+# rounded [DIGITS] [FILE]: round decimal numbers to DIGITS digits (default 4), and rounding errors to 0. Give fewer
+# DIGITS if a number is halfway between two numbers of four digits.
 digits=4
 case ${1-} in [1-9]) digits=$1; shift ;; esac
 exec awk -v digits="$digits" '{

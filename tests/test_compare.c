@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Comparison of orientations: the Gram matrices against sums over all vertices, and slabs by
- * height. */
+/* Comparison of orientations: distances by Gram matrices against sums over all vertices, and slabs
+ * of height. */
 #include <float.h>
 
 #include "test.h"
@@ -13,7 +13,7 @@
 
 enum { LUNGS_MAX = 3 };
 
-/* A synthetic basis, opened, with its comparison. */
+/* An open synthetic basis with its comparison. */
 typedef struct made {
   fixture *f;
   unsigned char *bytes;
@@ -53,7 +53,7 @@ static void random_direction(uint64_t *state, double g[3]) {
   } while (g[0] * g[0] + g[1] * g[1] + g[2] * g[2] < 0.01);
 }
 
-/* Compute the area of each vertex relative to the sum, by Heron's formula. */
+/* Return the share of each vertex in the surface area, by Heron's formula (malloc). */
 static double *area_shares(const fixture *f) {
   double *share = calloc(f->vertices, sizeof *share);
   assert_non_null(share);
@@ -98,7 +98,8 @@ static pair random_pair(const made *m, uint64_t *state) {
   return p;
 }
 
-/* Compute the distances of all vertices between two deformed surfaces, in double precision. */
+/* Return the distance of each vertex between two deformed surfaces in double precision, mm
+ * (malloc). */
 static double *direct_distances(const made *m, const pair *p) {
   const size_t n = m->f->vertices;
   double *a = malloc(3 * n * sizeof *a);
@@ -228,8 +229,8 @@ TEST(test_energy_sums_to_mean_square_over_sphere) {
     assert_true(energy[l] >= 0);
     total += energy[l];
   }
-  /* Longitudes equispaced, exact to band 2 BAND; latitudes by Fejer's first rule, exact to degree
-   * LATITUDES - 1 >= 2 BAND in z. */
+  /* Quadrature on a grid of directions: equispaced longitudes, exact to band 2 BAND, and Fejer's
+   * first rule in latitude, exact to degree LATITUDES - 1 >= 2 BAND in z. */
   double mean = 0;
   for (int j = 0; j < LATITUDES; ++j) {
     const double turn = 3.14159265358979323846 * (2 * j + 1) / (2.0 * LATITUDES);
@@ -269,7 +270,7 @@ TEST(test_create_surface_without_area_refused) {
   fixture_destroy(f);
 }
 
-/* Return x + M x + shift for every vertex. */
+/* Return x + M x + shift for each vertex x (malloc). */
 static float *moved(const fixture *f, const double matrix[3][3], const double shift[3]) {
   float *xyz = malloc(3 * f->vertices * sizeof *xyz);
   assert_non_null(xyz);
@@ -315,8 +316,8 @@ TEST(test_slabs_reference_sum_to_volume_of_lung) {
   unmake(&m);
 }
 
-/* Slabs of the bipyramid along its axis z, of half height h: the part within z of a tip has (z/h)^3
- * of half the volume. The corners of the ring are moved to one height for this. */
+/* Slabs across the axis of a bipyramid of half height h: the part within z of a tip has (z/h)^3 of
+ * half the volume, if all corners of the ring are at one height. */
 TEST(test_slabs_bipyramid_follow_cube_of_height) {
   fixture *f = fixture_create(602, 3, 2, 1, false, true, 2, 8);
   for (size_t i = 0; i < 600; ++i) {
@@ -345,10 +346,10 @@ TEST(test_slabs_bipyramid_follow_cube_of_height) {
   fixture_destroy(f);
 }
 
-/* A displacement that is linear in position multiplies the volume of every slab by det(1 + M). */
+/* The displacement x -> x + M x + shift multiplies the volume of every slab by det(1 + M). */
 TEST(test_slabs_linear_displacement_gains_its_determinant) {
   static const double matrices[][3][3] = {
-      {{0}},                                        /* a translation */
+      {{0}},                                        /* only the shift */
       {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* an expansion */
       {{-0.2, -0.6, 0}, {0.6, -0.2, 0}, {0, 0, 0}}, /* a rotation */
       {{0.04, 0.08, -0.3}, {0.02, -0.06, 0.05}, {-0.09, 0.01, 0.07}}};
@@ -369,7 +370,8 @@ TEST(test_slabs_linear_displacement_gains_its_determinant) {
       double g[3];
       random_direction(&random, g);
       assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
-      for (size_t s = 0; s < 2 * SLABS; ++s) { /* mL, of slabs of about 100: float positions */
+      /* The tolerance, mL, is that of float positions; a slab has about 100 mL. */
+      for (size_t s = 0; s < 2 * SLABS; ++s) {
         assert_close(slabs[s].gain, (determinant - 1) * slabs[s].volume, 1e-3);
       }
     }
@@ -398,7 +400,7 @@ TEST(test_slabs_any_state_sum_to_exact_volume) {
         gain += slabs[lung * SLABS + s].gain;
       }
       assert_close(gain, posed_lung_volume(m.basis, lung, weights, scales[lung]),
-                   1e-3); /* mL: float positions */
+                   1e-3); /* mL, from float positions */
     }
   }
   free(xyz);

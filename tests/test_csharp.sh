@@ -12,7 +12,7 @@ trap 'rm -r "$work"' EXIT
 "$cc" -I"$source/runtime/include" "$source/tests/python/reference.c" "$library" -o "$work/reference"
 export LD_LIBRARY_PATH="${library%/*}"
 "$work/reference" "$work/lungs.safetensors" prone:rest+500 "$work/expected"
-# The file has 15 floats for each vertex; the positions come first.
+# The reference file has 15 floats for each vertex and begins with all positions.
 vertices=$(($(wc -c <"$work/expected") / 60))
 {
   echo 'using System; using System.IO; using System.Runtime.InteropServices; static class Test {'

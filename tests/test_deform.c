@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The evaluator in every storage and code path, against double precision. */
+/* The evaluator in every storage and on every code path, against double precision. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -8,7 +8,7 @@
 
 #include "tests/poses.h"
 
-/* A synthetic basis in memory, and a basis opened from it. */
+/* A synthetic basis, and the bytes of its file. */
 typedef struct opened {
   fixture *f;
   unsigned char *bytes;
@@ -26,7 +26,7 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* NULL: not available on this processor */
+/* Open the basis; return NULL if this processor lacks the instruction set. */
 static supine_basis *open_as(const opened *o, supine_storage storage, supine_simd simd) {
   const supine_basis_options options = {sizeof options, .storage = storage, .simd = simd};
   supine_basis *basis = NULL;
@@ -52,7 +52,8 @@ static void random_frame(const supine_basis *basis, uint64_t *random, double *we
   }
 }
 
-/* Largest distance between float positions and exact ones of vertices begin <= i < end. */
+/* Return the largest distance between float positions and exact positions of vertices begin <= i <
+ * end, mm. */
 static double farthest(const float *xyz, const double *exact, size_t begin, size_t end) {
   double top = 0;
   for (size_t i = begin; i < end; ++i) {
@@ -61,13 +62,13 @@ static double farthest(const float *xyz, const double *exact, size_t begin, size
       const double apart = (double)xyz[3 * (i - begin) + axis] - exact[3 * i + axis];
       square += apart * apart;
     }
-    assert_true(square >= 0); /* not NaN */
+    assert_true(square >= 0); /* fails for NaN */
     top = square > top ? square : top;
   }
   return sqrt(top);
 }
 
-/* Evaluate in every storage and code path: within the stated bound of the exact result. */
+/* Assert that the error of every storage and code path is within its stated bound. */
 static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool vector,
                             uint64_t seed) {
   opened o = made(fixture_create(vertices, modes, 3, lungs, vector, false, 11, seed));
@@ -87,8 +88,9 @@ static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool ve
       supine_deform(basis, POSED(basis, weights, scales), xyz);
       const double error = farthest(xyz, exact, 0, vertices);
       if (!(error <= supine_basis_error(basis, POSED(basis, weights, scales)))) {
-        fail_msg("N %zu K %zu lungs %zu storage %d code %d: %g mm, stated %g", vertices, modes,
-                 lungs, storage, simd, error,
+        fail_msg("%zu vertices, %zu modes, %zu lungs, storage %d, instruction set %d: error %g mm, "
+                 "stated %g mm",
+                 vertices, modes, lungs, storage, simd, error,
                  supine_basis_error(basis, POSED(basis, weights, scales)));
       }
       supine_basis_close(basis);
@@ -121,7 +123,7 @@ TEST(test_deform_every_mode_count_within_stated_error) {
   }
 }
 
-/* The bound is not loose: over many frames it is reached up to a small factor. */
+/* The stated bound is at most 30 times the largest error of many frames. */
 TEST(test_basis_error_many_frames_bound_nearly_reached) {
   opened o = made(fixture_create(3000, 16, 3, 2, false, false, 11, 5));
   double *exact = fixture_allocate(3 * 3000, sizeof *exact);
@@ -149,7 +151,7 @@ TEST(test_basis_error_many_frames_bound_nearly_reached) {
   drop(&o);
 }
 
-/* The directions that the stated error is searched over treat all axes alike. */
+/* The stated error does not depend on the axis that the weight of a mode follows. */
 TEST(test_storage_error_mode_along_any_axis_same) {
   double error[3];
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -185,15 +187,18 @@ TEST(test_storage_error_orders_storages) {
     supine_basis_close(basis);
   }
   assert_true(error[SUPINE_STORAGE_EXACT] < error[SUPINE_STORAGE_INT16]);
-  assert_true(bytes[SUPINE_STORAGE_EXACT] == 88); /* 64 + 12 + 12 */
-  assert_true(bytes[SUPINE_STORAGE_INT16] == 48); /* 32 + 8 + 8 */
+  /* Bytes per vertex of 16 coefficients, the position and the direction. */
+  assert_true(bytes[SUPINE_STORAGE_EXACT] == 88);
+  /* 2 bytes for each coefficient, 8 for the position and 8 for the direction */
+  assert_true(bytes[SUPINE_STORAGE_INT16] == 48);
   assert_true(error[SUPINE_STORAGE_INT16] < error[SUPINE_STORAGE_MIXED]);
-  assert_true(bytes[SUPINE_STORAGE_MIXED] == 44); /* 10 / 2 + 6 / 3 words of 4; 8 + 8 */
+  /* Seven 4-byte words: five of two coefficients, two of three. Then 8 + 8 bytes. */
+  assert_true(bytes[SUPINE_STORAGE_MIXED] == 44);
   drop(&o);
 }
 
-/* With last modes of small amplitude, as in lungs. */
-TEST(test_storage_auto_mixed_where_it_suffices) {
+/* The mixed storage is chosen if the last modes have small amplitudes, as those of lungs have. */
+TEST(test_storage_auto_mixed_if_precise_enough) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < (size_t)500 * 16; ++i) {
     f->coefficient[i] *= i % 16 < 10 ? 1 : 0.02F;
@@ -206,7 +211,7 @@ TEST(test_storage_auto_mixed_where_it_suffices) {
   drop(&o);
 }
 
-/* Just below 2^30, products and bounds stay finite; from 2^30 a file is refused. */
+/* Numbers just below 2^30 give finite bounds; a file with 2^30 is refused. */
 TEST(test_storage_largest_numbers_have_finite_bounds) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < 3; ++i) {
@@ -227,7 +232,7 @@ TEST(test_storage_largest_numbers_have_finite_bounds) {
   drop(&o);
 }
 
-/* Packed in one or two steps, the stated error is that of the final storage. */
+/* Assert that the automatic choice states the same error as its storage chosen by hand. */
 static void check_stated_error(const opened *o, const supine_basis *chosen) {
   const supine_basis_info *info = supine_basis_get_info(chosen);
   supine_basis *basis = open_as(o, info->storage, SUPINE_SIMD_AUTO);
@@ -235,7 +240,7 @@ static void check_stated_error(const opened *o, const supine_basis *chosen) {
   supine_basis_close(basis);
 }
 
-TEST(test_storage_auto_exact_where_int16_errs) {
+TEST(test_storage_auto_exact_if_int16_imprecise) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   opened o = made(f);
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
@@ -268,7 +273,8 @@ TEST(test_open_bad_options_refused) {
   drop(&o);
 }
 
-/* Ranges at any alignment give the bits that the whole gives, and write nothing else. */
+/* Assert that ranges at any alignment get the bits of the whole, and that nothing else is
+ * written. */
 static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_simd simd,
                          int trials) {
   opened o = made(fixture_create(vertices, modes, 1, lungs, false, false, 11, 8));
@@ -370,7 +376,8 @@ TEST(test_step_many_steps_reach_volume) {
     supine_step(100, step, xyz);
   }
   fixture_deform(o.f, weights, scales, exact);
-  const double drift = STEPS * 0x1p-24 * 512 * 1.8; /* half a unit a step, three axes */
+  /* Half a unit of rounding per step, along three axes. */
+  const double drift = STEPS * 0x1p-24 * 512 * 1.8;
   assert_true(farthest(xyz, exact, 0, 100) <=
               supine_basis_error(basis, POSED(basis, weights, scales)) + drift);
   supine_basis_close(basis);
@@ -404,7 +411,8 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
         const double error = farthest(xyz + 3 * j * (end - begin), exact, begin, end);
         if (!(error <=
               supine_basis_error(basis, POSED(basis, weights + j * modes, scales + 2 * j)))) {
-          fail_msg("orientation %zu storage %d code %d: %g mm", j, storage, simd, error);
+          fail_msg("orientation %zu, storage %d, instruction set %d: error %g mm", j, storage, simd,
+                   error);
         }
       }
       supine_basis_close(basis);
@@ -420,8 +428,8 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
 TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 64, 0, 700);
   check_batch(700, 16, false, 1, 3, 691);
-  check_batch(24000, 16, false, 64, 0, 24000); /* larger than the cache, whole cache lines */
-  check_batch(23999, 16, false, 64, 1, 23998); /* shared cache lines */
+  check_batch(24000, 16, false, 64, 0, 24000); /* larger than the cache, in whole cache lines */
+  check_batch(23999, 16, false, 64, 1, 23998); /* with shared cache lines at the ends */
   check_batch(90, 16, false, 300, 0, 90);
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);
@@ -430,7 +438,8 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(90, 256, true, 3, 1, 90);
 }
 
-/* Five modes fill two vec4s of each lung; previous content is overwritten. */
+/* Unused slots of the last vec4 of weights become 0, whatever they held: five modes need two
+ * vec4s. */
 TEST(test_gl_pack_unused_slots_zero) {
   enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
@@ -492,7 +501,7 @@ TEST(test_normals_bipyramid_area_weighted) {
       assert_true(fabs((double)normals[3 * i + axis] - s[axis] / length) <= 64 * 0x1p-24);
     }
   }
-  /* Normals point outwards: that of the upper tip points up. */
+  /* Normals point outwards: the normal of the upper tip points up. */
   assert_true(normals[3 * 39 + 2] > 0.9F);
   /* The normals of a surface shrunk to a point are 0. */
   float point[120] = {0};

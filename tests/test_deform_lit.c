@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Normals by the reduced product, against their formula in double precision. */
+/* Normals by modes, against their formula in double precision. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -13,8 +13,8 @@ enum { VERTICES = 211, MODES = 5, BATCH = 3 };
 /* Bound of rounding errors of a sum of up to 66 products and a root. */
 static const double rounding = 66 * 0x1p-23;
 
-/* Error of packed modes in units of the file: half a step of 13, 10 and 9 bits in the first, second
- * and last third of the modes. */
+/* Return the packing error of a mode, in counts of the file: half a step of 13, 10 or 9 bits in the
+ * first, second or last third of the modes. */
 static double packed_error(size_t mode, size_t modes) {
   static const double bits[] = {13, 10, 9};
   const double limit = 256.0 / 255 * INT16_MAX;
@@ -35,7 +35,7 @@ static opened open_lit(size_t normals, supine_simd simd) {
   uint64_t random = 17;
   if (normals > 0) {
     fixture_add_normals(o.f, normals, 5);
-    /* A vertex without triangles. */
+    /* Vertex 40 has no triangles, so its normal is 0. */
     memset(o.f->normal + 3 * normals * 40, 0, 3 * normals * sizeof *o.f->normal);
   }
   o.bytes = fixture_bytes(o.f, &size);
@@ -58,7 +58,8 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Compute v of a lung term by term. */
+/* Compute the weights v [Q] of the modes of normals of a lung: quadratic forms of the weights w and
+ * the gain s. */
 static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
   const size_t terms = (MODES + 1) * (MODES + 2) / 2;
   for (size_t j = 0; j < f->normals; ++j) {
@@ -77,7 +78,7 @@ static void expected_weights(const fixture *f, size_t lung, const double *w, dou
   }
 }
 
-/* Compute a normal; return the bound of its error along each axis. */
+/* Compute the normal n of vertex i; return the bound of its error along each axis. */
 static double expected_normal(const fixture *f, size_t i, const double *w, const double *s,
                               double *n) {
   double off = 0;
@@ -96,7 +97,7 @@ static double expected_normal(const fixture *f, size_t i, const double *w, const
   for (size_t axis = 0; axis < 3; ++axis) {
     n[axis] = length > 0 ? n[axis] / length : 0;
   }
-  /* |a / |a| - b / |b|| <= 2 |a - b| / |a| */
+  /* because |a / |a| - b / |b|| <= 2 |a - b| / |a| */
   return length > 0 ? 2 * sqrt(3.0) * off / length + rounding : 0;
 }
 
@@ -177,7 +178,8 @@ TEST(test_lit_without_normals_refused) {
   assert_int_equal(supine_deform_lit(basis, POSED(basis, o.weights, o.scales), xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
   supine_basis_close(basis);
-  /* A program built before this option existed: bytes beyond its options are not read. */
+  /* A program built before this option existed passes a smaller size, and no bytes beyond it are
+   * read. */
   options.size = offsetof(supine_basis_options, without_normals);
   assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);
   assert_int_equal(supine_basis_get_info(basis)->normal_count, 8);
@@ -186,7 +188,7 @@ TEST(test_lit_without_normals_refused) {
   drop(&o);
 }
 
-/* Open the fixture unchanged; return the status. */
+/* Return the status of opening the fixture as a basis. */
 static supine_status open_status(const fixture *f) {
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
@@ -204,7 +206,7 @@ TEST(test_open_bad_normals_refused) {
   f->normal_weight[5] = (double)NAN;
   assert_int_equal(open_status(f), SUPINE_ERROR_FORMAT);
   f->normal_weight[5] = 0;
-  f->normals = 3; /* another shape of the same size */
+  f->normals = 3; /* fewer modes of normals */
   assert_int_equal(open_status(f), SUPINE_OK);
   free(f->normal);
   free(f->normal_weight);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lesions and collapse: changes of the affected and of the other tissue. */
+/* Lesions and collapse: changes in the affected tissue and elsewhere. */
 #include <float.h>
 
 #include "precompute/lungs/disease.h"
@@ -14,9 +14,9 @@
 static const char *const real_names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
 static const double supine[3] = {0.0, 1.0, 0.0};
 
-static supine_model model; /* of the current test */
+static supine_model model; /* model of the current test */
 
-/* Return factors of 1 that lesions multiply; the model refers to them from now on. */
+/* Return factors of 1 for lesions to multiply (malloc), and make the model use them. */
 static double *no_lesions(const supine_lungs *lungs) {
   double *factors = malloc(lungs->mesh.vertex_count * sizeof *factors);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -48,7 +48,7 @@ static double distance(const double *p, const double *q) {
   return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
 }
 
-/* Return the outermost point of the left lung. */
+/* Return the outermost vertex of the left lung. */
 static const double *side_of(const supine_lungs *lungs) {
   size_t found = 0;
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -57,10 +57,10 @@ static const double *side_of(const supine_lungs *lungs) {
   return lungs->mesh.vertices + 3 * found;
 }
 
-/* Least and greatest ratio of displacements with a lesion to those without. */
+/* Least and greatest ratio of the displacement with a lesion to that without. */
 typedef struct change {
-  double inside[2]; /* within half the radius */
-  double far[2];    /* at least 50 mm from the lesion's edge */
+  double inside[2]; /* within half the radius of the lesion */
+  double far[2];    /* more than 50 mm from the edge of the lesion */
 } change;
 
 static void widen(double range[2], double value) {
@@ -68,7 +68,8 @@ static void widen(double range[2], double value) {
   range[1] = fmax(range[1], value);
 }
 
-/* Compare breaths of `volume` mL with and without the lesion; 0: of one scale. */
+/* Compare a breath with the lesion to one without. Both have `volume` mL or, if it is 0, the same
+ * scale. */
 static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
   double *factors = no_lesions(lungs);
@@ -107,18 +108,20 @@ static void check_lesions(const supine_lungs *lungs) {
       const supine_lesion lesion = {{side[0] - 8.0, side[1], side[2]}, 25.0, factors[f]};
       const change scaled = change_by(lungs, &lesion, 0.0);
       const change breathed = change_by(lungs, &lesion, 500.0);
-      printf("reach %2g mm, factor %2g: inside %.3f to %.3f; 50 mm away %.6f to %.6f at one scale, "
+      printf("reach %2g mm, factor %2g: displacement with the lesion over that without: inside "
+             "%.3f to %.3f; 50 mm away %.6f to %.6f at one scale, "
              "%.6f to %.6f at 500 mL\n",
              model.reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0],
              scaled.far[1], breathed.far[0], breathed.far[1]);
       assert_true(scaled.inside[1] < 0.9);
       assert_true(breathed.inside[1] < 0.9);
       assert_true(scaled.far[0] > 0.99 && scaled.far[1] < 1.01);
-      /* At a given volume all other regions take over what the lesion leaves, in one proportion. */
+      /* At a given volume, all other regions move more by one common factor, which replaces the
+       * volume that the lesion does not gain. */
       assert_close(breathed.far[1] / breathed.far[0], scaled.far[1] / scaled.far[0], 1e-9);
       const supine_lesion small = {{side[0] - 8.0, side[1], side[2]}, 18.0, factors[f]};
       const change by_small = change_by(lungs, &small, 500.0);
-      printf("                         of 18 mm: %.6f to %.6f at 500 mL\n", by_small.far[0],
+      printf("  with a radius of 18 mm: 50 mm away %.6f to %.6f at 500 mL\n", by_small.far[0],
              by_small.far[1]);
       assert_true(by_small.inside[1] < 0.9);
       assert_true(by_small.far[0] > 0.99 && by_small.far[1] < 1.01);
@@ -129,7 +132,7 @@ static void check_lesions(const supine_lungs *lungs) {
   model.reach = 0.0;
 }
 
-TEST(test_lesion_real_lungs_lowers_only_itself) {
+TEST(test_lesion_real_lungs_changes_only_its_region) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = {0};
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
@@ -139,7 +142,8 @@ TEST(test_lesion_real_lungs_lowers_only_itself) {
   supine_lungs_free(&lungs);
 }
 
-/* Scaling to geometric mean 1 after the lesion would change E everywhere. */
+/* A large lesion does not change the other lung, because E is scaled to geometric mean 1 without
+ * it. */
 TEST(test_lesion_large_other_lung_unchanged) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
@@ -149,7 +153,7 @@ TEST(test_lesion_large_other_lung_unchanged) {
   size_t reached = 0;
   double *factors = no_lesions(&lungs);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
-  assert_true(20 * reached > lungs.mesh.vertex_count); /* more than 5 % of them */
+  assert_true(20 * reached > lungs.mesh.vertex_count); /* more than 5 % of the vertices */
   supine_solution ill = solve(&lungs, supine);
   for (size_t i = lungs.lung_begin[1]; i < lungs.lung_begin[2]; ++i) {
     assert_true(fabs(ill.catch_[i] - healthy.catch_[i]) <= 1e-12 * healthy.catch_[i] + 1e-14);
@@ -185,7 +189,7 @@ TEST(test_lesion_any_distance_has_documented_profile) {
   double *factors = no_lesions(&lungs);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL),
-                   SUPINE_OK); /* factors of lesions multiply */
+                   SUPINE_OK); /* the factors of lesions are multiplied */
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
@@ -233,7 +237,7 @@ TEST(test_lesion_bad_numbers_refused) {
                                       {{0, 0, 0}, 10, -3},      {{0, 0, 0}, 10, NAN}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error = {0};
-    double *factors = NULL; /* refused before the factors are read */
+    double *factors = NULL; /* bad numbers are refused before the factors are read */
     assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "lesion at"));
@@ -289,8 +293,8 @@ TEST(test_collapse_any_direction_rest_and_breath_scaled) {
   supine_lungs_free(&lungs);
 }
 
-/* The fixed point of a collapse is the mean of the vertices in the quarter of the lung's width that
- * is nearest the midline, on either side. */
+/* The fixed point of a collapse is the mean of the vertices in the quarter of the lung's width
+ * nearest the midline. */
 TEST(test_collapse_fixed_point_at_hilum) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
@@ -300,7 +304,7 @@ TEST(test_collapse_fixed_point_at_hilum) {
   double *rest = malloc(3 * n * sizeof *rest);
   supine_tissue_collapse(&lungs, share, rest);
   for (size_t lung = 0; lung < 2; ++lung) {
-    const double sign = lung == 0 ? 1.0 : -1.0; /* outwards */
+    const double sign = lung == 0 ? 1.0 : -1.0; /* sign of x towards the outside */
     double inner = INFINITY;
     double outer = -INFINITY;
     for (size_t i = lungs.lung_begin[lung]; i < lungs.lung_begin[lung + 1]; ++i) {
@@ -349,7 +353,7 @@ TEST(test_collapse_real_lung_shrinks_towards_midline) {
     outer[0] = fmin(outer[0], lungs.mesh.vertices[3 * i]);
     outer[1] = fmin(outer[1], rest[3 * i]);
   }
-  assert_true(outer[1] > outer[0] + 20.0); /* mm between lung and chest */
+  assert_true(outer[1] > outer[0] + 20.0); /* mm, from the chest wall to the collapsed lung */
   free(rest);
   supine_lungs_free(&lungs);
 }

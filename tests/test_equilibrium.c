@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equilibrium against its definition, against the paper's iteration, and its invariants. */
+/* The equilibrium: against its definition and the paper's iteration, and its invariants. */
 #include <float.h>
 
 #include "precompute/physics/equilibrium.h"
@@ -9,12 +9,12 @@
 #include "full_operator.h"
 #include "lungs_helpers.h"
 
-/* A lumpy surface with irregular stiffness and forces. */
+/* An irregular surface with irregular stiffness and forces. */
 typedef struct fixture {
   supine_mesh mesh;
   supine_topology topology;
-  double *stiffness; /* geometric mean far from 1 */
-  double *force;     /* [N, 3] */
+  double *stiffness; /* [N], with a geometric mean far from 1 */
+  double *force;     /* [N, 3] three applied forces */
 } fixture;
 
 static int setup(void **state) {
@@ -61,7 +61,7 @@ static double *solve_of(const fixture *f, const double *stiffness, size_t count)
   return out;
 }
 
-/* Scale stiffness to geometric mean 1, as the operator defines it. */
+/* Return the stiffness scaled to geometric mean 1, as the operator uses it (malloc). */
 static double *normalised(size_t count, const double *stiffness) {
   double *out = malloc(count * sizeof *out);
   double sum = 0.0;
@@ -74,7 +74,7 @@ static double *normalised(size_t count, const double *stiffness) {
   return out;
 }
 
-/* Compute the springs' catch from the masses' catch [N], by (8) and (12)-(14). */
+/* Return the catch of the springs, from that of the masses [N], by (8) and (12)-(14) (malloc). */
 static double *spring_catch(const fixture *f, const double *masses) {
   const size_t edges = f->topology.edge_count;
   double *e = normalised(f->mesh.vertex_count, f->stiffness);
@@ -152,7 +152,7 @@ TEST(test_pitcher_catcher_agrees_with_fast_solve) {
   double *force = malloc(n * sizeof *force);
   double *fast = malloc(n * sizeof *fast);
   double *slow = malloc(n * sizeof *slow);
-  for (size_t i = 0; i < n; ++i) { /* both signs */
+  for (size_t i = 0; i < n; ++i) { /* forces of both signs */
     force[i] = f->force[3 * i] - 0.4;
   }
   double last[2] = {0.0, INFINITY};
@@ -168,8 +168,9 @@ TEST(test_pitcher_catcher_agrees_with_fast_solve) {
   free(slow);
 }
 
-/* M is symmetric: T[i, j] S_j / S_i = T[j, i] S_i / S_j with S = 1/E. */
-TEST(test_transfer_column_reciprocity_and_positivity) {
+/* Columns of the transfer matrix T are positive, and T[i, j] S_j / S_i = T[j, i] S_i / S_j with S =
+ * 1 / E. */
+TEST(test_transfer_columns_reciprocal_and_positive) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
   const size_t first = f->topology.edges[20];
@@ -200,7 +201,7 @@ TEST(test_transfer_columns_superpose_to_solution) {
   double *column = malloc(n * sizeof *column);
   double *sum = calloc(n, sizeof *sum);
   double *whole = solve_of(f, f->stiffness, 3);
-  for (size_t j = 0; j < n; ++j) { /* (2): F = T f */
+  for (size_t j = 0; j < n; ++j) { /* F = T f by (2) */
     assert_int_equal(supine_physics_transfer_column(eq, j, column, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {
       sum[i] += column[i] * f->force[3 * j + 1];
@@ -215,7 +216,8 @@ TEST(test_transfer_columns_superpose_to_solution) {
   free(whole);
 }
 
-/* A large surface is factorised by each solve, and a solve may overwrite its forces. */
+/* A large surface is factorised anew by each solve. A second solve, and one that overwrites the
+ * force by the solution, give the same result. */
 TEST(test_solve_large_surface_again_in_place_same) {
   supine_mesh mesh = helper_lump(101, 60.0, 5);
   const size_t n = mesh.vertex_count;
@@ -260,7 +262,7 @@ TEST(test_set_stiffness_bad_value_names_vertex) {
   supine_physics_equilibrium_destroy(eq);
 }
 
-TEST(test_solve_force_not_finite_reports_numerical) {
+TEST(test_solve_force_not_finite_reports_numerical_error) {
   const fixture *f = *state;
   supine_equilibrium *eq = equilibrium_of(&f->mesh, &f->topology, f->stiffness);
   double *out = malloc(f->mesh.vertex_count * sizeof *out);
@@ -270,7 +272,7 @@ TEST(test_solve_force_not_finite_reports_numerical) {
   assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, out, &error),
                    SUPINE_ERROR_NUMERICAL);
   assert_non_null(strstr(error.message, "residual"));
-  force[3] = 0.0; /* zero force is not an error */
+  force[3] = 0.0; /* a force of 0 is valid */
   assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, out, &error), SUPINE_OK);
   assert_close(helper_largest(f->mesh.vertex_count, out), 0.0, 0.0);
   supine_physics_equilibrium_destroy(eq);
@@ -278,8 +280,8 @@ TEST(test_solve_force_not_finite_reports_numerical) {
   free(force);
 }
 
-/* Both lungs of a real model, against a sparse direct factorisation of the unsymmetric definition
- * over all nodes. */
+/* Compare the solution for two real lungs with a sparse direct factorisation of the unsymmetric
+ * definition over all nodes. */
 static void check_real_lungs(const char *const *names, supine_axes axes) {
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 2, axes, &lungs)) {
@@ -305,7 +307,7 @@ static void check_real_lungs(const char *const *names, supine_axes axes) {
   supine_equilibrium *eq = equilibrium_of(&lungs.mesh, &lungs.topology, stiffness);
   assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, fast, NULL), SUPINE_OK);
   const double difference = helper_difference(n, x, fast) / helper_largest(n, x);
-  printf("%s: %zu vertices, %.1e from the direct solution\n", names[0], n, difference);
+  printf("%s: %zu vertices, difference from the direct solution %.1e\n", names[0], n, difference);
   assert_true(difference <= 1e-10);
   supine_physics_equilibrium_destroy(eq);
   supine_lungs_free(&lungs);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability: regional models, files, and their effect on displacement. */
+/* Expandability: regional laws, files, and the effect on displacement. */
 #include <float.h>
 
 #include "precompute/lungs/expandability.h"
@@ -66,7 +66,7 @@ TEST(test_load_both_forms_same_values) {
   }
 }
 
-TEST(test_load_bad_files_message_names_line_and_vertex) {
+TEST(test_load_bad_files_message_names_line_or_vertex) {
   static const struct {
     const char *text, *line, *detail;
   } bad[] = {
@@ -115,9 +115,9 @@ TEST(test_load_binary_or_missing_refused) {
   assert_int_equal(supine_tissue_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
 }
 
-/* Doubling the expandability everywhere changes nothing; raising it in one place moves that place
- * more. */
-TEST(test_solve_expandability_scaled_changes_nothing_raised_moves_more) {
+/* Doubling the expandability everywhere changes nothing; where it is higher than elsewhere, the
+ * tissue moves more. */
+TEST(test_solve_expandability_scaled_same_raised_moves_more) {
   const size_t n = lungs.mesh.vertex_count;
   const double g[3] = {0.0, 1.0, 0.0};
   double *e = malloc(n * sizeof *e);
@@ -133,7 +133,8 @@ TEST(test_solve_expandability_scaled_changes_nothing_raised_moves_more) {
     }
     assert_int_equal(supine_physics_solve(&lungs, &model, g, &found[i], NULL), SUPINE_OK);
   }
-  double ends[2] = {0.0, 0.0}; /* mean ratio to uniform near the apex and the base */
+  /* Mean displacement relative to uniform tissue, near the apex and near the base. */
+  double ends[2] = {0.0, 0.0};
   double count[2] = {0.0, 0.0};
   for (size_t i = 0; i < n; ++i) {
     double box[3];

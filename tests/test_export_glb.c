@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Morph targets of a basis, and the glTF file. */
+/* Morph targets of a basis, and glTF files. */
 #include "test.h"
 
 #include <jansson.h>
@@ -47,8 +47,8 @@ static uint32_t word(const unsigned char *at) {
   return value;
 }
 
-/* Read a GLB file: return its JSON, the file in `bytes` (malloc) and the start of its binary chunk.
- */
+/* Read a GLB file: return its JSON, and set `bytes` to the file (malloc) and `numbers` to its
+ * binary chunk. */
 static json_t *read_glb(unsigned char **bytes, const unsigned char **numbers) {
   size_t size = 0;
   *bytes = test_read(out, &size);
@@ -74,7 +74,7 @@ static size_t number(const json_t *object, const char *key) {
   return (size_t)json_integer_value(json_object_get(object, key));
 }
 
-/* Return component `axis` of element `i` of an accessor; assert that it is within the stated
+/* Return component `axis` of element i of an accessor; assert that it is within the accessor's
  * bounds. */
 static double component(const json_t *root, const unsigned char *numbers, size_t accessor, size_t i,
                         size_t axis) {
@@ -102,8 +102,8 @@ static double real(const json_t *object, const char *key, size_t index) {
   return json_number_value(child(object, key, index));
 }
 
-/* Assert that base + sum of weight * target, with weights from the extras, gives the positions of
- * the library; s and t are the gains of each lung. */
+/* Assert that morphing with weights from the extras gives the positions of the library. Each lung
+ * has a gain s and a gain t along the bend. */
 static void check_pose(const supine_pose *given, const double s[2], const double t[2]) {
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -143,7 +143,7 @@ static void check_pose(const supine_pose *given, const double s[2], const double
   free(xyz);
 }
 
-/* The bend has its own targets, and each lung its own gains. */
+/* Targets for the bend and gains for each lung give the positions of the library. */
 TEST(test_glb_bent_basis_targets_give_positions_of_library) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain"), 0);
   export_source source = {0};
@@ -164,8 +164,8 @@ TEST(test_glb_bent_basis_targets_give_positions_of_library) {
   supine_export_source_close(&source);
 }
 
-/* Between the sampled directions a weight may exceed the sampled extremes: a fiftieth of the range
- * is kept free at either end. */
+/* Weights are between 0 and 1 in any direction. They may exceed the extremes of the sampled
+ * directions, so a fiftieth of the range is left free at either end. */
 TEST(test_glb_weights_any_direction_within_range) {
   enum { TRIED = 4096 };
   export_source source = {0};
@@ -199,7 +199,7 @@ TEST(test_glb_weights_any_direction_within_range) {
   supine_export_source_close(&source);
 }
 
-/* Compressed arrays fill the file without gaps, and state the array that they decode to. */
+/* Compressed arrays fill the file without gaps, and state the size to which they decode. */
 TEST(test_glb_compressed_views_fill_file) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   unsigned char *bytes = NULL;

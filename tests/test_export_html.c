@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The page: its tensors equal those of the basis, and its texts are escaped. */
+/* The exported page: its tensors equal those of the basis, and its texts are escaped. */
 #include "test.h"
 
 #include <base64.h>
@@ -29,7 +29,7 @@ static int teardown(void **state) {
   return 0;
 }
 
-/* RFC 4648, section 10. */
+/* Test vectors of RFC 4648, section 10. */
 TEST(test_base64_known_texts_literal) {
   static const char *const pairs[][2] = {{"", ""},
                                          {"f", "Zg=="},
@@ -63,7 +63,7 @@ static int digit(char c) {
   return (int)(at - digits);
 }
 
-/* Return the bytes of a tensor of the page (malloc). */
+/* Return the bytes of a tensor of the page (malloc), and set their number. */
 static unsigned char *take_bytes(const char *page, const char *name, size_t *size) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "id=\"tensor-%s\">", name);
@@ -86,7 +86,7 @@ static unsigned char *take_bytes(const char *page, const char *name, size_t *siz
   return bytes;
 }
 
-/* Compare a tensor of the page with bytes. */
+/* Assert that a tensor of the page has these bytes. */
 static void check_tensor(const char *page, const char *name, const void *bytes, size_t size) {
   size_t got = 0;
   unsigned char *found = take_bytes(page, name, &got);
@@ -95,7 +95,7 @@ static void check_tensor(const char *page, const char *name, const void *bytes, 
   free(found);
 }
 
-/* Return the rows padded to an even number of counts (malloc). */
+/* Return the decompressed rows of a tensor of 16-bit counts (malloc). */
 static int16_t *take_rows(const char *page, const char *name, size_t rows, size_t columns) {
   size_t size = 0;
   unsigned char *packed = take_bytes(page, name, &size);
@@ -107,7 +107,7 @@ static int16_t *take_rows(const char *page, const char *name, size_t rows, size_
   return counts;
 }
 
-/* Return a number of the page's description. */
+/* Return a number from the description of the basis in the page. */
 static double number_of(const char *page, const char *name) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "&quot;%s&quot;:", name);
@@ -117,7 +117,8 @@ static double number_of(const char *page, const char *name) {
   return strtod(at + (*at == '['), NULL);
 }
 
-/* Assert positions and coefficients, for directions of unit length, to half a count. */
+/* Assert that positions and coefficients, for directions of unit length, equal those of the basis
+ * to half a count. */
 static void check_motion(const char *page, const export_source *s, const uint32_t *order) {
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->mode_count;
@@ -148,7 +149,7 @@ static void check_motion(const char *page, const export_source *s, const uint32_
   free(counts);
 }
 
-/* Every triangle is present, starting at any of its corners. */
+/* Assert that every triangle is in the page, beginning with any of its corners. */
 static void check_corners(const char *page, const uint32_t *corners, size_t count) {
   size_t size = 0;
   unsigned char *packed = take_bytes(page, "triangles", &size);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Displacement fields on a grid: forward, inverse, warped images, and the same by plastimatch and
- * elastix. */
+/* Displacement fields on a grid: forward, inverse, and images warped by this program, plastimatch
+ * and elastix. */
 #include "folder.h"
 #include "inside_helpers.h"
 
@@ -14,7 +14,7 @@
 static supine_basis *surface;
 static supine_basis *grid;
 
-/* Half of the affine and of the quadratic motion: up to about 20 mm. */
+/* Weights of the affine and the quadratic motion: displacements of up to about 20 mm. */
 static const double weights[HELPER_MODES] = {0.5, 0.4, 0.0};
 static const double scales[2] = {1.0, 1.0};
 
@@ -63,7 +63,7 @@ static supine_field made_field(void) {
   return field;
 }
 
-/* The inverse field, computed once, as it takes a few seconds. */
+/* Return the inverse field. It is computed only at the first call, which takes some seconds. */
 static const supine_field *made_inverse(void) {
   if (inverse_kept.nodes.values == NULL) {
     supine_field field = made_field();
@@ -78,8 +78,8 @@ static double size_of(const double v[3]) {
   return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-/* At grid nodes the field equals the motion of the basis; far outside it is 0; between nodes it is
- * trilinear. */
+/* At grid nodes the field equals the displacement of the basis, far outside the lungs it is 0, and
+ * between nodes it is trilinear. */
 TEST(test_field_nodes_cells_and_border_interpolated) {
   supine_field field = made_field();
   const supine_basis_info *info = supine_basis_get_info(grid);
@@ -92,13 +92,13 @@ TEST(test_field_nodes_cells_and_border_interpolated) {
       p[k] = (double)info->vertices[3 * i + k];
     }
     supine_field_at(&field, p, u);
-    for (size_t k = 0; k < 3; ++k) { /* positions are float32: 1e-5 mm of a slope below 1 */
+    for (size_t k = 0; k < 3; ++k) { /* mm: positions are float32, rounded by up to 1e-5 */
       assert_close(u[k], (double)moved[3 * i + k], 2e-5);
     }
   }
   const float *values = field.nodes.values;
   assert_true(values[0] == 0.0F && values[1] == 0.0F &&
-              values[2] == 0.0F); /* a corner of the box */
+              values[2] == 0.0F); /* a corner of the grid, far outside */
   const size_t *n = field.nodes.size;
   const size_t at = n[0] / 4 + n[0] * (n[1] / 2 + n[1] * (n[2] / 2));
   double middle[3];
@@ -117,8 +117,8 @@ TEST(test_field_nodes_cells_and_border_interpolated) {
   supine_field_free(&field);
 }
 
-/* For a scan below full inflation the field counts from the scan: in the scan's own state nothing
- * moves, and in another state a point moves as embedded content does. */
+/* For a scan below full inflation, the field is measured from the scan: it is 0 in the state of the
+ * scan, and in another state it equals the displacement of an embedded point. */
 TEST(test_field_scan_below_full_counts_from_scan) {
   supine_inside_shells below;
   supine_inside_report report;
@@ -137,11 +137,11 @@ TEST(test_field_scan_below_full_counts_from_scan) {
   }
   assert_int_equal(supine_field_create(grid, &below.scan, 60.0, &field, &error), SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
-  for (size_t i = 0; i < 3 * count; ++i) { /* rounding of float32 positions */
+  for (size_t i = 0; i < 3 * count; ++i) { /* 0 up to the rounding of float32 positions */
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_field_free(&field);
-  /* a node inside, as a point */
+  /* Embed a node that is inside the lungs as a point. */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
@@ -179,16 +179,16 @@ TEST(test_field_scan_below_full_counts_from_scan) {
   grid = grid_kept;
 }
 
-TEST(test_field_inverse_composes_to_less_than_a_tenth) {
+TEST(test_field_inverse_composed_within_a_tenth_of_a_mm) {
   supine_field field = made_field();
   supine_field inverse;
   supine_field_residual residual;
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
-  print_message("forward and inverse: %.4f mm RMS, %.4f mm at most\n", residual.rms,
-                residual.largest);
+  print_message("forward after inverse displacement: off by %.4f mm RMS, %.4f mm at most\n",
+                residual.rms, residual.largest);
   assert_true(residual.largest <= 0.1);
   assert_true(residual.rms > 0.0 && residual.rms < residual.largest);
-  /* The stated residual is the real one, also at points between the nodes. */
+  /* The stated residual also holds between the nodes, up to a factor of 1.5. */
   const supine_basis_info *info = supine_basis_get_info(surface);
   uint64_t seed = 3;
   double largest = 0.0;
@@ -213,13 +213,12 @@ TEST(test_field_inverse_composes_to_less_than_a_tenth) {
     }
     largest = fmax(largest, size_of(v));
   }
-  assert_true(largest <= 1.5 * residual.largest); /* points between the nodes are hardly worse */
+  assert_true(largest <= 1.5 * residual.largest);
   supine_field_free(&field);
   supine_field_free(&inverse);
 }
 
-/* Make an image of 2 mm voxels over the left lump, with a ball of radius 9 mm around each landmark.
- */
+/* Landmarks in the left lung, LPS, mm. */
 enum { LANDMARKS = 5 };
 static const double landmarks[LANDMARKS][3] = {{71.0, 3.0, -40.0},
                                                {90.0, 20.0, 10.0},
@@ -227,6 +226,7 @@ static const double landmarks[LANDMARKS][3] = {{71.0, 3.0, -40.0},
                                                {95.0, 25.0, -70.0},
                                                {50.0, 5.0, 30.0}};
 
+/* Make an image of 2 mm voxels over the left lung, with a ball of radius 9 mm at each landmark. */
 static supine_image ball_image(supine_image_voxel voxel) {
   supine_image image = {.size = {100, 110, 160},
                         .origin = {-28.0, -106.0, -210.0},
@@ -241,7 +241,7 @@ static supine_image ball_image(supine_image_voxel voxel) {
                          image.origin[2] + 2.0 * (double)(i / 11000)};
     for (int l = 0; l < LANDMARKS; ++l) {
       const double d[3] = {p[0] - landmarks[l][0], p[1] - landmarks[l][1], p[2] - landmarks[l][2]};
-      if (supine_dot(d, d) < 81.0) { /* labels 1 to 5, or a brightness for each */
+      if (supine_dot(d, d) < 81.0) { /* 8-bit: labels 1 to 5; else a brightness for each landmark */
         supine_image_put(&image, i, 1, &(double){voxel == SUPINE_VOXEL_U8 ? l + 1.0 : 1000.0});
       }
     }
@@ -249,7 +249,8 @@ static supine_image ball_image(supine_image_voxel voxel) {
   return image;
 }
 
-/* Return the centroid of the bright voxels near a point. */
+/* Compute the centroid c of the voxels with `label` within 14 mm of a point, or, if `label` is 0,
+ * of all voxels there, weighted by brightness. */
 static void centroid(const supine_image *image, const double about[3], int label, double c[3]) {
   double sum = 0.0;
   c[0] = c[1] = c[2] = 0.0;
@@ -277,7 +278,7 @@ static void centroid(const supine_image *image, const double about[3], int label
   }
 }
 
-/* Compute the landmarks' positions by embedding them. */
+/* Compute the positions of the landmarks in the deformed lungs by embedding them. */
 static void moved_landmarks(double out[LANDMARKS][3]) {
   static bool known;
   static double kept[LANDMARKS][3];
@@ -311,7 +312,7 @@ static void moved_landmarks(double out[LANDMARKS][3]) {
   supine_inside_shells_free(&shells);
 }
 
-/* Landmarks of a warped image agree with the embedded points: within a voxel, 2 mm. */
+/* Assert that landmarks in a warped image are within a voxel, 2 mm, of the embedded points. */
 static void check_landmarks(const supine_image *image, bool labels) {
   double moved[LANDMARKS][3];
   double largest = 0.0;
@@ -346,7 +347,7 @@ TEST(test_resample_landmarks_follow_embedded_points) {
   }
 }
 
-/* Return the depth of a voxel below the surface, mm. */
+/* Return the depth of voxel i below the surface of the lungs, mm. */
 static double depth_at(const supine_field *field, const supine_image *image, size_t i) {
   double p[3];
   double depth;
@@ -357,7 +358,7 @@ static double depth_at(const supine_field *field, const supine_image *image, siz
   return depth;
 }
 
-/* Sum the mass within one label of a mask, g. */
+/* Return the mass within one label of a mask, g. */
 static double mass_of(const supine_image *image, const supine_image *mask, double label) {
   double sum = 0.0;
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
@@ -366,14 +367,14 @@ static double mass_of(const supine_image *image, const supine_image *mask, doubl
   return 1e-6 * sum * pow(image->step[0][0], 3.0);
 }
 
-/* Lungs of -850 to -550 HU, in a vacuum and in a wall of 40 HU, with masks that are warped too: the
- * mass within the mask is kept to 1 % with density scaling. Without scaling it changes by more than
- * 5 %, if no wall is mixed in. */
+/* Scaling of the density keeps the mass within the warped mask of a lung to 1 %. Without scaling,
+ * the mass of lungs in air changes by more than 5 %. The lungs have about -850 to -550 HU, and are
+ * surrounded by air or by a chest wall of 40 HU. */
 TEST(test_resample_density_mass_kept) {
   supine_field field;
   supine_field inverse;
   supine_field_residual residual;
-  const double larger[2] = {-1.4, 1.2}; /* one lung inflates, one deflates */
+  const double larger[2] = {-1.4, 1.2}; /* gains at which one lung inflates and one deflates */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), 60.0, &field, NULL),
                    SUPINE_OK);
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
@@ -381,7 +382,7 @@ TEST(test_resample_density_mass_kept) {
     for (int wall = 0; wall < 2; ++wall) {
       supine_image image = field.depth;
       supine_image mask = field.depth;
-      for (size_t a = 0; a < 3; ++a) { /* 2.5 mm, half a voxel off the nodes */
+      for (size_t a = 0; a < 3; ++a) { /* voxels of 2.5 mm whose centres are between the nodes */
         image.size[a] = (size_t)((double)field.depth.size[a] * 4.0 / 2.5) - 2;
         image.step[a][a] = 2.5;
         image.origin[a] += 1.1;
@@ -413,12 +414,14 @@ TEST(test_resample_density_mass_kept) {
       const double before = mass_of(&image, &mask, lung + 1.0);
       const double after = mass_of(&scaled, &moved, lung + 1.0) / before - 1.0;
       const double unscaled = mass_of(&plain, &moved, lung + 1.0) / before - 1.0;
-      print_message("%s lung, %s: %.0f g, %+.2f %%, unscaled %+.1f %%\n", lung ? "right" : "left",
-                    wall ? "in a wall" : "alone", before, 100.0 * after, 100.0 * unscaled);
+      print_message("%s lung, %s: %.0f g, change %+.2f %% with scaled density, %+.1f %% without\n",
+                    lung ? "right" : "left", wall ? "in a wall" : "alone", before, 100.0 * after,
+                    100.0 * unscaled);
       assert_true(fabs(after) < 0.01);
       assert_true(wall || fabs(unscaled) > 0.05);
       size_t changed = 0;
-      for (size_t i = 0; i < count && wall; ++i) { /* unchanged, except at the mask's edge */
+      /* Outside the mask, density is unchanged except at its edge. */
+      for (size_t i = 0; i < count && wall; ++i) {
         changed += supine_image_get(&moved, i) == 0.0 && supine_image_get(&scaled, i) != 40.0;
       }
       assert_true(changed < count / 1000);
@@ -433,13 +436,13 @@ TEST(test_resample_density_mass_kept) {
   supine_field_free(&inverse);
 }
 
-/* Warp the image balls.nrrd by the field v.nrrd into warped.nrrd with another program; the
- * landmarks agree with the embedded points. Skip if the program is missing. */
+/* Warp the image balls.nrrd by the field v.nrrd into warped.nrrd with another program, and check
+ * the landmarks. Skip the test if the program is missing. */
 static void check_warped_by(const char *asked, const char *command) {
   char text[512];
   (void)snprintf(text, sizeof text, "%s >/dev/null 2>&1", asked);
   if (system(text) != 0) { /* NOLINT(cert-env33-c) */
-    print_message("skipped: '%s' does not run\n", asked);
+    print_message("skipped: '%s' fails\n", asked);
     skip();
   }
   supine_image image = ball_image(SUPINE_VOXEL_I16);
@@ -466,7 +469,7 @@ TEST(test_plastimatch_inverse_field_warps_landmarks) {
                   "--output-img warped.nrrd --output-type short >plastimatch.log 2>&1");
 }
 
-/* The same by transformix of elastix, with the field as a transform. */
+/* transformix of elastix takes the inverse field as a transform. */
 TEST(test_elastix_inverse_field_warps_landmarks) {
   FILE *file = fopen(in_folder("field.txt"), "wb");
   assert_non_null(file);
@@ -498,7 +501,7 @@ TEST(test_field_impossible_grid_refused) {
   assert_non_null(strstr(error.message, "supine embed"));
 }
 
-/* The tensors of a grid, each made invalid in turn. */
+/* A grid is refused if any of its tensors is invalid. */
 TEST(test_field_malformed_grids_refused) {
   const supine_basis_info *info = supine_basis_get_info(grid);
   const size_t n = info->vertex_count;

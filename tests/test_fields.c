@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fields of another simulator: loading, fitting, cross-validation, and refused input. */
+/* Displacement fields of another simulator: loading, fit, cross-validation, and refused input. */
 #include <sys/stat.h>
 
 #include "folder.h"
@@ -34,7 +34,7 @@ static int teardown(void **state) {
   return folder_remove(state);
 }
 
-/* Compute displacements by the full physics for random directions. */
+/* Return displacements by the full physics in random directions of gravity. */
 static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64_t seed,
                                     double soften) {
   const size_t n = of->mesh.vertex_count;
@@ -59,7 +59,7 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
   return fields;
 }
 
-/* Make random fields of exactly this band at given directions. */
+/* Return random fields of exactly this band in given directions of gravity. */
 static supine_fields band_limited_fields(size_t band, size_t count, const double *directions) {
   const size_t n = lungs.mesh.vertex_count;
   const size_t terms = supine_sh_count(band);
@@ -95,7 +95,7 @@ static void check_band_limited(const supine_fields *fields, size_t band) {
     fail_msg("%s", error.message);
   }
   assert_int_equal(report.band, band);
-  assert_true(report.accuracy.relative_rms < 1e-6); /* coefficients are floats */
+  assert_true(report.accuracy.relative_rms < 1e-6); /* tolerance of float coefficients */
   assert_int_equal(field.vertex_count, 3 * fields->vertex_count);
   supine_projection_compression_free(&field);
 }
@@ -112,7 +112,8 @@ TEST(test_fit_band_limited_fields_recovered) {
   supine_fields_free(&fields);
 }
 
-/* The closed form of the leave-one-out error equals refitting without each direction in turn. */
+/* The leave-one-out error, computed in closed form, equals that of refits without each
+ * direction. */
 TEST(test_fit_leave_one_out_equals_fitting_without) {
   enum { COUNT = 24, BAND = 2 };
   supine_fields fields = physics_fields(&lungs, COUNT, 99, 1.0);
@@ -158,8 +159,8 @@ TEST(test_fit_leave_one_out_equals_fitting_without) {
   supine_fields_free(&fields);
 }
 
-/* Compare the error of a basis of 60 scattered directions, measured on 40 others, with the stated
- * error. */
+/* Compare the stated error of a basis fitted to 60 random directions with the error in 40
+ * others. */
 static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields fields = physics_fields(of, 60, 2008, 1.0);
   supine_fields others = physics_fields(of, 40, 1999, 1.0);
@@ -180,11 +181,12 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   double field2 = 0.0;
   for (size_t d = 0; d < others.direction_count; ++d) {
     const double *g = others.directions + 3 * d;
-    supine_state posture = {.gravity = {g[0], g[1], g[2]}}; /* default: the fields as given */
+    /* At the default volume, the basis gives the fields unchanged. */
+    supine_state posture = {.gravity = {g[0], g[1], g[2]}};
     supine_pose pose;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_OK);
     supine_deform(basis, &pose, xyz);
-    posture.volume.kind = SUPINE_VOLUME_REST; /* rest is unknown */
+    posture.volume.kind = SUPINE_VOLUME_REST; /* a basis of fields has no rest */
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
     posture.volume.kind = SUPINE_VOLUME_FULL;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
@@ -196,8 +198,9 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
     }
   }
   const double truth = sqrt(error2 / field2);
-  printf("%s, 60 directions, band %zu: stated %.2f %%, found on 40 others %.2f %%\n", what,
-         report.band, 100.0 * report.accuracy.relative_rms, 100.0 * truth);
+  printf(
+      "%s, 60 directions, band %zu: stated error %.2f %%, found in 40 other directions %.2f %%\n",
+      what, report.band, 100.0 * report.accuracy.relative_rms, 100.0 * truth);
   assert_true(report.accuracy.relative_rms > truth / 1.3333 &&
               report.accuracy.relative_rms < truth * 1.3333);
   free(xyz);
@@ -206,11 +209,11 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields_free(&others);
 }
 
-TEST(test_fit_other_directions_stated_error) {
+TEST(test_fit_other_directions_error_as_stated) {
   check_stated_error(&lungs, "phantom");
 }
 
-TEST(test_fit_real_lung_other_directions_stated_error) {
+TEST(test_fit_real_lung_other_directions_error_as_stated) {
   static const char *const names[] = {"lungs/chaste_left_5k.obj"};
   supine_lungs real = {0};
   if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &real)) {
@@ -221,8 +224,8 @@ TEST(test_fit_real_lung_other_directions_stated_error) {
   supine_lungs_free(&real);
 }
 
-/* Fit fields of band 1 with noise and `amount` times fields of band 2. Return the leave-one-out
- * error of band 2 relative to that of band 1, and the band chosen. */
+/* Fit the sum of fields of band 1, noise, and `amount` times fields of band 2. Return the
+ * leave-one-out error of band 2 relative to that of band 1, and set the band chosen. */
 static double gain_of_band_2(double amount, size_t *band) {
   enum { COUNT = 60 };
   double directions[3 * COUNT];
@@ -246,8 +249,8 @@ static double gain_of_band_2(double amount, size_t *band) {
   return report.error[2] / report.error[1];
 }
 
-/* A higher band is chosen only if its error is lower by at least a hundredth. */
-TEST(test_fit_band_gaining_below_a_hundredth_not_chosen) {
+/* Band 2 is chosen if it lowers the error by 1.5 %, but not if by 0.5 %. */
+TEST(test_fit_band_reducing_error_below_one_percent_not_chosen) {
   static const double wanted[] = {0.995, 0.985};
   for (size_t i = 0; i < 2; ++i) {
     double range[2] = {0.0, 2.0};
@@ -301,7 +304,7 @@ TEST(test_fit_vector_volumes_exact) {
   supine_fields_free(&fields);
 }
 
-TEST(test_fit_few_directions_report_their_band) {
+TEST(test_fit_few_directions_limit_the_band) {
   supine_fields fields = physics_fields(&lungs, 10, 4, 1.0);
   supine_fit_options options = {.band = -1, .modes = 16};
   supine_compression field;
@@ -326,13 +329,13 @@ TEST(test_fit_few_directions_report_their_band) {
   supine_fields_free(&fields);
 }
 
-/* Assert that loading fails with this status and message. */
+/* Assert that loading a file fails with this status and message. */
 static void expect_failure(const char *name, supine_status status, const char *words) {
   supine_fields fields = {0};
   supine_error error = {0};
   const supine_status got = supine_fields_load(in_folder(name), &lungs, NULL, &fields, &error);
   if (got != status || strstr(error.message, words) == NULL) {
-    fail_msg("%d, not %d, or no \"%s\" in: %s", (int)got, (int)status, words, error.message);
+    fail_msg("status %d, not %d, or no \"%s\" in: %s", (int)got, (int)status, words, error.message);
   }
   assert_null(fields.directions);
 }

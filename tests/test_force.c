@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The applied force (18), its factors, heights, and the direction of displacement (15)-(17). */
+/* The applied force (18) with its parts, heights, and the directions of displacement (15)-(17). */
 #include <float.h>
 
 #include "precompute/physics/model.h"
@@ -52,14 +52,14 @@ TEST(test_height_range_random_directions_equals_brute_force) {
   }
 }
 
-/* Compute f [N] for one direction. */
+/* Compute the force [N] for one direction of gravity, with heights from `low` to `high`. */
 static void force_along(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
                         double low, double high, double *force) {
   const supine_gravities gravity = {1, g, &low, &high};
   supine_physics_force(lungs, law, &gravity, lungs->mesh.vertex_count, NULL, force);
 }
 
-TEST(test_force_default_law_is_height_zero_to_one) {
+TEST(test_force_paper_law_is_height_zero_to_one) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   const supine_force_law law = supine_physics_model(SUPINE_LAW_PAPER).force;
@@ -78,7 +78,7 @@ TEST(test_force_default_law_is_height_zero_to_one) {
     least = fmin(least, down[i]);
     most = fmax(most, down[i]);
     assert_close(down[i], (height(lungs, g, i) - low) / (high - low), 4 * DBL_EPSILON);
-    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* h(-g) = 1 - h(g) */
+    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* height for -g is 1 - height for g */
   }
   assert_close(least, 0.0, 4 * DBL_EPSILON);
   assert_close(most, 1.0, 4 * DBL_EPSILON);
@@ -100,8 +100,8 @@ TEST(test_force_box_part_uses_box_coordinates) {
   free(force);
 }
 
-/* Softening multiplies the force by an expandability of geometric mean 1 that increases with
- * height. */
+/* Softening multiplies the force by a factor of geometric mean 1 whose logarithm grows in
+ * proportion to the height. */
 TEST(test_force_softened_follows_height) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
@@ -123,7 +123,8 @@ TEST(test_force_softened_follows_height) {
   free(force);
 }
 
-/* The force at some vertices for several directions equals that of each direction alone. */
+/* The force at selected vertices for several directions equals the force at all vertices for each
+ * direction. */
 TEST(test_force_some_vertices_same_as_all) {
   const supine_lungs *lungs = *state;
   enum { COUNT = 5 };
@@ -152,7 +153,8 @@ TEST(test_force_some_vertices_same_as_all) {
 }
 
 TEST(test_directions_box_model_literal_values) {
-  /* A left lung 100 mm wide, 200 deep, 300 high, midline at its inner face x = 10. */
+  /* A left lung 100 mm wide, 200 mm deep and 300 mm high. The midline is at its inner face, x =
+   * 10. */
   double vertices[] = {10, 0, 0, 110, 0, 0, 10, 200, 0, 10, 0, 300, 60, 100, 150};
   uint32_t triangles[] = {0, 1, 2, 0, 3, 1, 1, 3, 4, 1, 4, 2, 0, 2, 3, 2, 4, 3};
   const supine_mesh mesh = {5, vertices, 6, triangles};
@@ -163,15 +165,15 @@ TEST(test_directions_box_model_literal_values) {
   assert_close(lungs.midline, 10.0, 0.0);
   assert_int_equal(lungs.side[0], 1);
   assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
-  /* X = 1, Y = 1 (front), Z = 1 (base) */
+  /* Vertex 1 is at X = Y = Z = 1: outer side, front, base. */
   assert_close(d[3], 2.0, 1e-14);
   assert_close(d[4], -1.5, 1e-14);
   assert_close(d[5], -16.0, 1e-14);
-  /* back: Y = 0; apex: Z = 0; midline: X = 0: the fixed planes stay fixed */
+  /* The planes of the back (Y = 0), apex (Z = 0) and midline (X = 0) are fixed. */
   assert_close(d[7], 0.0, 0.0);
   assert_close(d[11], 0.0, 0.0);
   assert_close(d[0], 0.0, 0.0);
-  /* X = Y = Z = 1/2: 2 (1/2)^1.5, -1.5 (1/2), -16 (1/2)^1.4 */
+  /* Vertex 4 is at X = Y = Z = 1/2: 2 (1/2)^1.5, -1.5 (1/2), -16 (1/2)^1.4. */
   assert_close(d[12], 0.70710678118654752, 1e-14);
   assert_close(d[13], -0.75, 1e-14);
   assert_close(d[14], -6.0628662660415918, 1e-13);

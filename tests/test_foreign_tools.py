@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read displacement fields and images with other tools: nibabel, plastimatch, transformix, VTK.
+"""Exchange displacement fields, images and surfaces with nibabel, plastimatch, transformix and VTK.
 
     test_foreign_tools.py SUPINE
 """
@@ -29,7 +29,7 @@ def run(*arguments):
 
 
 def read_nrrd(path):
-    """Read vectors [k, j, i, 3] and the origin as the header states them."""
+    """Return the vectors [k, j, i, 3] and the origin that the header states."""
     import gzip
     data = open(path, "rb").read()
     head, body = data.split(b"\n\n", 1)
@@ -42,11 +42,11 @@ def read_nrrd(path):
 
 def close(name, a, b, tolerance):
     if not numpy.abs(numpy.asarray(a) - numpy.asarray(b)).max() <= tolerance:
-        faults.append(f"{name}: {numpy.abs(numpy.asarray(a) - numpy.asarray(b)).max()} apart")
+        faults.append(f"{name}: {numpy.abs(numpy.asarray(a) - numpy.asarray(b)).max()} too far")
 
 
 def plastimatch_stats(path):
-    """Return minimum, mean and maximum of each component."""
+    """Return the rows minimum, mean and maximum of the three components."""
     text = run("plastimatch", "stats", path)
     return numpy.array([[float(x) for x in re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text).groups()]
                         if re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text) else [numpy.nan] * 3
@@ -75,7 +75,7 @@ if shutil.which("plastimatch"):
     for ending in ("nrrd", "nii.gz", "mha"):
         close(f"plastimatch: f.{ending}", plastimatch_stats(f"f.{ending}"), wanted, 2e-3)
 
-# A warped image as .mha, converted by plastimatch and read by nibabel.
+# A warped image written as .mha is converted by plastimatch and read by nibabel.
 size = (40, 36, 38)
 grid = numpy.indices(size).sum(0) % 7
 nibabel.save(nibabel.Nifti1Image(grid.astype(numpy.int16), numpy.diag([-10.0, -10.0, 10.0, 1.0])), "in.nii.gz")
@@ -101,7 +101,7 @@ if shutil.which("plastimatch"):
     close("plastimatch: image", numpy.asarray(back.dataobj), moved, 0)
     close("plastimatch: place", back.affine, nibabel.load("in-out.nii.gz").affine, 1e-3)
 
-# elastix takes a displacement field as a transform.
+# transformix of elastix takes a displacement field as a transform.
 if shutil.which("transformix"):
     with open("t.txt", "w", encoding="utf-8") as file:
         file.write('(Transform "DeformationFieldTransform")\n(NumberOfParameters 0)\n'
@@ -122,7 +122,7 @@ if shutil.which("transformix"):
     went = re.search(r"OutputPoint = \[ (\S+) (\S+) (\S+) \]", text)
     close("transformix", [float(x) for x in went.groups()] if went else [numpy.nan] * 3, point + vectors[k, j, i], 1e-2)
 
-# Surfaces written by VTK, in every encoding.
+# Surfaces written by VTK are read in every encoding.
 try:
     import vtk
 except ImportError:
@@ -149,7 +149,7 @@ if vtk:
                     if not os.path.exists("v.ply") or open("v.ply", "rb").read() != open("wanted.ply", "rb").read():
                         faults.append(f"VTK's VTP, mode {mode}, header {header}, packed {packed}, encoded {encoded}")
 
-# A folder of TotalSegmentator masks; output to a pipe; names that are not UTF-8.
+# A folder of TotalSegmentator masks, output to a pipe, and file names that are not UTF-8 work.
 os.mkdir("segmentations")
 where = numpy.indices((58, 46, 40)).transpose(1, 2, 3, 0) * [5, 4, 6] + [-141.3, -85.7, -113.9]
 x, y, z = numpy.moveaxis(where, -1, 0)

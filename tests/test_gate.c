@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The checks applied to every surface of lungs. */
+/* The checks and repairs that every surface of lungs passes. */
 #include "mesh/anatomy.h"
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
@@ -26,7 +26,7 @@ static void turn_triangle(supine_mesh *mesh, size_t t) {
   mesh->triangles[3 * t + 2] = second;
 }
 
-/* Permute the coordinates as if a file in other axes were read as LPS. */
+/* Transform the coordinates as if a file in these axes were read as LPS. */
 static void misread(supine_mesh *mesh, supine_axes axes) {
   double matrix[3][3];
   supine_mesh_axes_matrix(axes, matrix);
@@ -42,7 +42,8 @@ static void misread(supine_mesh *mesh, supine_axes axes) {
   }
 }
 
-/* Append triangles with their vertices; indices count from the first new vertex. */
+/* Append vertices and triangles. If `of_new`, the indices in the triangles are relative to the
+ * first new vertex. */
 static void append(supine_mesh *mesh, size_t vertices, const double *at, size_t triangles,
                    const uint32_t *corner, bool of_new) {
   const size_t n = mesh->vertex_count;
@@ -80,7 +81,7 @@ static outcome pass(supine_mesh *mesh, const supine_lungs_source *given) {
 
 static void expect_said(const outcome *out, const char *words) {
   if (strstr(out->findings.text, words) == NULL) {
-    fail_msg("'%s' does not say '%s'", out->findings.text, words);
+    fail_msg("the findings '%s' lack '%s'", out->findings.text, words);
   }
 }
 
@@ -104,7 +105,7 @@ TEST(test_axes_letters_all_48_round_trip) {
 TEST(test_axes_apply_letters_permute_and_flip) {
   supine_axes axes = SUPINE_AXES_AUTO;
   double p[3] = {1.5, -2.25, 4.0};
-  assert_true(supine_mesh_axes_parse("SRA", &axes)); /* up, right, front */
+  assert_true(supine_mesh_axes_parse("SRA", &axes)); /* superior, right, anterior */
   supine_mesh_axes_apply(axes, 2.0, p);
   assert_true(p[0] == 4.5 && p[1] == -8.0 && p[2] == 3.0);
 }
@@ -124,7 +125,7 @@ TEST(test_gate_clean_lungs_no_message) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* Each of the 47 wrong readings of a pair of lungs is detected, and the right axes are proposed. */
+/* Each of the 47 wrong axes for a pair of lungs is detected, and the right axes are proposed. */
 TEST(test_gate_any_wrong_axes_proposes_right_ones) {
   for (int code = 2; code < SUPINE_AXES_COUNT; ++code) {
     supine_mesh mesh = phantom();
@@ -141,8 +142,8 @@ TEST(test_gate_any_wrong_axes_proposes_right_ones) {
   }
 }
 
-/* The message proposes axes for the file, not for coordinates already converted by a wrong --axes.
- */
+/* The message proposes the axes of the file, even if coordinates were converted by a wrong
+ * --axes. */
 TEST(test_gate_wrong_axes_option_proposes_right_one) {
   supine_mesh mesh = phantom();
   const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS, .axes_given = true};
@@ -159,10 +160,11 @@ TEST(test_gate_single_lung_side_found_by_shape) {
   for (int right = 0; right < 2; ++right) {
     supine_mesh mesh = left_lung();
     for (size_t i = 0; right != 0 && i < mesh.vertex_count; ++i) {
-      mesh.vertices[3 * i] *= -1.0; /* its mirror image is a right lung */
+      mesh.vertices[3 * i] *= -1.0; /* mirrors the left lung into a right one */
     }
     for (size_t i = 0; i < mesh.vertex_count; ++i) {
-      mesh.vertices[3 * i] += right != 0 ? 900.0 : -900.0; /* at the place of the other lung */
+      /* Move the lung to the side of the other one. */
+      mesh.vertices[3 * i] += right != 0 ? 900.0 : -900.0;
     }
     outcome out = pass(&mesh, NULL);
     assert_int_equal(out.status, SUPINE_OK);
@@ -224,12 +226,12 @@ TEST(test_gate_duplicate_loose_reversed_triangles_repaired) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* More pieces than lobes, each too large to be dropped: reported, as some may be lungs. */
+/* More pieces than lobes, each too large to be dropped, are reported, as some may not be lungs. */
 TEST(test_gate_many_pieces_reported) {
   supine_mesh mesh = phantom();
   for (int side = 0; side < 6; ++side) {
     double at[4][3];
-    for (int k = 0; k < 12; ++k) { /* 80 mm: 85 mL */
+    for (int k = 0; k < 12; ++k) { /* tetrahedra of 80 mm, 85 mL */
       at[k / 3][k % 3] = (k % 3 == 2      ? 100.0 * (side / 2) - 100.0
                           : side % 2 == 0 ? -300.0
                                           : 300.0) +
@@ -243,11 +245,12 @@ TEST(test_gate_many_pieces_reported) {
   supine_mesh_free(&mesh);
 }
 
-/* Two lungs that share one vertex are still two lungs. */
+/* Two lungs that share one vertex are separated there. */
 TEST(test_gate_touching_lungs_separated) {
   supine_mesh mesh = phantom();
   const size_t half = mesh.vertex_count / 2;
-  size_t inner[2] = {0, half}; /* of the left lung, the lowest x, of the right the highest */
+  /* The innermost vertex of the left lung has the lowest x, that of the right lung the highest. */
+  size_t inner[2] = {0, half};
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     const double x = mesh.vertices[3 * i];
     inner[0] = i < half && x < mesh.vertices[3 * inner[0]] ? i : inner[0];
@@ -265,7 +268,8 @@ TEST(test_gate_touching_lungs_separated) {
   supine_mesh_free(&mesh);
 }
 
-/* An ellipsoid with a waist, as wide as two lungs. */
+/* One piece as wide as two lungs, an ellipsoid with a waist, is refused unless the midline is
+ * given. */
 TEST(test_gate_both_lungs_in_one_piece_refused) {
   supine_mesh mesh = left_lung();
   double low[3];
@@ -311,11 +315,11 @@ TEST(test_gate_impossible_size_refused_unless_units_given) {
   supine_mesh_free(&mesh);
 }
 
-/* Single defects of closed surfaces; valid surfaces stay unchanged. */
+/* A surface with a hole and no other defect is left unchanged. */
 TEST(test_repair_open_surface_unchanged) {
   supine_mesh mesh = phantom();
   supine_mesh_repair_report report;
-  mesh.triangle_count -= 3; /* a hole */
+  mesh.triangle_count -= 3; /* leaves a hole */
   const size_t count = mesh.triangle_count;
   assert_int_equal(supine_mesh_repair(&mesh, &report), SUPINE_OK);
   assert_int_equal(report.duplicates + report.loose + report.reversed + report.separated, 0);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core: positions and normals by
- * transform feedback equal those of the C evaluator within rounding, for lungs at different scales
- * in one draw. Skipped if EGL has no such context. */
+/* supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core: positions and normals, read by
+ * transform feedback, equal those of the C evaluator within rounding. One draw has lungs of
+ * different gains. The tests are skipped if EGL has no such context. */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <GLES3/gl3.h>
@@ -16,7 +16,7 @@
 
 enum { VERTICES = 1003, LUNGS = 2, NORMALS = 8, WORDS = 3 };
 
-/* Functions of both APIs, loaded from the context's library. */
+/* OpenGL functions that are loaded, by type and name. */
 #define GL_FUNCTIONS(F)                                                                            \
   F(PFNGLATTACHSHADERPROC, AttachShader)                                                           \
   F(PFNGLBEGINTRANSFORMFEEDBACKPROC, BeginTransformFeedback)                                       \
@@ -64,7 +64,8 @@ typedef struct gl_api {
 #undef MEMBER
 } gl_api;
 
-/* Make a context of this API without a surface current; return false if there is none. */
+/* Create a context of this API without a surface and make it current; return false if that is not
+ * possible. */
 static bool make_context(EGLenum api, EGLDisplay *display, EGLContext *context, gl_api *gl) {
   const EGLint renderable = api == EGL_OPENGL_API ? EGL_OPENGL_BIT : EGL_OPENGL_ES3_BIT;
   const EGLint wanted[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, renderable, EGL_NONE};
@@ -117,7 +118,7 @@ static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, co
   return shader;
 }
 
-/* Link a program that displaces by the function for `vectors` vec4s of coefficients. */
+/* Link a program that displaces vertices with `vectors` vec4s of coefficients. */
 static GLuint make_program(const gl_api *gl, const char *version, const char *library,
                            size_t vectors) {
   static const char *const arguments[] = {"c0", "c0, c1", "c0, c1, c2", "c0, c1, c2, c3"};
@@ -161,7 +162,7 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
   return program;
 }
 
-/* Make a framebuffer: without a surface there is no default one, even if nothing is rasterised. */
+/* Create a framebuffer, as a context without a surface has none, even if nothing is drawn. */
 static void make_framebuffer(const gl_api *gl) {
   GLuint framebuffer = 0;
   GLuint renderbuffer = 0;
@@ -173,17 +174,17 @@ static void make_framebuffer(const gl_api *gl) {
   gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, renderbuffer);
 }
 
-/* Input of a program. */
+/* Inputs of the shader. */
 typedef struct model {
   size_t modes;
-  float *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] */
-  uint32_t *words;   /* [VERTICES, WORDS, 3] */
+  float *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] from supine_gl_pack */
+  uint32_t *words;   /* [VERTICES, WORDS, 3] from supine_gl_pack_normals */
   float weights[SUPINE_GL_MODES];
   float gains[3 * LUNGS];
   float normal_weights[LUNGS * WORDS * 3];
 } model;
 
-/* Make the vertex arrays of the model. */
+/* Create the vertex arrays of the model. */
 static void load_model(const gl_api *gl, const model *m) {
   const size_t floats = SUPINE_GL_FLOATS + m->modes;
   const GLsizei stride = (GLsizei)(floats * sizeof(float));
@@ -214,7 +215,8 @@ static void load_model(const gl_api *gl, const model *m) {
   }
 }
 
-/* Compute position and normal of every vertex by the shader, [VERTICES, 6], in one draw. */
+/* Compute position and normal of each vertex by the shader in one draw, `captured` [VERTICES,
+ * 6]. */
 static void run_shader(const gl_api *gl, GLuint program, const model *m, float *captured) {
   const GLsizeiptr output = (GLsizeiptr)(6 * VERTICES * sizeof(float));
   const GLsizei vectors = (GLsizei)((m->modes + 3) / 4);
@@ -240,8 +242,8 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
   memcpy(captured, mapped, (size_t)output);
 }
 
-/* Bound for normals: the GPU has the same packed numbers as the C evaluator, but rounds products
- * and the root; sums of random modes cancel tenfold. */
+/* Tolerance of normals: the GPU has the same packed numbers as the C evaluator, but rounds
+ * otherwise, and sums of random modes lose a digit by cancellation. */
 static const double normal_rounding = 1e-4;
 
 static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes) {
@@ -272,7 +274,7 @@ static void check_modes(const gl_api *gl, const char *version, const char *libra
   assert_int_equal(supine_deform_lit(basis, POSED(basis, weights, scales), cpu, cpu + 3 * VERTICES),
                    SUPINE_OK);
   double moved = 0;
-  /* Both round as supine_basis_error states, so they differ by at most twice that. */
+  /* Shader and evaluator err by at most supine_basis_error each. */
   const double bound = 2 * supine_basis_error(basis, POSED(basis, weights, scales));
   assert_true(bound < 1e-3);
   for (size_t i = 0; i < VERTICES; ++i) {

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Images: NRRD and NIfTI round trips in every orientation and type, and invalid files. */
+/* Images in NRRD, NIfTI and MetaImage: round trips in every orientation and type, and invalid
+ * files. */
 #include "folder.h"
 #include "mesh/io/image.h"
 
 #include "sh_helpers.h"
 
-/* Make an image of 5 x 4 x 3 voxels in any orientation. */
+/* Make an image of 5 x 4 x 3 voxels in a random orientation. */
 static supine_image made(supine_image_voxel voxel, uint64_t seed) {
   supine_image image = {
       .size = {5, 4, 3}, .origin = {-101.5, 33.25, 7.0}, .voxel = voxel, .channels = 1};
@@ -48,7 +49,7 @@ TEST(test_image_write_then_read_same) {
           supine_image_read(in_folder(names[i]), &back, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      check_same(&image, &back, 0x1p-23 * 256.0); /* NIfTI-1's frame is float32 */
+      check_same(&image, &back, 0x1p-23 * 256.0); /* NIfTI-1 stores the frame in float32 */
       supine_image_free(&image);
       supine_image_free(&back);
     }
@@ -93,7 +94,7 @@ TEST(test_nrrd_in_ras_converted_to_lps) {
   supine_image_free(&image);
 }
 
-/* The other byte order, and a slope: 348 bytes as in the standard. */
+/* A NIfTI header in the other byte order, with a slope and an intercept, is read. */
 TEST(test_nifti_other_endianness_and_slope) {
   unsigned char bytes[352 + 120];
   supine_image image = made(SUPINE_VOXEL_I16, 5);
@@ -133,7 +134,7 @@ static void check_refused(const char *name, supine_status expected, const char *
   supine_error error;
   assert_int_equal(supine_image_read(in_folder(name), &image, &error), expected);
   if (strstr(error.message, said) == NULL) {
-    fail_msg("'%s' does not say '%s'", error.message, said);
+    fail_msg("the message '%s' lacks '%s'", error.message, said);
   }
   assert_null(image.values);
 }
@@ -188,7 +189,7 @@ TEST(test_nifti_bad_files_refused) {
              {40, {4, 5, 4, 1, 3}, 5, "4 axes"},
              {254, {0}, 1, "orientation"},
              {70, {32}, 1, "COMPLEX"},
-             {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* a row of the matrix is 0 */
+             {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* the first row of the matrix is 0 */
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     memcpy(changed, bytes, sizeof bytes);
     memcpy(changed + bad[i].at, bad[i].value, bad[i].count * sizeof(int16_t));
@@ -201,7 +202,7 @@ TEST(test_nifti_bad_files_refused) {
   }
 }
 
-/* A wrong checksum is detected, although every voxel could be read. */
+/* A wrong checksum is refused, although every voxel could be read. */
 TEST(test_image_gzip_checksum_wrong_refused) {
   static const char *const names[] = {"c.nrrd", "c.nii.gz", "c.mha"};
   for (size_t i = 0; i < 3; ++i) {
@@ -209,7 +210,8 @@ TEST(test_image_gzip_checksum_wrong_refused) {
     supine_image image = made(SUPINE_VOXEL_F64, 5);
     assert_int_equal(supine_image_write(in_folder(names[i]), &image, NULL, NULL), SUPINE_OK);
     const size_t size = read_bytes(in_folder(names[i]), bytes, sizeof bytes);
-    bytes[size - (i == 2 ? 1 : 5)] ^= 0x55; /* zlib ends with it, gzip 4 bytes later */
+    /* Compressed data end with the checksum in zlib, and with checksum and size in gzip. */
+    bytes[size - (i == 2 ? 1 : 5)] ^= 0x55;
     write_bytes(in_folder(names[i]), bytes, size);
     check_refused(names[i], SUPINE_ERROR_FORMAT, names[i]);
     supine_image_free(&image);

@@ -17,14 +17,14 @@ check() {
   grep -q '^100 vertices; the first is at' "$work/out" || { cat "$work/out"; exit 1; }
 }
 
-# CMake. The example has no other path to the headers.
+# Build the example by CMake; it has no other path to the headers.
 CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
 "$cmake" --build "$work/build" >>"$work/log"
 check "$work/build/example_static"
 check "$work/build/example_shared"
 "$work/build/header_cpp"
 
-# pkg-config.
+# Build the example by pkg-config.
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name supine-runtime.pc)")
 export PKG_CONFIG_PATH
 lib=$(dirname "$PKG_CONFIG_PATH")
@@ -37,19 +37,19 @@ check "$work/static"
 "$work/static" "$work/basis.safetensors" pron 2>"$work/out" && exit 1
 grep -q "'prone'?" "$work/out"
 
-# It needs only libc and libm, not FFTW, GSL or assimp.
+# The library needs only libc and libm, not FFTW, GSL or assimp.
 needed=$(objdump -p "$lib/libsupine_runtime.so" | awk '/NEEDED/ {print $2}' | sort | tr '\n' ' ')
 case $needed in
 "libc.so.6 libm.so.6 " | "ld-linux-x86-64.so.2 libc.so.6 libm.so.6 " | "libc.so.6 ") ;;
 *) echo "needs $needed"; exit 1 ;;
 esac
 
-# It exports only supine_ names, each with a version; the archive defines no others either.
+# The library exports only names with supine_, each with a version; the archive defines no others.
 nm -D --defined-only "$lib/libsupine_runtime.so" | awk '{print $3}' >"$work/names"
 grep -q '^supine_deform@@SUPINE_0$' "$work/names"
 if grep -Ev '^(supine_[a-z0-9_]*@@SUPINE_0|SUPINE_0.*)$' "$work/names"; then exit 1; fi
-# It exports exactly the functions that the installed headers declare. Each header compiles alone, in C and
-# C++, and includes no header that is not installed.
+# The library exports exactly the functions that the installed headers declare. Each header compiles alone, in C
+# and in C++, and cites no header that is not installed.
 for header in "$prefix"/include/supine/*.h; do
   name=supine/$(basename "$header")
   printf '#include <%s>\n' "$name" >"$work/one.c"
@@ -71,6 +71,6 @@ done
 nm --defined-only --extern-only "$lib/libsupine_runtime.a" | awk 'NF == 3 {print $3}' >"$work/names"
 if grep -v '^supine_' "$work/names"; then exit 1; fi
 
-# Undefined names of the archive are in libc, libm or the archive itself.
+# Undefined names of the archive are defined in libc, in libm or in the archive.
 nm --undefined-only "$lib/libsupine_runtime.a" | awk '{print $2}' | sort -u >"$work/undefined"
 if grep -Ei 'fftw|gsl_|assimp|^ai[A-Z]|pthread|cblas' "$work/undefined"; then exit 1; fi

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Surfaces from label maps: accuracy with known lungs, label conventions, the report, and refused
- * maps. */
+/* Surfaces from label maps: accuracy for known lungs, conventions of labels, the report, and
+ * refused maps. */
 #include "folder.h"
 #include "mesh/anatomy.h"
 #include "mesh/labels/labels.h"
@@ -40,7 +40,7 @@ static made surfaces_of(const char *const *paths, size_t count,
   return out;
 }
 
-/* Write the image under a name, and make surfaces from the file. */
+/* Write the image into a file, and make surfaces from the file. */
 static made surfaces_of_image(const supine_image *image, const char *name,
                               const supine_labels_options *options) {
   const char *path = in_folder(name);
@@ -78,7 +78,7 @@ static void check_closed(const supine_mesh *mesh) {
   assert_true(supine_mesh_volume(mesh) > 0.0);
 }
 
-/* Return the RMS distance of a map's surfaces from the true one. */
+/* Return the RMS distance of the surfaces of a map from the true surface, mm. */
 static double rms_from(const supine_inside_surface *truth, const made *out) {
   enum { EVERY = 29 };
   double sum = 0.0;
@@ -94,8 +94,8 @@ static double rms_from(const supine_inside_surface *truth, const made *out) {
   return sqrt(sum / count);
 }
 
-/* Voxels of 1, 2 and 3 mm give the volume of the lungs within 0.5, 1 and 2 % and the surface within
- * half a voxel RMS. */
+/* From voxels of 1, 2 and 3 mm, the volume of the lungs is recovered within 0.5, 1 and 2 %, and the
+ * surface within half a voxel RMS. */
 TEST(test_labels_phantom_recovered) {
   supine_mesh phantom = {0};
   supine_inside_surface *truth = NULL;
@@ -103,7 +103,7 @@ TEST(test_labels_phantom_recovered) {
   assert_int_equal(supine_inside_surface_create(phantom.vertices, phantom.triangle_count,
                                                 phantom.triangles, true, &truth, NULL),
                    SUPINE_OK);
-  const size_t half = phantom.triangle_count / 2; /* the left lung's come first */
+  const size_t half = phantom.triangle_count / 2; /* the triangles of the left lung come first */
   const double share[] = {0.005, 0.01, 0.02};
   for (int h = 1; h <= 3; ++h) {
     const double spacing[3] = {h, h, h};
@@ -130,7 +130,7 @@ TEST(test_labels_phantom_recovered) {
       assert_false(is->cut);
     }
     const double rms = rms_from(truth, &out);
-    printf("%d mm: %.3f mm RMS, %+.2f and %+.2f mL of the mask\n", h, rms,
+    printf("voxels of %d mm: surface off by %.3f mm RMS, volumes by %+.2f and %+.2f mL\n", h, rms,
            out.report.lung[0].surface - out.report.lung[0].mask,
            out.report.lung[1].surface - out.report.lung[1].mask);
     assert_true(rms < 0.5 * h);
@@ -141,7 +141,8 @@ TEST(test_labels_phantom_recovered) {
   supine_mesh_free(&phantom);
 }
 
-/* Split labels 1 (right) and 2 (left) by height, from the feet up, and by side. */
+/* Return a map in which labels 1 (right) and 2 (left) are replaced by three and two labels, by
+ * height from the feet up. */
 static supine_image relabelled(const supine_image *from, const uint8_t left[2],
                                const uint8_t right[3]) {
   supine_image image = *from;
@@ -160,7 +161,7 @@ static supine_image relabelled(const supine_image *from, const uint8_t left[2],
 TEST(test_labels_conventions_same_lungs) {
   static const struct {
     uint8_t left[2], right[3];
-    const char *options[3]; /* equivalent options, ended by NULL */
+    const char *options[3]; /* equivalent values of --labels, ended by NULL */
     const char *said;
   } maps[] = {
       {{2, 2}, {1, 1, 1}, {NULL, "lungmask", "left=2,right=1"}, "2 left; 1 right"},
@@ -183,7 +184,7 @@ TEST(test_labels_conventions_same_lungs) {
       made out = surfaces_of_image(&map, "map.nrrd", &options);
       check_same(&out, &wanted);
       if (o == 0 && strstr(out.report.taken, maps[m].said) == NULL) {
-        fail_msg("'%s' does not say '%s'", out.report.taken, maps[m].said);
+        fail_msg("the report '%s' lacks '%s'", out.report.taken, maps[m].said);
       }
       release(&out);
     }
@@ -193,8 +194,9 @@ TEST(test_labels_conventions_same_lungs) {
   supine_image_free(&image);
 }
 
-/* A whole TotalSegmentator map with other organs; and one file for each lobe. */
-TEST(test_labels_other_organs_and_files_of_lobes) {
+/* Lobes give the same lungs from a TotalSegmentator map with other organs as from one file for each
+ * lobe. */
+TEST(test_labels_other_organs_ignored_and_files_of_lobes_joined) {
   static const uint8_t left[2] = {11, 10};
   static const uint8_t right[3] = {14, 13, 12};
   supine_image image = helper_two_lungs(4.0);
@@ -270,7 +272,7 @@ TEST(test_labels_touching_lungs_separated) {
   for (size_t i = 0; i < voxels(&image); ++i) {
     ((uint8_t *)image.values)[i] = ((uint8_t *)image.values)[i] != 0;
   }
-  /* a bridge of 5 x 4 voxels across the midline at x = 0; count the voxels that it adds */
+  /* Add a bridge of 5 x 4 voxels across the midline at x = 0, and compute its volume. */
   const size_t low[3] = {image.size[0] / 2 - 5, image.size[1] / 2 - 2, image.size[2] / 2 - 2};
   const size_t high[3] = {image.size[0] / 2 + 4, image.size[1] / 2 + 3, image.size[2] / 2 + 2};
   box_set(&image, low, high, 1);
@@ -279,7 +281,7 @@ TEST(test_labels_touching_lungs_separated) {
   made out = surfaces_of_image(&image, "touch.nrrd", &options);
   assert_int_equal(out.report.lung_count, 2);
   assert_true(out.report.neck >= 16.0 && out.report.neck <= 24.0);
-  /* the bridge is divided between the lungs, and no other voxel changes sides */
+  /* The bridge is divided between the lungs, and no other voxel changes sides. */
   assert_true(out.report.lung[0].mask >= 0.064 * (double)left - added &&
               out.report.lung[0].mask <= 0.064 * (double)left + added);
   assert_true(fabs(out.report.lung[0].mask + out.report.lung[1].mask -
@@ -295,7 +297,7 @@ TEST(test_labels_islands_cavities_gaps_counted) {
   const double left = voxel * (double)count_label(&image, 2);
   const size_t middle[3] = {(size_t)((66.0 - image.origin[0]) / 4.0), image.size[1] / 2,
                             image.size[2] / 2};
-  /* three cavities of 8, 1 and 1 voxels; two of them meet at an edge only */
+  /* Make three cavities of 8, 1 and 1 voxels; two of them meet only at an edge. */
   for (size_t c = 0; c < 3; ++c) {
     const size_t low[3] = {middle[0] + (c == 2 ? 1 : 4 * c) - 2, middle[1] + (c == 2 ? 1 : 0),
                            middle[2] + (c == 0 ? 4 : 0)};
@@ -303,7 +305,7 @@ TEST(test_labels_islands_cavities_gaps_counted) {
                             low[2] + (c == 0 ? 2 : 1)};
     box_set(&image, low, high, 0);
   }
-  /* an island of 12 voxels of the right lung, in a corner */
+  /* Add an island of 12 voxels of the right lung, in a corner. */
   box_set(&image, (const size_t[3]){1, 1, 1}, (const size_t[3]){4, 3, 3}, 1);
   const supine_labels_options options = {.edge = 5.0};
   made out = surfaces_of_image(&image, "holes.nrrd", &options);
@@ -316,7 +318,7 @@ TEST(test_labels_islands_cavities_gaps_counted) {
   assert_true(fabs(lung[1].dropped - 12.0 * voxel) < 1e-9);
   assert_int_equal(lung[1].cavities, 0);
   release(&out);
-  /* a hollow with a channel to the outside is no cavity: reported until --close closes it */
+  /* A hollow with a channel to the outside is no cavity: it is reported until --close closes it. */
   const size_t hollow_low[3] = {middle[0] - 3, middle[1] - 3, middle[2] - 3};
   const size_t hollow_high[3] = {middle[0] + 4, middle[1] + 4, middle[2] + 4};
   box_set(&image, hollow_low, hollow_high, 0);
@@ -325,7 +327,8 @@ TEST(test_labels_islands_cavities_gaps_counted) {
   box_set(&image, channel_low, channel_high, 0);
   const supine_labels_options fine = {.edge = 3.0};
   out = surfaces_of_image(&image, "channel.nrrd", &fine);
-  assert_int_equal(out.report.lung[0].tunnels, 1); /* in at the front, out at the back */
+  /* The channel leads through the hollow from front to back. */
+  assert_int_equal(out.report.lung[0].tunnels, 1);
   assert_true(left - out.report.lung[0].mask > 300.0 * voxel);
   release(&out);
   const supine_labels_options closing = {.edge = 3.0, .close = 4.5};
@@ -338,13 +341,13 @@ TEST(test_labels_islands_cavities_gaps_counted) {
   supine_image_free(&image);
 }
 
-/* The axes of a header are reported, and anatomy finds the axes that the voxels really have. */
+/* The axes in a header are reported, and anatomy finds the axes that the voxels have. */
 TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   static const double spacing[3] = {4.0, 4.0, 4.0};
   const supine_labels_options options = {.labels = "one", .edge = 5.0};
   supine_mesh phantom = {0};
   assert_int_equal(supine_phantom_create(2000, 6000.0, &phantom, NULL), SUPINE_OK);
-  const size_t half = phantom.triangle_count / 2; /* the left lung's come first */
+  const size_t half = phantom.triangle_count / 2; /* the triangles of the left lung come first */
   supine_image image = helper_image_over(&phantom, spacing);
   helper_voxelise(&phantom, 0, half, 2, &image);
   helper_voxelise(&phantom, half, phantom.triangle_count, 1, &image);
@@ -353,7 +356,7 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     static const char *const ways[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
     char wanted[64];
     supine_image map = image;
-    for (int a = 0; a < 3; ++a) { /* change the header only: the voxels stay in place */
+    for (int a = 0; a < 3; ++a) { /* change the header only, not the voxels */
       const bool flip = (flips >> a & 1) != 0;
       map.step[a][a] = flip ? -4.0 : 4.0;
       map.origin[a] = flip ? image.origin[a] + 4.0 * (double)(image.size[a] - 1) : image.origin[a];
@@ -369,11 +372,11 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     supine_mesh_axes_letters(anatomy.axes, found);
     assert_string_equal(found, letters);
     for (size_t lung = 0; lung < 2; ++lung) {
-      check_closed(&out.surface[lung]); /* surfaces of left-handed maps face outwards, too */
+      check_closed(&out.surface[lung]); /* triangles face outwards for left-handed axes, too */
     }
     release(&out);
   }
-  /* with the sides given, a mirrored header is refused */
+  /* If the sides are given, a mirrored header is refused. */
   supine_image map = image;
   map.step[0][0] = -4.0;
   const supine_labels_options named = {.labels = "lungmask"};
@@ -401,14 +404,15 @@ TEST(test_labels_lungs_cut_at_the_border_reported) {
   supine_image_free(&image);
 }
 
-/* Return the largest distance of a vertex from the faces of the mask, mm. */
+/* Return the largest distance of a vertex from the boundary of the mask, mm. */
 static double farthest_of(const supine_image *image, uint8_t label, const supine_mesh *mesh) {
   const uint8_t *at = image->values;
   double farthest = 0.0;
   for (size_t v = 0; v < mesh->vertex_count; ++v) {
     double voxel[3];
     supine_image_locate(image, mesh->vertices + 3 * v, voxel);
-    double nearest[2] = {INFINITY, INFINITY}; /* to voxels outside and inside */
+    /* Squared distance to the nearest voxel outside and inside the mask, mm^2. */
+    double nearest[2] = {INFINITY, INFINITY};
     for (size_t i = 0; i < voxels(image); ++i) {
       const size_t index[3] = {i % image->size[0], i / image->size[0] % image->size[1],
                                i / image->size[0] / image->size[1]};
@@ -443,7 +447,7 @@ TEST(test_labels_surface_within_half_a_voxel_of_the_mask) {
   supine_image_free(&image);
 }
 
-/* The surface of any mask is one closed manifold. */
+/* The surface of a mask of noise is one closed manifold. */
 TEST(test_labels_noise_closed_manifold) {
   uint64_t seed = 7;
   for (int trial = 0; trial < 6; ++trial) {
@@ -459,7 +463,7 @@ TEST(test_labels_noise_closed_manifold) {
       const bool is = 0.5 + 0.5 * random_signed(&seed) < density;
       at[i] = !is || i % 31 == 15 ? 0 : i % 31 < 15 ? 1 : 2;
     }
-    /* full resolution; averaged over eight voxels; interpolated */
+    /* keep the voxels, average eight, interpolate */
     const double edges[] = {4.0, 8.0, 2.7};
     for (size_t e = 0; e < 3; ++e) {
       const supine_labels_options options = {.edge = edges[e]};
@@ -471,7 +475,7 @@ TEST(test_labels_noise_closed_manifold) {
       if (status == SUPINE_OK) {
         check_closed(&out.surface[0]);
         check_closed(&out.surface[1]);
-      } else { /* too thin for the larger cubes */
+      } else { /* sparse noise may vanish in larger cubes */
         assert_int_equal(status, SUPINE_ERROR_MESH);
         assert_true(density < 0.5);
       }
@@ -481,7 +485,7 @@ TEST(test_labels_noise_closed_manifold) {
   }
 }
 
-/* Distances against a search over all pairs, in boxes with unequal voxel sides. */
+/* Distances equal those of a search over all pairs of voxels, which have unequal sides. */
 TEST(test_distance_any_mask_equals_all_pairs) {
   uint64_t seed = 11;
   labels_mask mask = {.size = {9, 13, 7}, .spacing = {0.7, 1.3, 2.9}};
@@ -520,13 +524,14 @@ static void refused(const char *name, const supine_labels_options *options, supi
   assert_int_equal(supine_labels_surfaces(&path, 1, options, out.surface, &out.report, &error),
                    status);
   if (strstr(error.message, said) == NULL) {
-    fail_msg("'%s' does not say '%s'", error.message, said);
+    fail_msg("the message '%s' lacks '%s'", error.message, said);
   }
   assert_null(out.surface[0].vertices);
   assert_null(out.surface[1].vertices);
 }
 
-/* Surfaces of a ball in two pieces and of a tube, with unequal voxel sides. */
+/* Each label gives one surface: a label of two balls and one of a tube, in voxels with unequal
+ * sides. */
 TEST(test_labels_shapes_any_label_one_surface_each) {
   supine_image image = {.voxel = SUPINE_VOXEL_U16, .channels = 1, .size = {60, 50, 40}};
   static const double spacing[3] = {0.8, 0.9, 1.3};
@@ -534,7 +539,7 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
   uint16_t *at = image.values;
   for (int a = 0; a < 3; ++a) {
     image.origin[a] = 31.7 - 40.3 * a;
-    image.step[a][a] = a == 1 ? -spacing[a] : spacing[a]; /* left-handed */
+    image.step[a][a] = a == 1 ? -spacing[a] : spacing[a]; /* makes the axes left-handed */
   }
   for (size_t i = 0; i < voxels(&image); ++i) {
     const double p[3] = {spacing[0] * (double)(i % 60), spacing[1] * (double)(i / 60 % 50),
@@ -566,12 +571,13 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
     assert_true(fabs(surface - ml) < 0.06 * ml);
     assert_int_equal(supine_mesh_topology_create(&shapes[s].surface, &topology), SUPINE_OK);
     assert_true(topology.closed);
-    assert_int_equal(topology.component_count, s == 0 ? 1 : 2); /* every piece is kept */
+    assert_int_equal(topology.component_count, s == 0 ? 1 : 2); /* both balls are kept */
     supine_mesh_topology_free(&topology);
   }
   double low[3];
   double high[3];
-  supine_mesh_box(&shapes[1].surface, low, high); /* at the position given by the header */
+  /* The surface is at the position that the header gives. */
+  supine_mesh_box(&shapes[1].surface, low, high);
   assert_true(fabs(low[0] - (31.7 + 4.0)) < 0.65 && fabs(high[0] - (31.7 + 20.0)) < 0.65);
   assert_true(fabs(high[1] - (31.7 - 40.3 - 12.0)) < 0.65);
   supine_labels_shapes_free(shapes, count);
@@ -636,16 +642,16 @@ TEST(test_labels_bad_maps_refused) {
   refused("absent.nii.gz", &plain, SUPINE_ERROR_READ, "absent.nii.gz");
   refused("map.mhd", &plain, SUPINE_ERROR_FORMAT, ".nrrd");
 
-  at[0] = 3; /* three labels: ambiguous */
+  at[0] = 3;
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "which of its labels (1, 2, 3)");
   at[0] = 0;
-  for (size_t i = 0; i < voxels(&image); ++i) { /* one lung without a given side */
+  for (size_t i = 0; i < voxels(&image); ++i) { /* leaves one lung, whose side is unknown */
     at[i] = at[i] == 2 ? 2 : 0;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "one lung");
-  for (size_t i = 0; i < voxels(&image); ++i) { /* halves above each other are not two lungs */
+  for (size_t i = 0; i < voxels(&image); ++i) { /* makes two labels that lie one above the other */
     at[i] = at[i] == 0 ? 0 : i < voxels(&image) / 2 ? 1 : 2;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
@@ -657,13 +663,13 @@ TEST(test_labels_bad_maps_refused) {
   at[5030] = 2;
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "impossible for a lung");
-  /* sheets of one voxel vanish in cubes of 20 mm */
+  /* Sheets of one voxel vanish in cubes of 20 mm. */
   const supine_labels_options coarse = {.edge = 20.0};
   box_set(&image, (const size_t[3]){5, 5, 5}, (const size_t[3]){6, 40, 50}, 1);
   box_set(&image, (const size_t[3]){60, 5, 5}, (const size_t[3]){61, 40, 50}, 2);
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &coarse, SUPINE_ERROR_MESH, "smaller edge");
-  image.step[2][2] *= 100.0; /* as from a header in other units */
+  image.step[2][2] *= 100.0; /* as if the header were in another unit */
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "impossible for a lung");
   supine_image_free(&image);
@@ -690,7 +696,7 @@ TEST(test_labels_impossible_voxels_refused) {
     }
     assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
     const char *path = in_folder("none.nrrd");
-    made out = surfaces_of(&path, 1, &plain); /* whole numbers of any type are labels */
+    made out = surfaces_of(&path, 1, &plain); /* Whole numbers of any type are labels. */
     assert_int_equal(out.report.lung_count, 2);
     release(&out);
     supine_image_put(&map, voxels(&image) - 1, 1, &(double){wrong[w].value});
@@ -701,7 +707,7 @@ TEST(test_labels_impossible_voxels_refused) {
   supine_image_free(&image);
 }
 
-/* Damaged files; test_image.c has more. */
+/* Damaged files are refused; test_image.c has more cases. */
 TEST(test_labels_damaged_files_refused) {
   const supine_labels_options plain = {.edge = 5.0};
   supine_image image = helper_two_lungs(8.0);
@@ -724,7 +730,7 @@ TEST(test_labels_damaged_files_refused) {
   supine_image_free(&image);
 }
 
-/* Interrupt at each call of the progress function in turn, until the work completes. */
+/* Let the work continue for `*left` calls of the progress function, then stop it. */
 static bool stop_at(void *context, double fraction) {
   long *left = context;
   assert_true(fraction >= 0.0 && fraction <= 1.0);

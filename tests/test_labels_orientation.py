@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare the position of a label map's lungs by nibabel, VTK and supine for all 8 flips of the axes, permuted
-and oblique axes, by sform and by qform; and check the messages for 21 wrong headers.
+"""Compare the positions of the lungs in label maps by nibabel, VTK and supine: for all 8 flips of the axes, permuted
+and oblique axes, by sform and by qform. Check the messages for 21 wrong headers.
 
     test_labels_orientation.py SUPINE
 """
@@ -26,20 +26,20 @@ faults = 0
 
 
 def made_map():
-    """Make labels as lungmask does, in a frame along RAS: the right lung is larger; both are wider at the feet and
-    reach lowest at the back."""
+    """Return labels as lungmask writes them, and the affine matrix of a frame along RAS. The right lung is larger; both
+    are wider towards the feet, where they reach backwards."""
     affine = numpy.diag([*SPACING, 1.0])
     affine[:3, 3] = [-141.3, -85.7, -113.9]
     index = numpy.stack(numpy.meshgrid(*map(numpy.arange, SIZE), indexing="ij"), -1)
     x, y, z = numpy.moveaxis(index @ affine[:3, :3] + affine[:3, 3], -1, 0)
     narrow = 1 - 0.2 * z / 100
-    half = numpy.where(x > 0, 58, 53)  # RAS: + is the right
+    half = numpy.where(x > 0, 58, 53)  # in RAS, x points to the patient's right
     inside = ((abs(x) - 66) / (half * narrow)) ** 2 + ((y - 0.25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
     return numpy.where(inside, numpy.where(x > 0, 1, 2), 0).astype(numpy.uint8), affine
 
 
 def phantom_map(folder):
-    """Make labels of synthetic lungs, whose shape shows their axes, in a frame along RAS."""
+    """Return labels of synthetic lungs, whose shape shows their axes, and the affine matrix of a frame along RAS."""
     path = os.path.join(folder, "phantom.ply")
     subprocess.run([supine, "phantom", "--vertices", "8000", "-o", path], check=True, stdout=subprocess.DEVNULL)
     reader = vtk.vtkPLYReader()
@@ -75,8 +75,8 @@ def phantom_map(folder):
 
 
 def check_header(labels, affine, flips, folder):
-    """Check the message for a header with reversed axes (rotated by 180 degrees or mirrored): it names the option
-    that corrects it. For a right header no axes are proposed."""
+    """Check that the message for a header with reversed axes (rotated by 180 degrees or mirrored) names the option
+    that corrects it, and that no axes are proposed for a right header."""
     global faults
     path = os.path.join(folder, "header.nii.gz")
     nibabel.save(nibabel.Nifti1Image(labels, numpy.diag([*(-1.0 if f else 1.0 for f in flips), 1.0]) @ affine), path)
@@ -95,7 +95,7 @@ def check_header(labels, affine, flips, folder):
 
 
 def turned(labels, affine, order, flips):
-    """Return the same lungs in the same place, stored along other axes."""
+    """Return labels and affine matrix of the same lungs in the same place, stored along other axes."""
     change = numpy.zeros((4, 4))
     change[3, 3] = 1
     for new, old in enumerate(order):
@@ -116,7 +116,7 @@ def rotation(angles):
 
 
 def centres(labels, affine):
-    """Return centre and volume of each label's voxels, LPS, left first."""
+    """Return centre (LPS, mm) and volume (mL) of the voxels of each label, the left lung first."""
     out = []
     for label in (2, 1):
         voxels = numpy.argwhere(labels == label)
@@ -126,7 +126,7 @@ def centres(labels, affine):
 
 
 def by_vtk(path):
-    """Return the same by VTK's reader, whose matrices apply to mm along the image's axes."""
+    """Return the same as `centres` by VTK's reader, whose matrices apply to mm along the axes of the image."""
     reader = vtk.vtkNIFTIImageReader()
     reader.SetFileName(path)
     reader.Update()
@@ -139,7 +139,7 @@ def by_vtk(path):
 
 
 def by_supine(path, folder):
-    """Return centre and volume of each surface written by --surfaces-out."""
+    """Return centre (LPS, mm) and volume (mL) of each surface written by --surfaces-out."""
     out = os.path.join(folder, "surfaces.ply")
     result = subprocess.run([supine, "solve", path, "--labels", "lungmask", "--edge", "5",
                              "--posture", "prone", "--surfaces-out", out,
@@ -168,7 +168,7 @@ def by_supine(path, folder):
         six = numpy.einsum("ij,ij->i", p[:, 0] - origin,
                            numpy.cross(p[:, 1] - origin, p[:, 2] - origin))
         centre = ((p - origin).sum(1) * six[:, None]).sum(0) / 4 / six.sum() + origin
-        found.append((centre, six.sum() / 6000))  # signed: outwards
+        found.append((centre, six.sum() / 6000))  # mL, positive if triangles face outwards
     return sorted(found, key=lambda f: -f[0][0]), result.stdout + result.stderr
 
 
@@ -182,7 +182,7 @@ def check(name, labels, affine, folder, form):
     back = nibabel.load(path)
     wanted = centres(numpy.asarray(back.dataobj), back.affine)
     ours, said = by_supine(path, folder)
-    # For all storage axes the only warning is that the lungs are small for full inflation.
+    # However the map is stored, the only warning is that the lungs are small for full inflation.
     warned = [line for line in said.splitlines() if "warning" in line and "full inflation" not in line]
     if ours is None or warned:
         faults += 1
@@ -190,7 +190,7 @@ def check(name, labels, affine, folder, form):
         return
     for other, reader in ((ours, "supine"), (by_vtk(path), "vtk")):
         for (a, va), (b, vb) in zip(wanted, other):
-            # tolerance: a tenth of a voxel, and 1 % of volume
+            # tolerances: a tenth of a voxel, and 1 % of the volume
             if numpy.abs(a - b).max() > 0.1 * max(SPACING) or abs(va - vb) > 0.01 * va:
                 faults += 1
                 print(f"{name}: nibabel {a} {va:.1f} mL, {reader} {b} {vb:.1f} mL")

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Angles between the normals of supine_deform_lit and supine_normals, in held-out postures and
- * volumes from rest to full inflation: within the documented limits and as stated in the file. */
+/* Angles between the normals of supine_deform_lit and those of supine_normals are within the
+ * documented limits and as stated in the file, in held-out postures and volumes from rest to full
+ * inflation. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -14,17 +15,18 @@
 
 enum { STATES = 192 };
 
-/* Documented limits, degrees. */
+/* Documented limits of the mean and the 99.9th percentile, degrees. */
 static const double mean_most = 0.1;
 static const double p999_most = 1.0;
-/* Numbers in the file have two digits, so they are rounded by up to 5 %. */
+/* Largest relative rounding error of numbers in the file, which have two digits. */
 static const double printed = 0.05;
-/* Allowed difference of the mean over STATES random states, in standard errors. */
+/* Tolerance of the mean over STATES random states, in standard errors. */
 static const double sigmas = 4.0;
-/* Allowed ratio of the percentile, which depends on the worst states. */
+/* Tolerance of the percentile as a ratio; it is large, as the worst states determine the
+ * percentile. */
 static const double p999_near = 1.4;
 
-/* Make the basis of lungs at full inflation by the default law, except for `soften`. */
+/* Make a basis of lungs scanned at full inflation, by the default law with this softening. */
 static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
   static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
@@ -39,7 +41,8 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   assert_true(file >= 0 && close(file) == 0);
   options.model.force.soften = soften;
   options.reference = &reference;
-  /* EXACT: rounded rest positions would rotate small triangles, whose normals are the reference. */
+  /* Exact storage: rounded reference positions would rotate small triangles, from which the
+   * reference normals are computed. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   if (supine_reference_find(lungs, &options.model, &full, &resting, &reference, &error) !=
           SUPINE_OK ||
@@ -57,7 +60,7 @@ static int compare_floats(const void *left, const void *right) {
   return a < b ? -1 : a > b;
 }
 
-/* Compute the angles of one state, degrees, [N]; return their mean. */
+/* Compute the angle at each vertex in a random state, [N], degrees; return the mean. */
 static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, float *lit,
                       float *exact, float *angles) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -111,8 +114,8 @@ static void check_angles(supine_lungs *lungs, double soften, size_t modes) {
   const char *said_mean = supine_basis_metadata(basis, "normals_mean_degrees");
   const char *said_p999 = supine_basis_metadata(basis, "normals_p999_degrees");
   assert_true(said_mean != NULL && said_p999 != NULL);
-  printf("%zu vertices, %zu modes, %zu of the normals: mean %.3f degrees (said %s), 99.9th "
-         "percentile %.2f (said %s)\n",
+  printf("%zu vertices, %zu modes, %zu modes of normals: mean %.3f degrees (stated %s), 99.9th "
+         "percentile %.2f (stated %s)\n",
          n, info->mode_count, info->normal_count, mean, said_mean, p999, said_p999);
   assert_true(mean <= mean_most);
   assert_true(p999 <= p999_most);
@@ -137,7 +140,7 @@ static void check_real(const char *left, const char *right, supine_axes axes, do
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lit_synthetic_lungs_stated_angles) {
+TEST(test_lit_synthetic_lungs_angle_errors_as_stated) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
   assert_int_equal(supine_phantom_create(8000, 6000.0, &mesh, NULL), SUPINE_OK);
@@ -147,18 +150,18 @@ TEST(test_lit_synthetic_lungs_stated_angles) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lit_adult_stated_angles) {
+TEST(test_lit_adult_angle_errors_as_stated) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 0.0, 16);
 }
 
-TEST(test_lit_adult_softened_sixteen_modes_stated_angles) {
+TEST(test_lit_adult_softened_sixteen_modes_angle_errors_as_stated) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 1.0, 16);
 }
 
-TEST(test_lit_covid001_stated_angles) {
+TEST(test_lit_covid001_angle_errors_as_stated) {
   check_real("covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS, 0.0, 16);
 }
 
-TEST(test_lit_covid005_stated_angles) {
+TEST(test_lit_covid005_angle_errors_as_stated) {
   check_real("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS, 0.0, 16);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors, and lungs located from points that the law itself moved. */
+/* Expected errors, and lungs located from observed points that were moved by the law. */
 #include "test.h"
 
 #include <supine/locate.h>
@@ -48,7 +48,7 @@ static supine_state state_of(const char *text) {
   return state;
 }
 
-/* Compute the positions of all vertices in a state. */
+/* Compute the positions of all vertices in a state, xyz [3 VERTICES]. */
 static void deform(const supine_basis *basis, const supine_state *state, float *xyz) {
   supine_pose pose;
   supine_error error = {0};
@@ -58,7 +58,8 @@ static void deform(const supine_basis *basis, const supine_state *state, float *
   supine_deform(basis, &pose, xyz);
 }
 
-/* Rotate by 40 degrees about (1, 2, 2) / 3 if `turned`, and shift. */
+/* Move a point as between two frames: rotate it by 40 degrees about (1, 2, 2) / 3 if `turned`, and
+ * shift it. */
 static void move(bool turned, const double x[3], double moved[3]) {
   static const double shift[3] = {512, -207, 1020};
   const double c = turned ? cos(0.7) : 1;
@@ -72,19 +73,19 @@ static void move(bool turned, const double x[3], double moved[3]) {
   }
 }
 
-/* Observe every twentieth vertex in a state. */
+/* Set the observed points: one of each twenty vertices, in a state. */
 static void observe(world *w, const supine_state *state, bool turned) {
   float xyz[3 * VERTICES];
   deform(w->basis, state, xyz);
   for (size_t j = 0; j < SEEN; ++j) {
-    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* spread from apex to base */
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* includes a tip of each lung */
     const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
     w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
     move(turned, x, w->seen[j].position);
   }
 }
 
-/* Return the RMS difference of the located and the true positions of all vertices. */
+/* Return the RMS distance between the located and the true positions of all vertices, mm. */
 static double miss(const world *w, const supine_location *found, const supine_state *state,
                    bool turned) {
   float truth[3 * VERTICES];
@@ -116,7 +117,7 @@ static supine_location locate(world *w, const supine_state *state, bool rigid) {
   return found;
 }
 
-TEST(test_locate_points_of_law_recover_it) {
+TEST(test_locate_points_of_law_recover_positions_and_volume) {
   world *w = *state;
   const supine_state truth = state_of("prone:rest+300");
   const supine_state posture = state_of("prone");
@@ -127,7 +128,8 @@ TEST(test_locate_points_of_law_recover_it) {
   for (int rigid = 0; rigid < 2; ++rigid) {
     observe(w, &truth, rigid == 1);
     const supine_location found = locate(w, &posture, rigid == 1);
-    print_message("off by %.2f mm, %.0f mL +- %.0f, %.2f mm among the points\n",
+    print_message("positions off by %.2f mm RMS, volume off by %.0f mL (stated %.0f), residuals "
+                  "%.2f mm RMS\n",
                   miss(w, &found, &truth, rigid == 1), found.volume - held[0] - held[1],
                   found.volume_error, found.residual_rms);
     assert_true(miss(w, &found, &truth, rigid == 1) < 2.5);
@@ -150,7 +152,7 @@ TEST(test_locate_given_volume_kept) {
 
 TEST(test_locate_wrong_point_reported_and_ignored) {
   world *w = *state;
-  const supine_state truth = state_of("left:full-700"); /* whose points are known to 10 mm */
+  const supine_state truth = state_of("left:full-700"); /* with expected errors of about 10 mm */
   const supine_state posture = state_of("left");
   observe(w, &truth, false);
   const supine_location before = locate(w, &posture, false);
@@ -190,7 +192,8 @@ TEST(test_locate_any_points_error_not_above_prior) {
     assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
     assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma, NULL), SUPINE_OK);
     for (size_t i = 0; i < VERTICES; ++i) {
-      assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i])); /* |u| is at least 2 mm */
+      /* The prior uses at least 2 mm for |u|, so its error is at least 3 mm. */
+      assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i]));
     }
   }
 }
@@ -240,13 +243,13 @@ TEST(test_locate_bad_task_refused) {
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
   task.count = 3;
-  w->seen[1] = w->seen[2] = w->seen[0]; /* one position shows no rotation */
+  w->seen[1] = w->seen[2] = w->seen[0]; /* points in one position show no rotation */
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
 }
 
-/* sigma^2 = |u| min(4.5, RMS of u); if rest is assumed, plus the square of the motion by 5 % of
- * full inflation. */
+/* sigma^2 = |u| min(4.5 mm, RMS of u) for a displacement u from the scan. If the volume is relative
+ * to an assumed rest, the square of the displacement by 5 % of full inflation is added. */
 TEST(test_expected_error_any_state_equals_formula) {
   world *w = *state;
   const supine_basis_info *info = supine_basis_get_info(w->basis);
@@ -283,7 +286,7 @@ TEST(test_expected_error_any_state_equals_formula) {
   float sigma[VERTICES];
   assert_int_equal(supine_expected_error(w->basis, &scan, NULL, sigma, NULL), SUPINE_OK);
   for (size_t i = 0; i < VERTICES; ++i) {
-    assert_true(sigma[i] == 0); /* no error in the scan's own state */
+    assert_true(sigma[i] == 0); /* no error in the state of the scan */
   }
 }
 

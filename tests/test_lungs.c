@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Models from surfaces, sides, synthetic lungs, and volume forms. */
+/* Lungs from surfaces and their sides, synthetic lungs, and volume forms. */
 #include <float.h>
 
 #include "precompute/lungs/phantom.h"
@@ -32,7 +32,7 @@ TEST(test_lungs_two_files_any_order_left_first) {
   }
 }
 
-/* One surface whose vertices alternate between the lungs. */
+/* A surface whose vertices alternate between the lungs is grouped by lung, the left lung first. */
 TEST(test_lungs_interleaved_file_grouped) {
   supine_mesh lumps[2] = {helper_lump(4, -80.0, 3), helper_lump(4, 90.0, 4)};
   const size_t n = lumps[0].vertex_count;
@@ -85,7 +85,7 @@ TEST(test_lungs_single_lung_midline_at_inner_face) {
   }
 }
 
-/* X increases from the midline outwards in either lung: check the first and last vertex of each. */
+/* The box coordinate X increases from 0 at the midline to 1 at the outer side of either lung. */
 TEST(test_lungs_box_either_lung_increases_outwards) {
   supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(5, -80.0, 4)};
   supine_lungs lungs = {0};
@@ -115,7 +115,7 @@ TEST(test_lungs_given_midline_decides_sides) {
   supine_mesh_free(&lump);
 }
 
-/* Swap two corners of every triangle from `first` on. */
+/* Reverse every triangle from `first` on. */
 static void turn_inwards(supine_mesh *mesh, size_t first) {
   for (size_t t = first; t < mesh->triangle_count; ++t) {
     const uint32_t corner = mesh->triangles[3 * t];
@@ -125,7 +125,7 @@ static void turn_inwards(supine_mesh *mesh, size_t first) {
 }
 
 TEST(test_lungs_inward_flipped_and_reported) {
-  for (int which = 0; which < 4; ++which) { /* bit 0: the left, bit 1: the right */
+  for (int which = 0; which < 4; ++which) { /* bit 0 reverses the left lung, bit 1 the right */
     supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
     const double volume = supine_mesh_volume(&lumps[0]) + supine_mesh_volume(&lumps[1]);
     for (int lung = 0; lung < 2; ++lung) {
@@ -145,14 +145,13 @@ TEST(test_lungs_inward_flipped_and_reported) {
   }
 }
 
-/* If triangles of one piece face different ways, the surface counts as open. */
 static void expect_refused(const supine_mesh *meshes, size_t count, const double *midline,
                            const char *words) {
   supine_lungs lungs = {0};
   supine_error error = {0};
   assert_int_equal(supine_lungs_create(meshes, count, midline, &lungs, &error), SUPINE_ERROR_MESH);
   if (strstr(error.message, words) == NULL) {
-    fail_msg("\"%s\" lacks \"%s\"", error.message, words);
+    fail_msg("the message '%s' lacks '%s'", error.message, words);
   }
   assert_null(lungs.mesh.vertices);
 }
@@ -191,7 +190,7 @@ TEST(test_lungs_midline_out_of_place_refused) {
   expect_refused(lumps, 2, &midline, "x = 80 mm runs through the left lung");
   midline = 95.0;
   expect_refused(lumps, 1, &midline, "runs through the right lung");
-  midline = 20.0; /* slightly off */
+  midline = 20.0; /* 20 mm off is accepted */
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(lumps, 2, &midline, &lungs, NULL), SUPINE_OK);
   assert_int_equal(lungs.lung_count, 2);
@@ -245,8 +244,8 @@ TEST(test_phantom_pair_closed_with_given_volume) {
   assert_int_equal(supine_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
 }
 
-/* The phantom keeps its shape: sums over vertices to which every harmonic of both lungs
- * contributes. Expected values are from the first version of the shape. */
+/* The phantom keeps its shape. Every harmonic of the shape contributes to the compared sums over
+ * vertices, whose expected values are from its first version. */
 TEST(test_phantom_create_same_shape_as_first_version) {
   static const double made[2] = {-542.627977, 212.207209};
   supine_mesh mesh = {0};
@@ -259,13 +258,13 @@ TEST(test_phantom_create_same_shape_as_first_version) {
         sum += sin((double)(v + 1) * (double)(a + 1)) * mesh.vertices[3 * v + a];
       }
     }
-    /* mm: a hundredth of the smallest coefficient's contribution */
+    /* mm, a hundredth of the contribution of the smallest coefficient */
     assert_true(fabs(sum - made[lung]) < 1e-4);
   }
   supine_mesh_free(&mesh);
 }
 
-/* Return the volume gained by one lung of a pair, measured on the deformed surface. */
+/* Return the volume that one lung of a pair gains, mL, measured on the deformed surface. */
 static double gained(const supine_lungs *lungs, size_t lung, const double *d, const double *columns,
                      size_t count, const double *weights, const double gains[3]) {
   const size_t n = lungs->mesh.vertex_count;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the tests that TEST defines, in the order of their definitions. A program of which a test was
- * skipped, and none failed, ends with 77: CTest then counts it as skipped and not as passed. */
+/* Run the tests that TEST defines, in the order of their definitions. If a test is skipped and none
+ * fails, exit with 77, so that CTest reports the program as skipped, not as passed. */
 #include "test.h"
 
 #include <gsl/gsl_errno.h>
@@ -8,7 +8,7 @@
 /* NULL in programs that are linked without GSL. */
 #pragma weak gsl_set_error_handler_off
 
-enum { SKIPPED = 77 }; /* SKIP_RETURN_CODE in CMakeLists.txt */
+enum { SKIPPED = 77 }; /* equal to SKIP_RETURN_CODE in CMakeLists.txt */
 
 static struct CMUnitTest tests[64];
 static size_t test_count;
@@ -40,7 +40,7 @@ void __wrap__skip(const char *file, int line) {
 
 int main(void) {
   if (gsl_set_error_handler_off != NULL) {
-    (void)gsl_set_error_handler_off(); /* GSL's own handler would end the program */
+    (void)gsl_set_error_handler_off(); /* GSL's default handler would abort the program */
   }
   const int failed =
       _cmocka_run_group_tests("tests", tests, test_count, group_setup, group_teardown);

@@ -13,7 +13,7 @@ fail() {
 commands=$("$supine" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p')
 [ "$(echo "$commands" | wc -w)" -ge 11 ] || fail "commands: $commands"
 
-# Every option of --help-all is in the command's page and both completions.
+# Every option of --help-all is in the manual page of its command and in both completions.
 for command in $commands; do
   for option in $("$supine" "$command" --help-all | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*'); do
     sed 's/\\-/-/g' "supine-$command.1" | grep -q -- "$option" || fail "supine-$command.1 lacks $option"
@@ -25,8 +25,8 @@ for command in $commands; do
   fi
 done
 
-# complete WORDS...: print bash's completions of the last word.
 . ./supine.bash
+# complete_words WORDS...: print bash's completions of the last word.
 complete_words() {
   COMP_WORDS=(supine "$@")
   COMP_CWORD=$#
@@ -52,6 +52,6 @@ expect "lungs.ply" precompute --fields lu
 rm -r "$PWD"
 cd "$2" || exit 1
 if command -v zsh >/dev/null; then
-  zsh -n _supine || fail "_supine is no zsh"
+  zsh -n _supine || fail "_supine is not valid in zsh"
 fi
 [ $failures -eq 0 ] || exit 1

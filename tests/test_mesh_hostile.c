@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Truncated, corrupt and hostile files: each is refused or read right, and none crashes or exhausts
- * memory. */
+/* Truncated, corrupt and hostile files: each is refused or read correctly, and none causes a crash
+ * or exhausts memory. */
 #include <dirent.h>
 
 #include "mesh_samples.h"
 
-/* Return the status of loading; on success assert a valid mesh. */
+/* Load a file and return the status. Assert a valid mesh on success, else a complete error. */
 static supine_status attempt(const char *path) {
   supine_mesh mesh = {0};
   supine_error error = {0};
@@ -26,7 +26,7 @@ static supine_status attempt(const char *path) {
   return status;
 }
 
-/* Load `text` under `name` and assert the status; if SUPINE_OK, also the number of triangles. */
+/* Load `text` from a file `name`; assert the status and the number of triangles. */
 static void expect_text(void **state, const char *name, const char *text, supine_status expected,
                         size_t triangles) {
   char path[256];
@@ -50,7 +50,7 @@ static void expect_bytes(void **state, const char *name, const void *bytes, size
   assert_int_equal(unlink(path), 0);
 }
 
-/* Return the box as saved under that name. */
+/* Return the bytes of the box saved as `name` (malloc). */
 static unsigned char *saved_box(void **state, const char *name, size_t *size) {
   char path[256];
   supine_mesh box = sample_box();
@@ -61,7 +61,7 @@ static unsigned char *saved_box(void **state, const char *name, size_t *size) {
   return bytes;
 }
 
-TEST(test_truncated_binary_every_length_format) {
+TEST(test_truncated_binary_every_length_reports_format_error) {
   static const char *const names[] = {"a.ply", "a.stl"};
   for (size_t k = 0; k < 2; ++k) {
     size_t size = 0;
@@ -79,7 +79,7 @@ TEST(test_truncated_binary_every_length_format) {
   "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 #define PLY_BODY "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
 
-TEST(test_truncated_text_every_length_format) {
+TEST(test_truncated_text_every_length_reports_format_error) {
   static const struct {
     const char *name;
     const char *text;
@@ -90,7 +90,8 @@ TEST(test_truncated_text_every_length_format) {
   };
   for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
     const size_t size = strlen(cases[k].text);
-    for (size_t length = 0; length + 1 < size; ++length) { /* the last line end may be missing */
+    /* Only the last line end may be missing. */
+    for (size_t length = 0; length + 1 < size; ++length) {
       expect_bytes(state, cases[k].name, cases[k].text, length, SUPINE_ERROR_FORMAT);
     }
     expect_bytes(state, cases[k].name, cases[k].text, size - 1, SUPINE_OK);
@@ -109,7 +110,7 @@ TEST(test_truncated_obj_every_length_read_or_refused) {
 
 #define PLY_ASCII "ply\nformat ascii 1.0\n"
 
-TEST(test_ply_header_illegal_format) {
+TEST(test_ply_header_illegal_reports_format_error) {
   static const char *const texts[] = {
       "plx\nformat ascii 1.0\n" PLY_HEAD PLY_BODY,
       "ply\n" PLY_HEAD PLY_BODY,
@@ -120,8 +121,9 @@ TEST(test_ply_header_illegal_format) {
       PLY_ASCII "element vertex\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element vertex -1\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element vertex 99999999999999999999\n" PLY_HEAD PLY_BODY,
-      PLY_ASCII "element vertex 3\nproperty float x\n" PLY_HEAD PLY_BODY, /* twice */
-      PLY_ASCII "element none 0\n" PLY_HEAD PLY_BODY,                     /* no property */
+      /* The element is given twice. */
+      PLY_ASCII "element vertex 3\nproperty float x\n" PLY_HEAD PLY_BODY,
+      PLY_ASCII "element none 0\n" PLY_HEAD PLY_BODY, /* an element without a property */
       PLY_ASCII "element a 0\nproperty\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element a 0\nproperty float\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element a 0\nproperty half x\n" PLY_HEAD PLY_BODY,
@@ -137,7 +139,7 @@ TEST(test_ply_header_illegal_format) {
   }
 }
 
-TEST(test_ply_header_too_many_parts_format) {
+TEST(test_ply_header_too_many_parts_reports_format_error) {
   char text[16384];
   for (int kind = 0; kind < 2; ++kind) {
     int length = snprintf(text, sizeof text, PLY_ASCII "element first 0\n");
@@ -150,19 +152,19 @@ TEST(test_ply_header_too_many_parts_format) {
   }
 }
 
-TEST(test_ply_body_illegal_format) {
+TEST(test_ply_body_illegal_reports_format_error) {
   static const char *const bodies[] = {
-      "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n",   /* no vertex 3 */
-      "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",  /* a negative one */
-      "0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n", /* not an integer */
-      "0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n",  /* a negative length */
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n",   /* vertex 3 does not exist */
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",  /* a negative vertex */
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n", /* a vertex that is not an integer */
+      "0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n",  /* a list of negative length */
       "0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n",
       "0 0 0\n1 0 0\n0 one 0\n3 0 1 2\n",
       "0 0 0\n1 0 0\n0 0,5 0\n3 0 1 2\n",
       "0 0 0\n1 0 0\n0 1e 0\n3 0 1 2\n",
-      "0 0 0\n1 0 0\n\n0 1 0\n3 0 1 2\n", /* importers count lines */
+      "0 0 0\n1 0 0\n\n0 1 0\n3 0 1 2\n", /* an empty line between rows */
       "0 0 0 1 0 0 0 1 0\n3 0 1 2\n\n\n",
-      "0 0 0\r1 0 0\n0 1 0\n3 0 1 2\nx\n", /* CR that does not end a line */
+      "0 0 0\r1 0 0\n0 1 0\n3 0 1 2\nx\n", /* a CR within the rows */
   };
   for (size_t i = 0; i < sizeof bodies / sizeof *bodies; ++i) {
     char text[512];
@@ -171,7 +173,7 @@ TEST(test_ply_body_illegal_format) {
   }
 }
 
-/* Words that assimp 5.2 misreads as counts, elements or coordinates. */
+/* Legal files are read in which assimp 5.2 mistakes words for counts, elements or coordinates. */
 TEST(test_ply_unusual_but_legal_read) {
   static const char *const texts[] = {
       PLY_ASCII "comment 3 lungs\n" PLY_HEAD PLY_BODY,
@@ -193,7 +195,7 @@ TEST(test_ply_unusual_but_legal_read) {
   }
 }
 
-/* Append the four bytes of a value. */
+/* Append the four bytes of `bits`, big-endian if `big`; return the new length. */
 static size_t append(unsigned char *bytes, size_t at, uint32_t bits, bool big) {
   for (size_t k = 0; k < 4; ++k) {
     bytes[at + k] = (unsigned char)(bits >> (8 * (big ? 3 - k : k)));
@@ -201,8 +203,8 @@ static size_t append(unsigned char *bytes, size_t at, uint32_t bits, bool big) {
   return at + 4;
 }
 
-/* Binary PLY files whose data begins with LF, in both byte orders, with unknown elements before and
- * after. */
+/* Binary PLY files are read, in both byte orders, if the data begins with a line feed and unknown
+ * elements are before and after the surface. */
 TEST(test_ply_binary_first_byte_line_feed_read) {
   for (int big = 0; big < 2; ++big) {
     unsigned char bytes[512] = {0};
@@ -246,7 +248,7 @@ TEST(test_ply_binary_first_byte_line_feed_read) {
   }
 }
 
-/* Load bytes; assert that they are refused with this message. */
+/* Assert that a PLY file with these bytes is refused with this message. */
 static void refuse_bytes(void **state, const void *bytes, size_t size, const char *words) {
   char path[256];
   supine_mesh mesh = {0};
@@ -254,7 +256,7 @@ static void refuse_bytes(void **state, const void *bytes, size_t size, const cha
   (void)sample_write(state, "a.ply", bytes, size, path);
   assert_int_equal(supine_mesh_load(path, NULL, &mesh, NULL, &error), SUPINE_ERROR_FORMAT);
   if (strstr(error.message, words) == NULL) {
-    fail_msg("\"%s\" lacks \"%s\"", error.message, words);
+    fail_msg("the message '%s' lacks '%s'", error.message, words);
   }
   assert_int_equal(unlink(path), 0);
 }
@@ -279,7 +281,7 @@ TEST(test_ply_list_of_negative_length_refused) {
   }
 }
 
-TEST(test_ply_no_surface_mesh) {
+TEST(test_ply_no_surface_reports_mesh_error) {
   static const char *const texts[] = {
       PLY_ASCII "element vertex 1\nproperty float x\nproperty float y\nproperty float "
                 "z\nend_header\n1 2 3\n",
@@ -293,7 +295,7 @@ TEST(test_ply_no_surface_mesh) {
   }
 }
 
-TEST(test_load_stl_and_obj_garbage_format) {
+TEST(test_load_stl_and_obj_garbage_reports_format_error) {
   expect_text(state, "a.stl",
               "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 "
               "0\nendloop\nendfacet\nendsolid\n",
@@ -311,7 +313,7 @@ TEST(test_load_stl_and_obj_garbage_format) {
   expect_bytes(state, "a.obj", utf16, sizeof utf16, SUPINE_ERROR_FORMAT);
 }
 
-/* Load every file of a folder of the test data; return how many exist. */
+/* Load every file of a folder of the test data; return the number of files. */
 static size_t sweep(const char *name) {
   char folder[256];
   (void)snprintf(folder, sizeof folder, "%s/defects/%s", SUPINE_TEST_DATA, name);
@@ -325,7 +327,7 @@ static size_t sweep(const char *name) {
       char path[640];
       (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
       const supine_status status = attempt(path);
-      /* Only one file of this folder can be read: its material is missing. */
+      /* Only one file of the folder `invalid` can be read: the one whose material is missing. */
       if (strcmp(name, "invalid") == 0) {
         assert_int_equal(
             status, strcmp(entry->d_name, "malformed2.obj") == 0 ? SUPINE_OK : SUPINE_ERROR_FORMAT);
@@ -337,7 +339,7 @@ static size_t sweep(const char *name) {
   return count;
 }
 
-TEST(test_defects_read_or_refused) {
+TEST(test_defects_each_file_read_or_refused) {
   static const char *const folders[] = {"OBJ", "OFF", "PLY", "STL", "invalid"};
   for (size_t i = 0; i < sizeof folders / sizeof *folders; ++i) {
     if (sweep(folders[i]) == 0) {
@@ -347,7 +349,7 @@ TEST(test_defects_read_or_refused) {
   }
 }
 
-TEST(test_defects_known_read_right) {
+TEST(test_defects_known_files_read_correctly) {
   static const struct {
     const char *name;
     supine_status status;
@@ -361,7 +363,7 @@ TEST(test_defects_known_read_right) {
       {"PLY/cube_uv.ply", SUPINE_OK, 8, 12},
       {"PLY/Wuson.ply", SUPINE_OK, 2117, 3732},
       {"PLY/points.ply", SUPINE_ERROR_MESH, 0, 0},
-      {"PLY/issue623.ply", SUPINE_ERROR_MESH, 0, 0}, /* its faces are listed among the vertices */
+      {"PLY/issue623.ply", SUPINE_ERROR_MESH, 0, 0}, /* has faces among its vertices */
       {"STL/Wuson.stl", SUPINE_OK, 2117, 3732},
       {"STL/triangle_with_two_solids.stl", SUPINE_OK, 6, 2},
       {"STL/triangle_with_empty_solid.stl", SUPINE_OK, 3, 1},

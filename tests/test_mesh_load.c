@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Loading small files of every kind: welding, dropped elements, orientation and units. */
+/* Small files of every format: welding, dropped elements, orientation, axes and units. */
 #include <float.h>
 #include <math.h>
 #include <pthread.h>
@@ -22,7 +22,7 @@ static const char tetrahedron_stl[] =
     "0\nvertex 0 0 120\nendloop\nendfacet\n"
     "endsolid\n";
 
-/* Load a file, assert success, and remove it. */
+/* Load a file, assert that this succeeds, and remove the file. */
 static supine_mesh load(const char *path, const supine_mesh_load_options *options,
                         supine_mesh_report *report) {
   supine_mesh mesh = {0};
@@ -80,7 +80,7 @@ TEST(test_load_stl_soup_equals_indexed) {
   supine_mesh_free(&soup);
 }
 
-/* No reader returns -0, so that equal positions have equal bits. */
+/* Readers return 0 for -0, so that equal positions have equal bits. */
 TEST(test_load_negative_zero_becomes_zero) {
   static const char text[] = SAMPLE_PLY(5, 2) "-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
                                               "3 0 2 1\n3 3 1 4\n";
@@ -143,8 +143,8 @@ TEST(test_load_ply_strips_refused) {
               SUPINE_ERROR_MESH, "save the mesh as triangles");
 }
 
-/* A concave flat face of any size, one corner of which sees all others, is cut inside: all
- * triangles face the same way and their areas sum to its area. */
+/* A flat concave face of any size is cut within its outline: all triangles face the same way and
+ * their areas sum to that of the face. */
 TEST(test_load_concave_face_cut_inside) {
   static const double corners[7][3] = {{0, 0, 0},   {90, 0, 0}, {90, 30, 0}, {30, 30, 0},
                                        {30, 60, 0}, {0, 60, 0}, {0, 0, 50}};
@@ -174,7 +174,8 @@ TEST(test_load_concave_face_cut_inside) {
   }
 }
 
-/* Faces with collinear corners or self-intersections are cut into all triangles. */
+/* A face with collinear corners or self-intersections is still cut into its number of corners less
+ * two triangles. */
 TEST(test_load_degenerate_faces_cut_into_all_triangles) {
   static const char text[] = SAMPLE_PLY(6, 3) "0 0 0\n10 0 0\n20 0 0\n30 0 0\n0 10 0\n10 10 0\n"
                                               "4 0 1 2 3\n5 0 1 2 3 4\n4 0 5 4 1\n";
@@ -194,8 +195,9 @@ TEST(test_load_face_of_too_many_corners_refused) {
   refuse_text(state, "a.ply", text, SUPINE_ERROR_FORMAT, "face 0 has 1025 corners");
 }
 
-/* Two nodes have the tetrahedron, one shifted, one mirrored and shifted; both face outwards. */
-TEST(test_load_nodes_transformed_mirror_keeps_sense) {
+/* Two nodes show the same tetrahedron, one shifted, the other mirrored and shifted. The triangles
+ * of both face outwards. */
+TEST(test_load_nodes_transformed_mirror_keeps_orientation) {
   static const char text[] =
       "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
       "{\"children\":[1,2],\"translation\":[0,0,1000]},"
@@ -231,7 +233,8 @@ TEST(test_load_nodes_transformed_mirror_keeps_sense) {
   supine_mesh_free(&mesh);
 }
 
-/* Load the tetrahedron with a first line `head`; return x of vertex 1, 120 or -120. */
+/* Load the tetrahedron with a first line `head` and these axes; return the x of vertex 1, 120 or
+ * -120. */
 static double x_under(void **state, const char *name, const char *head, supine_axes axes,
                       supine_mesh_report *report) {
   char text[512];
@@ -248,7 +251,7 @@ static double x_under(void **state, const char *name, const char *head, supine_a
   return x;
 }
 
-TEST(test_load_axes_tag_option_and_comment) {
+TEST(test_load_axes_option_overrides_tag) {
   static const struct {
     const char *head;
     supine_axes asked;
@@ -276,8 +279,9 @@ TEST(test_load_axes_tag_option_and_comment) {
   }
 }
 
-/* Binary STL by 3D Slicer begins with its tag; text behind the header is ignored. */
-TEST(test_load_axes_tag_in_stl_header) {
+/* A SPACE tag is read anywhere in the header of a binary STL file; 3D Slicer writes it at the
+ * beginning. */
+TEST(test_load_axes_tag_in_stl_header_used) {
   static const char *const heads[] = {"SPACE=RAS", "a lung, SPACE=RAS"};
   for (size_t i = 0; i < 2; ++i) {
     unsigned char stl[134] = {0};
@@ -302,7 +306,7 @@ TEST(test_load_axes_foreign_tag_refused) {
               SUPINE_ERROR_FORMAT, "SPACE tag");
 }
 
-TEST(test_load_units_scaled) {
+TEST(test_load_units_scaled_to_millimetres) {
   static const double scales[] = {0.0, 1.0, 10.0, 0.125};
   for (size_t i = 0; i < sizeof scales / sizeof *scales; ++i) {
     char path[256];
@@ -321,7 +325,7 @@ TEST(test_load_units_scaled) {
   }
 }
 
-TEST(test_unit_is_likely_sides_and_other_units) {
+TEST(test_unit_is_likely_known_sizes_give_unit) {
   static const struct {
     double side;
     bool likely;
@@ -338,7 +342,7 @@ TEST(test_unit_is_likely_sides_and_other_units) {
   }
 }
 
-TEST(test_load_units_not_positive_argument) {
+TEST(test_load_units_not_positive_refused) {
   char path[256];
   (void)sample_text(state, "a.obj", tetrahedron_obj, path);
   static const double scales[] = {-1.0, (double)INFINITY, (double)NAN};
@@ -349,20 +353,20 @@ TEST(test_load_units_not_positive_argument) {
   assert_int_equal(unlink(path), 0);
 }
 
-TEST(test_load_missing_folder_device_unreadable_read) {
+TEST(test_load_unreadable_path_reports_read_error) {
   char path[256];
   expect_refused(sample_path(state, "missing.ply", path), NULL, SUPINE_ERROR_READ, "No such file");
   expect_refused(*state, NULL, SUPINE_ERROR_READ, "is a folder");
   expect_refused("/dev/null", NULL, SUPINE_ERROR_READ, "not a regular file");
   (void)sample_text(state, "a.obj", tetrahedron_obj, path);
   assert_int_equal(chmod(path, 0), 0);
-  if (access(path, R_OK) != 0) { /* root may read everything */
+  if (access(path, R_OK) != 0) { /* root may read any file */
     expect_refused(path, NULL, SUPINE_ERROR_READ, "Permission denied");
   }
   assert_int_equal(unlink(path), 0);
 }
 
-TEST(test_load_unknown_kind_format) {
+TEST(test_load_unknown_kind_of_file_reports_format_error) {
   refuse_text(state, "empty.ply", "", SUPINE_ERROR_FORMAT, "empty");
   refuse_text(state, "a.jpg", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
   refuse_text(state, "none", tetrahedron_obj, SUPINE_ERROR_FORMAT, "no importer");
@@ -371,7 +375,7 @@ TEST(test_load_unknown_kind_format) {
   refuse_text(state, "a.dae", "\n<a>\n\n</b>\n", SUPINE_ERROR_FORMAT, "malformed");
 }
 
-TEST(test_load_no_triangles_mesh) {
+TEST(test_load_no_triangles_reports_mesh_error) {
   refuse_text(state, "points.obj", "v 1 2 3\nv 4 5 6\n", SUPINE_ERROR_MESH, "no triangles");
   refuse_text(state, "lines.obj", "v 1 2 3\nv 4 5 6\nl 1 2\n", SUPINE_ERROR_MESH, "no triangles");
   refuse_text(state, "flat.obj", "v 1 2 3\nv 4 5 6\nv 1 2 3\nf 1 2 3\n", SUPINE_ERROR_MESH,
@@ -437,7 +441,7 @@ static void *read_often(void *argument) {
   return NULL;
 }
 
-/* Materials are not needed: the file named by an OBJ is not opened. */
+/* The material files that an OBJ names are not opened: inotify sees no access. */
 TEST(test_load_obj_materials_not_opened) {
   char materials[256];
   char text[1024];
@@ -502,7 +506,8 @@ TEST(test_load_from_threads_good_and_bad) {
       "<DataArray type=\"UInt8\" Name=\"offsets\" format=\"appended\" offset=\"12\"/>",            \
       "<AppendedData encoding=\"" encoding "\">_" data "</AppendedData>")
 
-/* Arrays of bytes 0 0 0 1 0 0 0 1 0, 0 1 2 and 3 in base64, each after its size in 4 or 8 bytes. */
+/* The arrays of bytes 0 0 0 1 0 0 0 1 0, 0 1 2 and 3 are read from text and from base64. In base64,
+ * the size of an array precedes it in 4 or 8 bytes. */
 TEST(test_load_vtp_each_encoding_same_triangle) {
   static const char *const texts[] = {
       VTP_ASCII(VTP_POINTS, "0 1 2", "3"),

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Real lungs, if available: their numbers as in README.md of this folder. */
+/* Real lungs (tests/README.md) have known sizes, topology and volumes. */
 #include <math.h>
 
 #include "mesh_samples.h"
 
-/* Load a file of the test data; skip the test if it is missing. */
+/* Load a file of the test data; skip the test if the file is missing. */
 static supine_mesh lung_load(const char *name, supine_mesh_report *report) {
   char path[512];
   (void)snprintf(path, sizeof path, "%s/%s", SUPINE_TEST_DATA, name);
@@ -26,14 +26,14 @@ static supine_topology topology_of(const supine_mesh *mesh) {
   return topology;
 }
 
-/* Closed lungs: numbers of vertices and triangles, genus, litres to one decimal. */
+/* Closed lungs have known numbers of vertices and triangles, genus and volume. */
 TEST(test_lungs_closed_known_numbers) {
   static const struct {
     const char *name;
     size_t vertices;
     size_t triangles;
     long genus;
-    double litres; /* to 0.05 */
+    double litres; /* volume, within 0.05 litres */
   } cases[] = {
       {"lungs/chaste_left_5k.obj", 5001, 9998, 0, 3.4},
       {"lungs/chaste_right_5k.obj", 5001, 9998, 0, 4.2},
@@ -83,7 +83,7 @@ TEST(test_lungs_stl_soup_welds_closed) {
   }
 }
 
-TEST(test_lungs_defect_boundary_and_non_manifold) {
+TEST(test_lungs_known_defect_edges_counted) {
   supine_mesh mesh = lung_load("covid/covid005_left_DEFECT.ply", NULL);
   supine_topology topology = topology_of(&mesh);
   assert_int_equal(topology.boundary_edges, 2);
@@ -95,7 +95,7 @@ TEST(test_lungs_defect_boundary_and_non_manifold) {
   supine_mesh_free(&mesh);
 }
 
-/* Saved as triangle soup and loaded again, a lung is the same surface. */
+/* A lung saved as STL, without shared vertices, and loaded again is the same surface. */
 TEST(test_lungs_stl_round_trip_same_surface) {
   supine_mesh mesh = lung_load("lungs/chaste_left.ply", NULL);
   char path[256];
@@ -107,7 +107,7 @@ TEST(test_lungs_stl_round_trip_same_surface) {
   assert_int_equal(unlink(path), 0);
   assert_int_equal(again.vertex_count, mesh.vertex_count);
   assert_int_equal(again.triangle_count, mesh.triangle_count);
-  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) { /* file and mesh are float32: exact */
+  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) { /* exact, as file and mesh are float32 */
     assert_memory_equal(again.vertices + 3 * (size_t)again.triangles[c],
                         mesh.vertices + 3 * (size_t)mesh.triangles[c], 3 * sizeof(double));
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volume, box and areas against closed forms. */
+/* Volume, box and areas of surfaces against closed forms. */
 #include <float.h>
 #include <math.h>
 
@@ -7,7 +7,7 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Bound for a sum of n terms: each is rounded a few times. */
+/* Return the tolerance of a sum of `terms` terms of about `size`, each rounded a few times. */
 static double rounding(size_t terms, double size) {
   return 8.0 * (double)terms * DBL_EPSILON * size;
 }
@@ -38,9 +38,10 @@ TEST(test_volume_flipped_negative) {
   supine_mesh_free(&box);
 }
 
-/* Torus with corners (R + r cos b) cos a, (R + r cos b) sin a, r sin b, in steps of 2 pi / n and 2
- * pi / m. Any horizontal cut is a ring between two regular n-gons, so the volume is n sin(2 pi / n)
- * R (m / 2) r^2 sin(2 pi / m). It lies far from the origin, where sums about the origin cancel. */
+/* The volume of a torus with corners (R + r cos b) cos a, (R + r cos b) sin a, r sin b, for angles
+ * a in N steps and b in M steps, is N sin(2 pi / N) R (M / 2) r^2 sin(2 pi / M): any horizontal cut
+ * is a ring between two regular polygons. It is also right far from the origin, where sums about
+ * the origin cancel. */
 TEST(test_volume_torus_far_from_origin_closed_form) {
   enum { N = 37, M = 23 };
   const double R = 83.0;
@@ -65,7 +66,7 @@ TEST(test_volume_torus_far_from_origin_closed_form) {
   }
   supine_mesh torus = sample_make(N * M, vertices, 2 * N * M, triangles);
   const double expected = N * sin(2.0 * pi / N) * R * 0.5 * M * r * r * sin(2.0 * pi / M);
-  /* Rounding of the coordinates: 5e6 EPSILON mm over a surface of some 96000 mm^2. */
+  /* Tolerance: coordinates are rounded by 5e6 epsilon mm, over a surface of about 96000 mm^2. */
   expect_near(supine_mesh_volume(&torus), expected, 5.0e6 * DBL_EPSILON * 96000.0);
   supine_mesh_free(&torus);
 }
@@ -86,7 +87,8 @@ TEST(test_vertex_area_tetrahedron_literal) {
   supine_mesh mesh = sample_tetrahedron();
   double area[4];
   supine_mesh_vertex_area(&mesh, area);
-  /* Three right triangles of 120^2 / 2 = 7200; the slanted one has sqrt(3) times that area. */
+  /* Three right triangles have 120^2 / 2 = 7200 mm^2 each; the slanted one has sqrt(3) times
+   * that. */
   const double slanted = 7200.0 * sqrt(3.0);
   expect_near(area[0], 7200.0, rounding(3, 7200.0));
   for (int i = 1; i < 4; ++i) {

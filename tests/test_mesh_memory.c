@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Each allocation of loading, welding, measuring and saving fails in turn: the result is
- * SUPINE_ERROR_MEMORY or as without the failure, and nothing leaks (checked by a leak sanitizer).
- */
+/* Each allocation of loading, welding, measuring and saving fails in turn. The result is a reported
+ * error or the same as without the failure, and nothing leaks (checked by a leak sanitizer). */
 #include <errno.h>
 #include <sys/mman.h>
 
 #include "mesh_samples.h"
 
-/* Number of allocations that still succeed; negative: all. The linker redirects allocations to this
- * file. */
+/* Number of allocations that still succeed before one fails; negative: none fails. The linker
+ * redirects allocations to this file. */
 static int allocations_left = -1;
-static int *allocations_failed; /* shared with the process that assimp runs in */
+static int *allocations_failed; /* shared with the process in which assimp runs */
 
 static int allocation_fails(void) {
   const int fails = allocations_left >= 0 && allocations_left-- == 0;
@@ -43,7 +42,8 @@ void *__wrap_realloc(void *old, size_t size) {
 }
 /* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
 
-/* Run `work` with allocation 0, 1, 2, ... failing, until none fails. */
+/* Run `work` with allocation 0, 1, 2, ... failing, until a run ends before that allocation. Assert
+ * that there were at least `least` allocations. */
 static void fail_each(supine_status (*work)(const char *path, supine_error *error),
                       const char *path, int least) {
   for (int nth = 0;; ++nth) {
@@ -56,14 +56,14 @@ static void fail_each(supine_status (*work)(const char *path, supine_error *erro
     if (was_last) {
       assert_int_equal(status, SUPINE_OK);
       if (nth < least) {
-        fail_msg("%s: %d allocations were seen", path, nth);
+        fail_msg("%s: only %d allocations", path, nth);
       }
       return;
     }
     if (status == SUPINE_OK) {
-      continue; /* the memory was optional, as for a buffer */
+      continue; /* the memory was optional, as that of a buffer */
     }
-    /* An output that cannot be opened may be a write error; its message names memory, too. */
+    /* An output that cannot be opened may give a write error, whose message also names memory. */
     if ((status != SUPINE_ERROR_MEMORY && status != SUPINE_ERROR_WRITE) || error.status != status ||
         strstr(error.message, "memory") == NULL) {
       fail_msg("%s: allocation %d: status %d, \"%s\"", path, nth, (int)status, error.message);
@@ -80,19 +80,19 @@ static supine_status load(const char *path, supine_error *error) {
   return status;
 }
 
-TEST(test_load_each_allocation_failing_memory) {
+TEST(test_load_each_allocation_failing_reports_memory_error) {
   static const struct {
     const char *name;
     const char *text;
-  } files[] = {
-      {"a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+  } files[] = {{"a.ply",
+                "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
                 "property float z\nproperty float a\nelement face 1\nproperty list uchar int "
                 "vertex_indices\nend_header\n0 0 0 1\n1 0 0 2\n1 1 0 3\n0 1 0 4\n4 0 1 2 3\n"},
-      {"a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"}};
+               {"a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"}};
   for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
     char path[256];
     (void)sample_text(state, files[i].name, files[i].text, path);
-    fail_each(load, path, 5); /* bytes, vertices, triangles, and two for welding */
+    fail_each(load, path, 5); /* arrays of bytes, vertices and triangles, and two for welding */
     assert_int_equal(unlink(path), 0);
   }
 }
@@ -110,10 +110,10 @@ static supine_status find_edges(const char *path, supine_error *error) {
   assert_true((status == SUPINE_OK) == (topology.component != NULL));
   supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
-  return supine_error_set(error, status, "out of memory"); /* it sets no message */
+  return supine_error_set(error, status, "out of memory"); /* the function sets no message */
 }
 
-TEST(test_topology_each_allocation_failing_memory) {
+TEST(test_topology_each_allocation_failing_reports_memory_error) {
   char path[256];
   (void)sample_text(state, "a.ply", SAMPLE_PLY(4, 1) "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n",
                     path);
@@ -131,9 +131,9 @@ static supine_status save(const char *path, supine_error *error) {
   return status;
 }
 
-/* Only the writer of VTP and the opening of an output allocate; removal of the folder fails if a
- * file is left. */
-TEST(test_save_each_allocation_failing_memory) {
+/* Only writing VTP and opening an output allocate. If a file were left, the removal of the folder
+ * would fail. */
+TEST(test_save_each_allocation_failing_reports_memory_error) {
   static const char *const names[] = {"a.ply", "a.obj", "a.stl", "a.vtp"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     char path[256];
@@ -159,10 +159,10 @@ static supine_status save_series(const char *path, supine_error *error) {
   return status;
 }
 
-TEST(test_series_each_allocation_failing_memory) {
+TEST(test_series_each_allocation_failing_reports_memory_error) {
   char path[256];
   fail_each(save_series, sample_path(state, "a.vtp", path),
-            5); /* series, offsets, bytes, packed, sizes */
+            5); /* the series and four of its arrays */
 }
 
 static int setup(void **state) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Saved files: read back the same, with displacements, and never incomplete. */
+/* Saved files: equal when read back, displacements and expected errors, and never incomplete. */
 #include <fcntl.h>
 #include <float.h>
 #include <math.h>
@@ -10,7 +10,7 @@
 
 static const char *const endings[] = {"a.ply", "a.obj", "a.stl", "a.VTP"};
 
-/* A box with corners that float32 rounds. */
+/* Make a box whose corners are rounded in float32. */
 static supine_mesh make_crooked(void) {
   supine_mesh mesh = sample_box();
   for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
@@ -27,7 +27,8 @@ static void save(const char *path, const supine_mesh *mesh,
   }
 }
 
-/* Welding orders vertices by first appearance, so compare with the nearest vertex. */
+/* Return the vertex nearest to a position, and its distance. Loading reorders vertices, so they are
+ * compared by position. */
 static size_t nearest(const supine_mesh *mesh, const double position[3], double *distance) {
   size_t found = 0;
   *distance = INFINITY;
@@ -70,7 +71,8 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
       if (supine_mesh_load(path, NULL, &again, &report, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      /* One rounding to float32; assimp may round text once more; VTP has steps of 1/256 mm. */
+      /* Positions are rounded to float32; assimp may round text once more; VTP has steps of 1/256
+       * mm. */
       static const double tolerance[] = {64.0 * FLT_EPSILON, 512.0 * FLT_EPSILON,
                                          64.0 * FLT_EPSILON, 0.5 / 256.0};
       expect_same(&again, &mesh, tolerance[k]);
@@ -113,8 +115,8 @@ static const char *find(const unsigned char *bytes, size_t size, const char *tex
   return found + strlen(text);
 }
 
-/* One vertex is moved by (3, 4, 12) mm, 13 mm in total; in RAS it is (-3, -4, 12). */
-TEST(test_save_ply_displacement_rows) {
+/* The displacement of one vertex is (3, 4, 12) mm, 13 mm in length; in RAS it is (-3, -4, 12). */
+TEST(test_save_ply_displacement_in_each_row) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
   memcpy(rest, mesh.vertices, sizeof rest);
@@ -143,8 +145,7 @@ TEST(test_save_ply_displacement_rows) {
   supine_mesh_free(&mesh);
 }
 
-/* The expected error is in mm even if the file is in cm; it follows the displacement if there is
- * one. */
+/* The expected error is in mm even if the file is in cm. In each row it is the last value. */
 TEST(test_save_expected_error_stays_in_millimetres) {
   static const float errors[4] = {1.5F, 2.5F, 3.5F, 4.5F};
   supine_mesh mesh = sample_tetrahedron();
@@ -173,7 +174,7 @@ TEST(test_save_expected_error_stays_in_millimetres) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_save_stl_layout_and_normals) {
+TEST(test_save_stl_header_and_normals_literal) {
   supine_mesh mesh = sample_tetrahedron();
   const supine_mesh_save_options options = {
       .comment = "a comment that is far too long for the eighty bytes that a binary STL file has "
@@ -206,18 +207,19 @@ static uint64_t size_at(const unsigned char *bytes) {
   return value;
 }
 
-/* Decompress one array of one block, of at most 64 bytes; return the start of the next array. */
+/* Decompress an array of one block and at most 64 bytes, whose size is `expected`; return the start
+ * of the next array. */
 static const unsigned char *unpack(const unsigned char *at, unsigned char *array, size_t expected) {
   uLongf size = 64;
   assert_int_equal(size_at(at), 1);
-  assert_int_equal(size_at(at + 16), expected); /* of the last block, smaller than the others */
+  assert_int_equal(size_at(at + 16), expected); /* size of the last block */
   const size_t packed = size_at(at + 24);
   assert_int_equal(uncompress(array, &size, at + 32, packed), Z_OK);
   assert_int_equal(size, expected);
   return at + 32 + packed;
 }
 
-TEST(test_save_vtp_layout) {
+TEST(test_save_vtp_arrays_and_header_as_documented) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
   memcpy(rest, mesh.vertices, sizeof rest);
@@ -297,8 +299,9 @@ TEST(test_save_vtp_opens_in_vtk) {
   assert_int_equal(unlink(path), 0);
 }
 
-/* A series with an impossible path is refused, and one without commit leaves nothing. */
-TEST(test_series_impossible_or_uncommitted_leaves_nothing) {
+/* A series with an impossible path is refused, and a series that is not committed leaves no
+ * file. */
+TEST(test_series_impossible_or_uncommitted_leaves_no_file) {
   static const double times[2] = {0.0, 0.5};
   supine_mesh mesh = sample_tetrahedron();
   supine_mesh_series *series = NULL;
@@ -312,7 +315,8 @@ TEST(test_series_impossible_or_uncommitted_leaves_nothing) {
   supine_mesh_series_close(NULL);
 
   assert_int_equal(mkfifo(path, 0600), 0);
-  const int reader = open(path, O_RDONLY | O_NONBLOCK); /* so that a writer does not block */
+  /* With a reader, opening the FIFO for writing does not block. */
+  const int reader = open(path, O_RDONLY | O_NONBLOCK);
   assert_true(reader >= 0);
   assert_int_equal(supine_mesh_series_open(path, &mesh, NULL, 2, times, &series, &error),
                    SUPINE_ERROR_WRITE);
@@ -338,8 +342,9 @@ TEST(test_series_impossible_or_uncommitted_leaves_nothing) {
   supine_mesh_free(&mesh);
 }
 
-/* Axes and units apply to all arrays; lengths are rounded to a grid, in units of the file. */
-TEST(test_save_vtp_axes_units_and_rounding) {
+/* Axes and units apply to all arrays. Lengths are rounded to steps that are a power of two in the
+ * unit of the file. */
+TEST(test_save_vtp_axes_units_and_rounding_applied) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
   memcpy(rest, mesh.vertices, sizeof rest);
@@ -367,7 +372,7 @@ TEST(test_save_vtp_axes_units_and_rounding) {
   for (size_t i = 0; i < 6; ++i) {
     at = unpack(at, arrays[i], sizes[i]);
   }
-  static const double grid = 1.0 / 262144.0; /* m: the power of two below 1/256 mm */
+  static const double grid = 1.0 / 262144.0; /* m, the greatest power of two below 1/256 mm */
   for (size_t i = 0; i < 12; ++i) {
     const double sign = i % 3 == 2 ? 1.0 : -1.0;
     const double point = (double)float_at(arrays[0] + 4 * i);
@@ -383,7 +388,7 @@ TEST(test_save_vtp_axes_units_and_rounding) {
   assert_int_equal(unlink(path), 0);
 }
 
-TEST(test_save_unknown_ending_argument) {
+TEST(test_save_unknown_ending_refused) {
   static const char *const names[] = {"a.txt", "a", "a.ply.gz", "ply", ".ply/a"};
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -416,14 +421,14 @@ TEST(test_save_not_finite_mesh_no_file) {
   }
 }
 
-TEST(test_save_too_large_argument) {
+TEST(test_save_too_large_refused) {
   const supine_mesh mesh = {.vertex_count = (size_t)INT32_MAX + 1};
   char path[256];
   assert_int_equal(supine_mesh_save(sample_path(state, "a.ply", path), &mesh, NULL, NULL),
                    SUPINE_ERROR_ARGUMENT);
 }
 
-TEST(test_save_missing_folder_write) {
+TEST(test_save_missing_folder_reports_write_error) {
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof endings / sizeof *endings; ++i) {
     char name[64];
@@ -437,8 +442,8 @@ TEST(test_save_missing_folder_write) {
   supine_mesh_free(&mesh);
 }
 
-/* A link with a known ending to a device that is always full. */
-TEST(test_save_full_disk_write) {
+/* Writing through a link to a full device is reported. */
+TEST(test_save_full_disk_reports_write_error) {
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof endings / sizeof *endings; ++i) {
     char path[256];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Edges, components and genus of known surfaces. */
+/* Edges, components, genus and defects of known surfaces. */
 #include "mesh_samples.h"
 
 static supine_topology topology_of(const supine_mesh *mesh) {
@@ -8,7 +8,8 @@ static supine_topology topology_of(const supine_mesh *mesh) {
   return topology;
 }
 
-/* Assert V, E, F, components and genus of a closed surface. */
+/* Assert the numbers of vertices, edges, triangles and components and the genus of a closed
+ * surface; free it. */
 static void expect_closed(supine_mesh mesh, size_t vertices, size_t edges, size_t triangles,
                           size_t components, long genus) {
   supine_topology topology = topology_of(&mesh);
@@ -26,7 +27,7 @@ static void expect_closed(supine_mesh mesh, size_t vertices, size_t edges, size_
   supine_mesh_free(&mesh);
 }
 
-/* Make a torus: an `around` x `across` grid with both ends joined. */
+/* Make a torus from a grid of `around` x `across` vertices whose opposite sides are joined. */
 static supine_mesh make_torus(uint32_t around, uint32_t across) {
   supine_mesh mesh = sample_make(0, NULL, 0, NULL);
   supine_mesh_free(&mesh);
@@ -92,7 +93,7 @@ TEST(test_topology_open_sheet_boundary_counted) {
 }
 
 TEST(test_topology_two_tetrahedra_components_in_order) {
-  /* Vertices of the two components alternate. */
+  /* The vertices of the two components alternate. */
   static const double vertices[24] = {0};
   static const uint32_t triangles[] = {1, 5, 3, 1, 3, 7, 1, 7, 5, 3, 5, 7,
                                        0, 4, 2, 0, 2, 6, 0, 6, 4, 2, 4, 6};
@@ -108,8 +109,8 @@ TEST(test_topology_two_tetrahedra_components_in_order) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_topology_components_joined_late_one) {
-  /* A strip whose parts are joined by its last triangles only; the first vertex is used last. */
+TEST(test_topology_components_joined_late_count_as_one) {
+  /* Only the last triangles join the parts of a strip, and the last part is numbered first. */
   static const double vertices[27] = {0};
   static const uint32_t triangles[] = {8, 7, 6, 5, 4, 3, 2, 1, 0, 6, 5, 7, 3, 2, 4};
   supine_mesh mesh = sample_make(9, vertices, 5, triangles);
@@ -122,7 +123,7 @@ TEST(test_topology_components_joined_late_one) {
   supine_mesh_free(&mesh);
 }
 
-/* A closed surface whose two ends share a vertex: V - E + F is 1, so the genus is undefined. */
+/* A closed surface whose two ends share a vertex has V - E + F = 1, so its genus is undefined. */
 TEST(test_topology_pinched_in_a_vertex_no_genus) {
   static const double vertices[21] = {0};
   static const uint32_t triangles[] = {0, 2, 1, 0, 3, 2, 0, 1, 3, 1, 2, 5, 1, 5, 4, 2, 3, 6,
@@ -168,7 +169,7 @@ TEST(test_topology_flipped_triangle_inconsistent) {
 }
 
 TEST(test_topology_hub_of_many_edges_sorted) {
-  /* A disc with its hub at vertex 0 and its rim listed in strides. */
+  /* Make a disc around vertex 0, whose rim visits the other vertices in steps of 331. */
   enum { RIM = 997 };
   static double vertices[3 * (RIM + 1)];
   static uint32_t triangles[3 * RIM];
@@ -191,8 +192,8 @@ TEST(test_topology_hub_of_many_edges_sorted) {
 }
 
 TEST(test_topology_touching_tetrahedra_no_genus) {
-  /* Two closed surfaces that share a vertex: V - E + F = 7 - 12 + 8 = 3, impossible for one
-   * surface. */
+  /* Two closed surfaces that share a vertex have V - E + F = 7 - 12 + 8 = 3, which is impossible
+   * for one surface. */
   static const double vertices[21] = {0};
   static const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3,
                                        0, 5, 4, 0, 4, 6, 0, 6, 5, 4, 5, 6};
@@ -206,7 +207,7 @@ TEST(test_topology_touching_tetrahedra_no_genus) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_topology_illegal_triangles_argument) {
+TEST(test_topology_illegal_triangles_refused) {
   static const double vertices[9] = {0};
   static const uint32_t beyond[] = {0, 1, 3};
   static const uint32_t twice[] = {0, 1, 1};

@@ -1,12 +1,12 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# No command loses data: test_no_data_lost.sh PROGRAM [KILLS [SIGNALS]]
+# Check that no command loses data: test_no_data_lost.sh PROGRAM [KILLS [SIGNALS]]
 #
-# Check that an output that is also an input is refused under any name, that a missing folder is reported before
-# the inputs are read, and that a full disk, a size limit or a signal leaves no file: end each writer by each of the
-# SIGNALS (default KILL TERM INT) at KILLS (default 2) random moments.
+# An output that is also an input is refused under any name. A missing folder is reported before the inputs are read.
+# A full disk, a size limit or a signal leaves no file: each command that writes a file is ended by each of the SIGNALS
+# (default KILL TERM INT) at KILLS (default 2) random moments.
 set -u
-export SOURCE_DATE_EPOCH=0 # a report that is made again is the same, also past midnight
+export SOURCE_DATE_EPOCH=0 # so that a report made again is the same, even after midnight
 supine=$1
 kills=${2:-2}
 signals=${3:-KILL TERM INT}
@@ -27,7 +27,8 @@ fail() {
 awk 'BEGIN { print "name,x,y,z"; for (i = 0; i < 300; ++i) printf "p%d,%d,%d,%d\n", i, 60 + i % 50, i % 40, i % 60 }' >points.csv
 "$supine" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1 || exit 1
 
-# refused INPUT ENDING COMMAND...: run with -o and each name of the input; assert that the input is unchanged.
+# refused INPUT ENDING COMMAND...: run the command with -o and each name of its input, a copy of INPUT with this
+# ending; check that it is refused and the input unchanged.
 refused() {
   input=$1
   ending=$2
@@ -39,11 +40,11 @@ refused() {
     "$supine" "$@" -o "$name" >said 2>&1
     code=$?
     [ $code -eq 1 ] && grep -q 'is also an input' said || fail "$* -o $name: $code, $(cat said)"
-    cmp -s "before$ending" "input$ending" || fail "$* -o $name: the input is not what it was"
+    cmp -s "before$ending" "input$ending" || fail "$* -o $name: the input has changed"
   done
   rm -f "before$ending" "input$ending" "hard$ending" "soft$ending"
 }
-# Give the input the ending of each output, so that the command has no other reason to refuse it.
+# The input gets the ending of the output, so that the command has no other reason to refuse the output.
 refused lungs.ply .ply precompute input.ply
 refused lungs.ply .ply solve input.ply --posture prone
 refused lungs.safetensors .safetensors precompute lungs.ply --fields input.safetensors
@@ -60,7 +61,7 @@ refused points.csv .json fit --landmarks input.json
 refused lungs.ply .png validate lungs.safetensors --state prone:input.png
 printf 'seconds,w,x,y,z\n0,1,0,0,0\n' >poses.csv && cp poses.csv poses.before
 "$supine" stream lungs.safetensors --replay poses.csv --record poses.csv >said 2>&1
-[ $? -eq 1 ] && cmp -s poses.csv poses.before || fail "stream --record replaced what it replays: $(cat said)"
+[ $? -eq 1 ] && cmp -s poses.csv poses.before || fail "stream --record replaced the file that it replays: $(cat said)"
 "$supine" precompute lungs.ply -o basis.stl >said 2>&1
 [ $? -eq 1 ] && [ ! -e basis.stl ] || fail "a basis named .stl: $(cat said)"
 
@@ -73,9 +74,9 @@ mkdir far
 echo old >far/target.ply
 ln -s far/target.ply link.ply
 "$supine" deform lungs.safetensors --posture prone -o link.ply >/dev/null || fail "through a link"
-[ -L link.ply ] && [ "$(head -c 3 far/target.ply)" = ply ] || fail "the link did not stay"
+[ -L link.ply ] && [ "$(head -c 3 far/target.ply)" = ply ] || fail "the link was replaced"
 
-# writer NAME COMMAND...: run "COMMAND -o NAME" to its end once, then with limits and signals.
+# writer NAME COMMAND...: run "COMMAND -o NAME" once to its end, then with a size limit, a full disk and signals.
 writer() {
   name=$1
   shift
@@ -114,13 +115,13 @@ writer() {
       "") ;;
       "$name")
         done_whole=$((done_whole + 1))
-        cmp -s whole "out/$name" || fail "$*: SIG$signal at $moment s left part of it"
+        cmp -s whole "out/$name" || fail "$*: SIG$signal at $moment s left an incomplete file"
         ;;
       *) fail "$*: SIG$signal at $moment s left $(ls -A out)" ;;
       esac
       rm -rf out && mkdir out
     done
-    echo "$1: $kills times SIG$signal within $took ms: $done_whole whole, the others nothing"
+    echo "$1: $kills times SIG$signal within $took ms: $done_whole left a complete file, the others none"
   done
   rm -rf out whole
 }

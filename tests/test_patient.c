@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law from landmarks: held-out errors, recovery of known constants, and refused input.
- */
+/* A patient's law from landmarks: held-out errors, recovery of known constants, records, and
+ * refused input. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -14,7 +14,7 @@
 
 #include "lungs_helpers.h"
 
-/* Fit pairs as the command does. */
+/* Fit a law to pairs of points as `supine fit` does. */
 static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
                       supine_patient_scan_motion moved, supine_patient *patient,
                       supine_patient_fit_report *report) {
@@ -30,7 +30,7 @@ static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
   free(rows);
 }
 
-/* Draw points over two lungs, about 230 by 150 by 240 mm. */
+/* Draw random points in two lungs, in a box of about 230 x 150 x 240 mm. */
 static supine_patient_pairs scatter(size_t count, unsigned long seed) {
   supine_patient_pairs pairs = {count, malloc(3 * count * sizeof(double)),
                                 malloc(3 * count * sizeof(double)), NULL};
@@ -46,13 +46,13 @@ static supine_patient_pairs scatter(size_t count, unsigned long seed) {
   return pairs;
 }
 
-/* Compute the displacement of a point by a law; the midline decides its side. */
+/* Compute the displacement u of a point by a law, mm; the side of the midline selects the lung. */
 static void displace(const supine_patient *patient, const double point[3], double u[3]) {
   const supine_patient_place place = supine_patient_find(&patient->frame, point, 0.0);
   supine_patient_displacement(patient, &place, 1.0, u);
 }
 
-/* Move points by a law, and add noise to each coordinate. */
+/* Move points by a law, and add Gaussian noise of `noise` mm to each coordinate. */
 static void move(supine_patient_pairs *pairs, const supine_patient *truth, double noise,
                  unsigned long seed) {
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -90,12 +90,12 @@ static supine_patient_record record_of(const supine_patient *patient) {
   return record;
 }
 
-/* Held-out errors of the five public pairs are below those of the quadratic law of 220ee0d on the
- * same blocks, for both orders of the images and both reference states. */
+/* Held-out errors of five public pairs are below those of the quadratic law of commit 220ee0d on
+ * the same blocks, from either image. */
 TEST(test_fit_public_pairs_below_quadratic_law) {
   static const struct {
     const char *name;
-    double quadratic[2]; /* RMS held out, mm: from the inhaled image, from the exhaled one */
+    double quadratic[2]; /* held-out RMS, mm, from the inhaled and the exhaled image */
   } cases[] = {{"054", {3.01, 3.30}},
                {"055", {8.07, 9.83}},
                {"056", {3.83, 4.44}},
@@ -113,7 +113,7 @@ TEST(test_fit_public_pairs_below_quadratic_law) {
     (void)snprintf(path, sizeof path, "%s/landmarks/case%s_landmarks_mm.csv", SUPINE_TEST_DATA,
                    cases[c / 2].name);
     if (access(path, R_OK) != 0) {
-      printf("skipped: the landmarks are not there\n");
+      printf("skipped: the landmarks are missing\n");
       skip();
     }
     assert_int_equal(supine_patient_pairs_load(path, !exhaled, &pairs, &error), SUPINE_OK);
@@ -123,26 +123,26 @@ TEST(test_fit_public_pairs_below_quadratic_law) {
     const double *held = report.held_out;
     const double kept = held[SUPINE_PATIENT_SCORE_CORRECTED];
     printf("%s from %s: translation %.2f, affine %.2f, deep %.2f, with kriging %.2f mm, expected "
-           "%.2f, band %.1f %%, explained %.0f %%\n",
+           "%.2f mm, %.1f %% within the band, explained %.0f %%\n",
            cases[c / 2].name, exhaled ? "exhaled" : "inhaled",
            held[SUPINE_PATIENT_SCORE_TRANSLATION], held[SUPINE_PATIENT_SCORE_AFFINE],
            held[SUPINE_PATIENT_SCORE_LAW], kept, report.expected_point, report.band,
            report.explained);
     assert_true(kept < cases[c / 2].quadratic[exhaled]);
     assert_true(kept < held[SUPINE_PATIENT_SCORE_LAW] && kept < held[SUPINE_PATIENT_SCORE_AFFINE]);
-    /* Held-out errors are never below fitted ones. */
+    /* The held-out error is above that of the fitted points. */
     assert_true(kept > report.fitted[SUPINE_PATIENT_SCORE_CORRECTED]);
     assert_true(report.band > 87.0 && report.band < 99.0);
     mean[exhaled] += kept / 5.0;
     band += report.band / 10.0;
     supine_patient_pairs_free(&pairs);
   }
-  printf("mean: %.2f and %.2f mm, band %.1f %%\n", mean[0], mean[1], band);
+  printf("mean error: %.2f and %.2f mm, %.1f %% within the band\n", mean[0], mean[1], band);
   assert_true(mean[0] <= 5.25 && mean[1] <= 5.95);
   assert_true(band > 92.0 && band < 98.0);
 }
 
-/* At the fitted points the correction equals the prediction of the fit. */
+/* At the fitted points, the residual of the corrected law is the one that the fit reports. */
 TEST(test_correct_fitted_points_match_prediction) {
   supine_patient_pairs pairs = scatter(150, 8);
   supine_patient truth = known(&pairs);
@@ -150,7 +150,7 @@ TEST(test_correct_fitted_points_match_prediction) {
   supine_patient_fit_report report;
   double square = 0.0;
   move(&pairs, &truth, 0.4, 5);
-  for (size_t i = 0; i < pairs.count; ++i) { /* a motion outside the law */
+  for (size_t i = 0; i < pairs.count; ++i) { /* adds a motion that the law cannot describe */
     pairs.to[3 * i] += 6.0 * sin(pairs.from[3 * i + 2] / 30.0);
   }
   fit_pairs(&pairs, SUPINE_PATIENT_DEEP, SUPINE_PATIENT_RIGID, &found, &report);
@@ -172,7 +172,7 @@ TEST(test_correct_fitted_points_match_prediction) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* A point beyond the midline moves with the lung that it is assigned to. */
+/* A point beyond the midline moves with the lung to which it is assigned. */
 TEST(test_find_side_given_overrides_midline) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
@@ -182,12 +182,12 @@ TEST(test_find_side_given_overrides_midline) {
   assert_true(place.side == 1.0 && place.box[0] < 0.0);
   double u[3];
   supine_patient_displacement(&patient, &place, 1.0, u);
-  assert_true(u[0] == 0.0); /* it does not cross the fixed plane */
+  assert_true(u[0] == 0.0); /* its x does not change, as on the fixed plane */
   supine_patient_pairs_free(&pairs);
 }
 
-/* Points of the emptier state are mapped back to the fuller one. */
-TEST(test_points_to_fuller_moved_points_returned) {
+/* Points of the emptier state are mapped back to the fuller state. */
+TEST(test_points_to_fuller_moved_points_mapped_back) {
   supine_patient_pairs pairs = scatter(60, 12);
   supine_patient truth = known(&pairs);
   for (size_t k = 0; k < 3; ++k) {
@@ -215,9 +215,11 @@ TEST(test_fit_noisy_landmarks_recover_constants) {
   move(&pairs, &truth, 0.5, 917);
   fit_pairs(&pairs, SUPINE_PATIENT_PAPER, SUPINE_PATIENT_STILL, &found, &report);
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
-    printf("c%zu %8.4f found %8.4f +- %.4f\n", k + 1, expected[k], c[k], report.error[k]);
+    printf("c%zu: true value %8.4f, found %8.4f +- %.4f\n", k + 1, expected[k], c[k],
+           report.error[k]);
     assert_true(fabs(c[k] - expected[k]) <= 3.0 * report.error[k]);
-    assert_true(report.error[k] < 0.2 * (1.0 + fabs(expected[k]))); /* and not trivially large */
+    /* The stated errors are small, too. */
+    assert_true(report.error[k] < 0.2 * (1.0 + fabs(expected[k])));
   }
   double worst = 0.0;
   for (size_t i = 0; i < pairs.count; ++i) {
@@ -227,12 +229,12 @@ TEST(test_fit_noisy_landmarks_recover_constants) {
     displace(&found, pairs.from + 3 * i, v);
     worst = fmax(worst, hypot(hypot(u[0] - v[0], u[1] - v[1]), u[2] - v[2]));
   }
-  assert_true(worst < 0.5); /* no error exceeds that of one measurement */
+  assert_true(worst < 0.5); /* mm, the noise of one measurement */
   supine_patient_pairs_free(&pairs);
 }
 
-/* Each entry of a row is the derivative of its displacement by one unknown: compare with small
- * differences. */
+/* The entries of a row are the derivatives of its displacement by the unknowns, compared here with
+ * difference quotients. */
 TEST(test_power_design_each_unknown_matches_difference) {
   supine_patient_pairs pairs = scatter(20, 3);
   const supine_patient truth = known(&pairs);
@@ -282,7 +284,7 @@ TEST(test_fit_motion_between_scans_separated_from_law) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* --- what is refused ------------------------------------------------------------------------- */
+/* --- refused input --------------------------------------------------------------------------- */
 
 static supine_status check(const supine_patient_pairs *pairs, bool moved, char *message) {
   supine_error error = {0};
@@ -295,7 +297,7 @@ static void refused(const supine_patient_pairs *pairs, bool moved, const char *w
   char message[sizeof((supine_error *)0)->message];
   assert_int_equal(check(pairs, moved, message), SUPINE_ERROR_FORMAT);
   if (strstr(message, words) == NULL) {
-    fail_msg("'%s' does not say '%s'", message, words);
+    fail_msg("the message '%s' lacks '%s'", message, words);
   }
 }
 
@@ -310,11 +312,11 @@ TEST(test_pairs_check_impossible_pairs_refused) {
   pairs.count = 11;
   refused(&pairs, false, "pairs of points: 11, where a law needs at least 12");
   pairs.count = n;
-  for (size_t i = 0; i < n; ++i) { /* one axis reversed in one of the two */
+  for (size_t i = 0; i < n; ++i) { /* reverses one axis of the second points */
     pairs.to[3 * i] *= -1.0;
   }
   refused(&pairs, false, "differ by a reflection");
-  for (size_t i = 0; i < n; ++i) { /* one file in RAS, the other in LPS */
+  for (size_t i = 0; i < n; ++i) { /* rotates the second points, as from RAS to LPS */
     pairs.to[3 * i + 1] *= -1.0;
   }
   refused(&pairs, true, "by a rotation of 1");
@@ -323,7 +325,7 @@ TEST(test_pairs_check_impossible_pairs_refused) {
     pairs.to[i] += 150.0;
   }
   refused(&pairs, false, "mm apart");
-  assert_int_equal(check(&pairs, true, message), SUPINE_OK); /* --translation fits it */
+  assert_int_equal(check(&pairs, true, message), SUPINE_OK); /* a shift that --translation fits */
   for (size_t i = 0; i < 3 * n; ++i) {
     pairs.to[i] = 0.1 * pairs.from[i];
   }
@@ -334,7 +336,7 @@ TEST(test_pairs_check_impossible_pairs_refused) {
     pairs.to[3 * i + 2] += 5.0;
   }
   refused(&pairs, true, "give a state in which the lungs have moved");
-  for (size_t i = 0; i < n; ++i) { /* each point has the partner of another */
+  for (size_t i = 0; i < n; ++i) { /* exchanges the partners of points */
     memcpy(pairs.to + 3 * i, pairs.from + 3 * ((i * 7 + 3) % n), 3 * sizeof(double));
   }
   refused(&pairs, false, "do not match");
@@ -371,7 +373,7 @@ TEST(test_pairs_load_bad_files_message_names_fault) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     assert_int_equal(load_text(bad[i].text, false, &pairs, &error), SUPINE_ERROR_FORMAT);
     if (strstr(error.message, bad[i].words) == NULL) {
-      fail_msg("'%s' does not say '%s'", error.message, bad[i].words);
+      fail_msg("the message '%s' lacks '%s'", error.message, bad[i].words);
     }
     assert_null(pairs.from);
   }
@@ -379,13 +381,13 @@ TEST(test_pairs_load_bad_files_message_names_fault) {
                    SUPINE_ERROR_READ);
 }
 
-TEST(test_pairs_load_either_order_from_rest) {
+TEST(test_pairs_load_either_order_starts_at_rest) {
   static const char images[] = "im1_x,im1_y,im1_z,im2_x,im2_y,im2_z\n1,2,3,4,5,6\n";
   static const char plain[] = "x,y,z,to_x,to_y,to_z\n1,2,3,4,5,6\n";
   supine_patient_pairs pairs = {0};
   supine_error error;
   for (int reverse = 0; reverse < 2; ++reverse) {
-    for (int file = 0; file < 2; ++file) { /* image 1 is inhaled: rest is image 2 */
+    for (int file = 0; file < 2; ++file) { /* image 1 is inhaled, so rest is image 2 */
       assert_int_equal(load_text(file == 0 ? plain : images, reverse == 1, &pairs, &error),
                        SUPINE_OK);
       assert_int_equal((int)pairs.count, 1);
@@ -414,7 +416,7 @@ TEST(test_fit_fewer_points_than_unknowns_refused) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* --- patient.json and what it makes of a surface --------------------------------------------- */
+/* --- patient.json, and the model of a surface from it ---------------------------------------- */
 
 TEST(test_record_written_and_read_same) {
   static const char path[] = "test_patient_record.json";
@@ -451,7 +453,7 @@ TEST(test_record_written_and_read_same) {
   assert_memory_equal(before.report.error, after.report.error, sizeof before.report.error);
   assert_true(after.report.baseline == 10.5 && after.report.points == 300);
   assert_true(after.expand.fitted[0] == 0.75 && after.applied.blocks == 0.0);
-  /* A missing part is named. */
+  /* The message about a missing part names it. */
   static const char *const parts[] = {"frame",      "law",     "force",         "fuller",
                                       "emptier",    "motion",  "format",        "centres",
                                       "correction", "version", "emptier_frame", "c1_to_c9"};
@@ -476,8 +478,9 @@ TEST(test_record_written_and_read_same) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* The share at rest follows from the two states, and a scan in one of them needs no option. */
-TEST(test_scan_fitted_states_need_no_option) {
+/* The volume at rest follows from the two fitted states, and a scan in one of them needs no
+ * option. */
+TEST(test_scan_fitted_states_known_without_option) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   supine_patient_record record = record_of(&patient);
@@ -491,10 +494,10 @@ TEST(test_scan_fitted_states_need_no_option) {
   assert_true(scan.known && scan.state.volume.kind == SUPINE_VOLUME_REST);
   double gains[2][3];
   supine_patient_path(&record, gains);
-  for (size_t k = 0; k < 3; ++k) { /* at full inflation */
+  for (size_t k = 0; k < 3; ++k) { /* gains at full inflation are 0, at rest 1 */
     assert_true(gains[0][k] == 0.0 && fabs(gains[1][k] - 1.0) < 1e-12);
   }
-  /* Half a litre above rest: the default share gives full inflation. */
+  /* A state half a litre above rest: full inflation follows from the default share at rest. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_REST, 500.0};
   record.volume[0] = 2910.25;
   resting = supine_reference_resting_default();
@@ -510,7 +513,7 @@ TEST(test_scan_fitted_states_need_no_option) {
   for (size_t k = 0; k < 3; ++k) {
     assert_true(fabs(gains[0][k] - expected[k]) < 1e-9 && fabs(gains[1][k] - 1.0) < 1e-12);
   }
-  /* Volumes alone do not define rest. */
+  /* Two volumes without a reference do not define rest. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2910.25};
   record.state[1].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 2410.25};
   assert_false(supine_patient_scan(&record, 1, 2410.25, &resting).known);
@@ -538,7 +541,8 @@ TEST(test_law_force_centre_in_fitted_posture_is_one) {
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* The deep law written as nine constants keeps its force: base 0.9 and -0.2 along y. */
+  /* The deep law, written as nine constants, keeps its force: base 0.9, and -0.2 along y of the
+   * box. */
   const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   const supine_force_law deep = supine_patient_force(&shape, 0.4, postures[0]);
   assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);
@@ -546,8 +550,8 @@ TEST(test_law_force_centre_in_fitted_posture_is_one) {
 }
 
 /* Known gains, and a volume for each lung, are recovered from a third scan, prone or upright,
- * within three standard errors; one in the same posture does not determine them. */
-TEST(test_gain_third_scan_recovers_it) {
+ * within three standard errors; a scan in the same posture does not determine them. */
+TEST(test_gain_third_scan_recovers_gain) {
   static const double postures[2][3] = {{0.0, -1.0, 0.0}, {0.0, 0.0, -1.0}};
   static const double gains[2] = {0.23, 0.71};
   supine_patient_pairs pairs = scatter(200, 55);
@@ -570,7 +574,8 @@ TEST(test_gain_third_scan_recovers_it) {
       const supine_patient_place at = supine_patient_find(&patient.frame, pairs.from + 3 * i, 0.0);
       const double *b = at.box;
       const double fixed = law.base + law.box[0] * b[0] + law.box[1] * b[1] + law.box[2] * b[2];
-      const double then = fixed + gain * (1.0 - b[1]); /* supine */
+      /* The force in the posture of the fit, supine, then that in the other posture. */
+      const double then = fixed + gain * (1.0 - b[1]);
       const double now = fixed + gain * (c % 2 == 0 ? b[1] : b[2]);
       displace(&patient, pairs.from + 3 * i, u);
       for (size_t k = 0; k < 3; ++k) {
@@ -583,9 +588,10 @@ TEST(test_gain_third_scan_recovers_it) {
     assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, moved, other, &error),
                      SUPINE_OK);
     supine_patient_gain_set(&record);
-    printf("gain %.2f found %.3f +- %.3f, scales %.3f %.3f, residual %.2f mm, %.2f without\n", gain,
-           record.force.gain, record.gain_error, other->scale[0], other->scale[1], other->residual,
-           other->residual_without_gain);
+    printf("gain: true value %.2f, found %.3f +- %.3f; scales %.3f %.3f, residual %.2f mm, %.2f mm "
+           "without the gain\n",
+           gain, record.force.gain, record.gain_error, other->scale[0], other->scale[1],
+           other->residual, other->residual_without_gain);
     assert_false(record.gain_undetermined);
     assert_true(fabs(record.force.gain - gain) <= 3.0 * record.gain_error);
     assert_true(record.gain_error < 0.1);
@@ -595,7 +601,7 @@ TEST(test_gain_third_scan_recovers_it) {
                 other->residual < other->residual_without_gain);
   }
   gsl_rng_free(random);
-  /* A scan in the fitted posture: the gain stays. */
+  /* A scan in the fitted posture leaves the gain as it was. */
   const double kept = record.force.gain;
   memcpy(other->state.gravity, record.state[1].gravity, sizeof other->state.gravity);
   assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, false, other, &error),
@@ -606,12 +612,12 @@ TEST(test_gain_third_scan_recovers_it) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* Each map recovers motions within its class, and no others: literal maps and distances. */
-TEST(test_maps_fit_motions_of_their_class_explained) {
+/* Each map explains the motions of its class, and no others. */
+TEST(test_maps_fit_explains_motions_of_each_class) {
   supine_patient_pairs pairs = scatter(80, 21);
   supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT];
   supine_error error;
-  static const double turned[3][3] = {/* by about 10 degrees about z, times 1.1 */
+  static const double turned[3][3] = {/* a rotation by 10 degrees about z, times 1.1 */
                                       {1.08329, -0.19101, 0.0},
                                       {0.19101, 1.08329, 0.0},
                                       {0.0, 0.0, 1.1}};
@@ -639,12 +645,12 @@ TEST(test_maps_fit_motions_of_their_class_explained) {
       supine_command_compare_points(&pairs, pairs.from, SUPINE_PATIENT_STILL, distance, &error),
       SUPINE_OK);
   assert_true(distance[SUPINE_PATIENT_MAP_AFFINE].largest < 1e-9 * none);
-  /* The prediction of no motion scores 0. */
+  /* A prediction of no motion explains nothing. */
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 0.0);
-  /* Only the rigid motion between scans is removed from the prediction. */
+  /* From a wrong prediction, only the rigid motion between scans is removed. */
   double *turned_by = malloc(3 * pairs.count * sizeof *turned_by);
-  for (size_t i = 0; i < pairs.count; ++i) { /* a quarter turn about z, and a shift */
+  for (size_t i = 0; i < pairs.count; ++i) { /* a rotation by 90 degrees about z, and a shift */
     turned_by[3 * i] = -pairs.to[3 * i + 1] + 40.0;
     turned_by[3 * i + 1] = pairs.to[3 * i];
     turned_by[3 * i + 2] = pairs.to[3 * i + 2] - 7.0;

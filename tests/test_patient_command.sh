@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Fit a patient's law and use it: test_patient_command.sh PROGRAM
 #
-# Lungs are moved by a known law. fit recovers it from surfaces and from landmarks, precompute makes a basis
-# with it, and validate compares the basis with other states of the person. Bad input is refused.
+# Synthetic lungs are moved by a known law. `supine fit` recovers the law from surfaces and from landmarks,
+# `precompute` makes a basis with it, and `validate` compares the basis with other states of the person. Bad input is
+# refused.
 set -u
 supine=$1
 work=$(mktemp -d) || exit 1
@@ -13,24 +14,29 @@ fail() {
   echo "FAILED: $*"
   exit 1
 }
-number() { # KEY FILE [N]: the Nth number of that key
+# number KEY FILE [N]: print the Nth (default first) number with this key in a JSON file.
+number() {
   sed -n "s/^ *\"$1\": \(-*[0-9.e+-]*\),*\$/\1/p" "$2" | sed -n "${3:-1}p"
 }
-near() { # A B TOLERANCE
+# near A B TOLERANCE: succeed if A and B differ by less than the tolerance.
+near() {
   awk -v a="$1" -v b="$2" -v t="$3" 'BEGIN { exit !(a != "" && b != "" && a - b < t && b - a < t) }'
 }
 
-vertices() { # FILE: x y z of its vertices
+# vertices FILE: print x,y,z of the vertices of an OBJ file.
+vertices() {
   awk '/^v / { print $2 "," $3 "," $4 }' "$1"
 }
-pairs() { # FROM TO NAME: every 101st vertex of two OBJ files, as landmarks
+# pairs FROM TO NAME: write NAME.csv with every 101st vertex of two OBJ files as landmarks.
+pairs() {
   {
     echo x,y,z,to_x,to_y,to_z
     vertices "$1.obj" >from.csv
     vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 101 == 1'
   } >"$3.csv"
 }
-surfaces() { # FILE: what validate says of its first state, mm RMS
+# surfaces FILE: print the distance of the surfaces in the first state of `validate`, mm RMS.
+surfaces() {
   number rms_mm "$1"
 }
 
@@ -52,16 +58,17 @@ pairs p_supine_full p_supine_rest empty
 pairs p_supine_rest p_prone_rest prone
 pairs p_supine_full p_prone_rest down
 
-# A gain of 0.70 is recovered for either order of the two states, and the basis of the scan at rest reaches
+# The gain of 0.70 is recovered for either order of the two states, and the basis of the scan at rest reaches
 # the true prone surface.
-turns() { # NAME ARGUMENTS of fit
+# turns NAME ARGUMENTS...: fit with these arguments, and check the gain and the prone surface.
+turns() {
   name=$1
   shift
   "$supine" fit "$@" --name somebody -o "$name.json" >fit.txt || fail "fit $name"
   near "$(number gain "$name.json")" 0.70 0.05 || fail "$name: $(grep gain fit.txt)"
   "$supine" precompute p_supine_rest.ply --patient "$name.json" -o "$name.safetensors" \
     >out 2>note || fail "precompute $name: $(cat note)"
-  grep -q 'assumed to be the emptier of the two' note || fail "the scan's state is not told"
+  grep -q 'assumed to be the emptier of the two' note || fail "the assumed state of the scan is not stated"
   "$supine" validate "$name.safetensors" --from supine:rest --state prone:rest:p_prone_rest.ply \
     --json >valid.json || fail "validate $name"
   near "$(surfaces valid.json)" 0 1 || fail "$name: prone off by $(surfaces valid.json) mm"
@@ -74,15 +81,17 @@ turns backwards p_supine_full.ply p_supine_rest.ply --rest supine:full --other s
 turns points --landmarks full.csv --other supine:full --state prone:rest:prone.csv
 turns reversed --landmarks empty.csv --rest supine:full --other supine:rest \
   --state prone:rest:down.csv
-grep -q 'state *supine:full' fit.txt || fail "states are not told: $(cat fit.txt)"
+grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat fit.txt)"
 "$supine" info points.safetensors | grep -q 'patient *somebody: deep law.* held-out residual' ||
-  fail "info does not say whose: $("$supine" info points.safetensors)"
+  fail "info does not name the patient: $("$supine" info points.safetensors)"
 "$supine" info points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
   fail "info does not state the fit's error"
 
 # With default options and two meshes, the basis of either scan reaches the other within 0.2 mm RMS, and
 # within 0.6 mm at four times the volume between them.
-chain() { # SCAN STATE ALLOWED...: a basis of the scan against other states
+# chain SCAN [VOLUME MESH ALLOWED]...: make a basis of the scan, and check its distance in mm RMS from a mesh at each
+# volume.
+chain() {
   scan=$1
   shift
   "$supine" precompute "$scan.ply" --patient surface.json -o surface.safetensors >out 2>&1 ||
@@ -104,19 +113,19 @@ for meshes in 'p q' 'q p'; do
 done
 "$supine" fit p_supine_rest.ply q_supine_full.ply --other supine:full -o surface.json >fit.txt ||
   fail "fit two meshings"
-grep -q 'scans in one posture do not determine' fit.txt || fail "a gain out of nothing"
+grep -q 'scans in one posture do not determine' fit.txt || fail "a gain is fitted to one posture"
 chain p_supine_rest full q 0.2 rest+2000 q 0.2
 chain q_supine_full rest p 0.2 rest+2000 p 0.2
 "$supine" validate surface.safetensors --state q_supine_full.ply --json >valid.json ||
   fail "validate where nothing moved"
-grep -q '"explained_percent": null' valid.json || fail "explained of nothing"
+grep -q '"explained_percent": null' valid.json || fail "a share is explained where nothing moved"
 
-# A scan at rest without its volume contradicts the assumed rest volume.
+# A scan given as at rest gives a warning if it holds too much gas.
 "$supine" fit p_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
   fail "fit a fuller rest"
 grep -q 'at rest the lungs hold 51 % of full inflation' note || fail "no warning: $(cat note)"
 
-# Unknown states are refused.
+# If fit knows only absolute volumes, states relative to rest or full inflation are refused.
 "$supine" fit p_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \
   >fit.txt || fail "fit volumes alone"
 "$supine" precompute p_supine_rest.ply --patient known.json -o known.safetensors >out 2>&1 &&
@@ -132,14 +141,14 @@ done
   fail "validate volumes alone"
 near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json) mm"
 
-# A state in the same posture does not determine the gain.
+# A further state does not determine the gain if its posture is the same, or if the lungs did not move.
 "$supine" fit --landmarks full.csv --other supine:full --state prone:rest:full.csv -o x.json \
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
 "$supine" fit p_supine_rest.ply p_supine_full.ply --other supine:full \
   --state prone:rest:p_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
 grep -q 'gain from.*other postures do not' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
 
-# A stiff region is recovered and used in the basis, which reaches the other state.
+# A stiff region is recovered, and a basis with it reaches the other state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
 "$supine" solve rest.ply --posture supine --scanned none --reach 10 --base 0.9 --gain 0.4 --box-force 0,-0.2,0 \
   --constants 5,2.2,9,1.1,20,1.4 --volume scan-1000 --lesion 97,-135,-190,65,3 -o stiff.ply >/dev/null ||
@@ -153,11 +162,11 @@ near "$(number left_rms stiff.json)" 0 0.035 || fail "the force: $(cat fit.txt)"
 "$supine" precompute rest.ply --patient stiff.json -o stiff.safetensors >/dev/null 2>&1 ||
   fail "precompute with stiffness"
 "$supine" validate stiff.safetensors --state stiff.ply --json >valid.json || fail "validate stiff"
-near "$(number explained_percent valid.json)" 100 2 || # regions are not of the lesion's shape
+near "$(number explained_percent valid.json)" 100 2 || # not exactly, as regions do not have the shape of the lesion
   fail "stiff: $(number explained_percent valid.json) % explained"
 
-# Several states, from one that is not the basis's surface: the basis predicts states that it made itself,
-# scales are nearly linear in volume, and the picture shows small errors.
+# Validate with several states, measured from a state other than the scan. The basis made the states itself, so it
+# predicts them, and its scale is nearly linear in volume. A picture of the errors is written.
 "$supine" precompute rest.ply --band 3 -o full.safetensors >/dev/null || fail "precompute"
 "$supine" deform full.safetensors --posture supine --volume rest -o scan.ply >/dev/null ||
   fail "deform to rest"
@@ -176,14 +185,14 @@ done
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
   --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest -o errors.png --json >valid.json
 code=$?
-[ $code -eq 0 ] || [ $code -eq 3 ] || fail "validate several: $code" # 3: nothing here can draw
+[ $code -eq 0 ] || [ $code -eq 3 ] || fail "validate several: $code" # 3: drawing is not available
 if [ $code -eq 0 ]; then
   [ "$(head -c 8 errors.png | od -An -tx1 | tr -d ' ')" = 89504e470d0a1a0a ] || fail "no PNG"
 fi
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
   --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest --json >valid.json ||
   fail "validate several"
-for state in 1 5 9 13; do # predicted; "none" comes next
+for state in 1 5 9 13; do # index of the error of a prediction; the error without motion follows it
   near "$(number rms_mm valid.json $state)" 0 0.01 || fail "state $state is not predicted"
   near "$(number rms_mm valid.json $((state + 1)))" 0 0.5 && fail "state $state did not move"
 done
@@ -197,7 +206,7 @@ near "$(number nearest_scale valid.json 2)" "$(number scale valid.json 2)" 0.001
   >valid.json || fail "validate from another state"
 near "$(number volume_ml valid.json)" -500 1 || fail "from: $(number volume_ml valid.json)"
 
-# With a basis without a patient's law, points move with the displacement of its surface.
+# In a basis without a patient's law, landmarks move with the surface.
 for posture in supine prone; do
   "$supine" deform scanned.safetensors --posture $posture --volume rest -o $posture.obj >/dev/null ||
     fail "deform to OBJ"
@@ -212,23 +221,23 @@ done
 near "$(number rms_mm valid.json)" 0 0.01 || fail "points are $(number rms_mm valid.json) mm off"
 near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
 
-# A shift between the scans is estimated if requested.
+# A shift between the scans is removed only if --translation asks for it.
 awk '/^v / { print $1, $2 + 12, $3 - 5, $4 + 7; next } { print }' p_supine_full.obj >shifted.obj
 "$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj \
   --translation --json >valid.json || fail "validate a shift"
 near "$(surfaces valid.json)" 0 1 || fail "shift: $(surfaces valid.json) mm"
 "$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj --json \
   >valid.json || fail "validate without a shift"
-near "$(surfaces valid.json)" 0 3 && fail "a shift was taken out unasked"
-# Half a breath in the same posture.
+near "$(surfaces valid.json)" 0 3 && fail "a shift was removed without --translation"
+# A further state of half a breath in the same posture gets about half the scale.
 "$supine" deform p.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
   fail deform
 "$supine" fit p_supine_rest.ply p_supine_full.ply --state supine:half.ply --other supine:full \
   --law paper >fit.txt || fail "fit half a breath"
 grep -q 'supine  *0.[45]' fit.txt || fail "half a breath: $(grep -A2 further fit.txt)"
 
-# Refused input and its exit codes.
-refused() { # CODE WORDS COMMAND...
+# refused CODE WORDS COMMAND...: check that the command ends with this code and that its output has these words.
+refused() {
   code=$1
   words=$2
   shift 2

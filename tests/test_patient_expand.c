@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability from motion: a lesion and a gradient are recovered from a surface with another mesh
- * and noise, and uniform tissue stays uniform. */
+/* Expandability from motion: a lesion and a gradient are recovered from a surface of another mesh
+ * with noise, and uniform tissue is found uniform. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -37,7 +37,8 @@ static double *gradient_of(const supine_lungs *lungs, const supine_expandability
   return e;
 }
 
-/* Return the vertices moved by the true law with this stiffness, with noise on every coordinate. */
+/* Return the vertices moved by the true law with stiffness e [N], with noise of `noise` mm on every
+ * coordinate (malloc). */
 static double *moved_by_truth(const supine_lungs *lungs, const double *e, double noise) {
   supine_model model = truth();
   supine_solution solution = {0};
@@ -57,8 +58,8 @@ static double *moved_by_truth(const supine_lungs *lungs, const double *e, double
   return positions;
 }
 
-/* Return the ratio of the stiffness in a lesion's core, within half its radius, to that outside it,
- * from means of log E. */
+/* Return the stiffness found within half the radius of a lesion relative to that outside the
+ * lesion, from means of log E. */
 static double contrast(const supine_lungs *lungs, const supine_patient_stiffness *found,
                        const supine_lesion *lesion) {
   const size_t n = lungs->mesh.vertex_count;
@@ -80,8 +81,8 @@ static double contrast(const supine_lungs *lungs, const supine_patient_stiffness
   return exp(sum[1] / count[1] - sum[0] / count[0]);
 }
 
-/* Fit the lungs at rest to others of the same shape, moved by the true law with stiffness e; free
- * e. */
+/* Fit the lungs at rest to lungs of the same shape that are moved by the true law with stiffness e;
+ * free e. */
 static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, double *e,
                        supine_patient_record *found) {
   supine_mesh state = other->mesh;
@@ -93,7 +94,7 @@ static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, doub
       SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  printf("fitted %.3f and %.3f mm without and with, held out %.3f and %.3f\n",
+  printf("error without and with regions: fitted %.3f and %.3f mm, held out %.3f and %.3f mm\n",
          found->expand.fitted[0], found->expand.fitted[1], found->expand.held_out[0],
          found->expand.held_out[1]);
   assert_true(found->expand.tried);
@@ -111,11 +112,11 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   static supine_patient_record found;
   fit(rest, other, lesion, &found);
   const double times = contrast(rest, &found.stiffness, lesion);
-  printf("%.2f times as stiff, %.0f in truth\n", times, lesion->factor);
+  printf("lesion found %.2f times as stiff, true value %.0f\n", times, lesion->factor);
   assert_true(fabs(times / lesion->factor - 1.0) < 0.2);
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.5 * found.expand.held_out[0]);
-  /* The held-out error is that of the final fit with its regions. */
+  /* The reported held-out error is that of the final fit, with its regions. */
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
@@ -131,7 +132,8 @@ TEST(test_fit_lesion_of_real_lung_recovered) {
   supine_lungs_free(&other);
 }
 
-/* Synthetic lungs for both: different vertices, but the same shape to 0.2 mm. */
+/* Make synthetic lungs of this number of vertices; the shape is the same for any number within 0.2
+ * mm. */
 static void made(size_t vertices, supine_lungs *lungs) {
   supine_mesh mesh = {0};
   supine_error error;
@@ -165,8 +167,8 @@ TEST(test_fit_uniform_lungs_no_stiffness_kept) {
   supine_lungs_free(&other);
 }
 
-/* Lungs moved by the true law, with an expandability that triples from apex to base: the visible
- * part of it is recovered. */
+/* Check that an expandability that triples from apex to base is recovered where the motion shows
+ * it. */
 static void check_gradient(const supine_lungs *rest, const supine_lungs *other) {
   const supine_expandability_law law = {SUPINE_EXPANDABILITY_LINEAR, 2, 0.5, 1.5};
   const size_t n = rest->mesh.vertex_count;
@@ -198,8 +200,9 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
       close += fabs(miss) < log(1.15);
     }
   }
-  printf("%.0f of %zu regions unseen; E within 15 %% at %.0f %% of what is seen (%.0f %%), %.0f %% "
-         "RMS\n",
+  printf("%.0f of %zu regions unseen; E within 15 %% at %.0f %% of the seen vertices (%.0f %% of "
+         "all), "
+         "error %.0f %% RMS\n",
          found.expand.unseen, found.stiffness.count, 100.0 * (double)close / (double)seen,
          100.0 * (double)seen / (double)n, 100.0 * sqrt(squares / (double)seen));
   assert_true(seen > n / 2);

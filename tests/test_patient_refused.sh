@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Check the messages and exit codes of 'supine fit' for refused input: test_patient_refused.sh PROGRAM
 #
-# Landmarks and surfaces in different frames, units or sides, without overlap, mirrored, shuffled,
-# too few, or NaN.
+# Landmarks and surfaces are refused if they are in different frames, units or sides, without overlap, mirrored,
+# shuffled, too few, or not numbers.
 set -u
 supine=$1
 work=$(mktemp -d) || exit 1
@@ -13,7 +13,8 @@ fail() {
   echo "FAILED: $*"
   exit 1
 }
-refused() { # CODE WORDS ARGUMENTS of fit
+# refused CODE WORDS ARGUMENTS...: check that `fit` ends with this code, its output has these words, and no file is left.
+refused() {
   code=$1
   words=$2
   shift 2
@@ -24,7 +25,7 @@ refused() { # CODE WORDS ARGUMENTS of fit
   [ ! -e law.json ] || fail "fit $* left a file"
 }
 
-# Landmarks: sixty points over two lungs, moved as by a breath.
+# Landmarks: sixty points in two lungs, moved as by a breath.
 awk 'BEGIN {
   srand(11)
   print "x,y,z,to_x,to_y,to_z"
@@ -36,7 +37,8 @@ awk 'BEGIN {
   }
 }' >good.csv
 "$supine" fit --landmarks good.csv -o good.json >/dev/null || fail "good landmarks"
-changed() { # WHAT AWK: good.csv with each row changed
+# changed NAME AWK: write NAME.csv from good.csv with each row changed by an awk statement.
+changed() {
   awk -F, -v OFS=, "NR == 1 { print; next } { $2; print }" good.csv >"$1.csv"
 }
 changed apart '$4 += 150; $5 += 150; $6 += 150'
@@ -79,9 +81,10 @@ refused 2 'No such file' --landmarks absent.csv
 refused 1 'nothing to fit to' --name nobody
 refused 1 'give --translation or --rigid, not both' --landmarks good.csv --translation --rigid
 
-# Surfaces: synthetic lungs, one file each, and the same after a breath.
+# Surfaces: synthetic lungs, one in each file, and the same lungs after a breath.
 "$supine" phantom -o pair.obj --vertices 700 >/dev/null || fail phantom
-half() { # NAME FIRST|SECOND: one lung of the pair
+# half NAME 0|1: write NAME.obj with the first or the second lung of the pair.
+half() {
   awk -v second="$2" '/^v / { v[++n] = $0 } /^f / { f[++m] = $0 }
     END {
       for (i = 1; i <= n / 2; ++i) { print v[second * n / 2 + i] }
@@ -93,7 +96,8 @@ half() { # NAME FIRST|SECOND: one lung of the pair
 }
 half rest 0
 half other 1
-moved() { # NAME AWK: the lung with its vertices changed
+# moved NAME AWK: write NAME.obj from rest.obj with each vertex changed by an awk statement.
+moved() {
   awk "/^v / { x = \$2; y = \$3; z = \$4; $2; print \"v\", x, y, z; next } { print }" rest.obj >"$1.obj"
 }
 moved state 'y *= 1.05; z *= 1.08'
@@ -109,7 +113,8 @@ moved turned 'x = -x; y = -y'
 refused 2 'do not overlap along' rest.obj turned.obj
 moved left 'x = -x'
 refused 2 'do not overlap along x' rest.obj left.obj
-changed_pair() { # NAME AWK: both lungs with their vertices changed
+# changed_pair NAME AWK: write NAME.obj from pair.obj with each vertex changed by an awk statement.
+changed_pair() {
   awk "/^v / { x = \$2; y = \$3; z = \$4; $2; print \"v\", x, y, z; next } { print }" pair.obj >"$1.obj"
 }
 changed_pair breath 'y *= 1.05; z *= 1.08'

@@ -17,7 +17,8 @@
 
 static const supine_patient_pairs no_landmarks;
 
-/* Return the vertices moved by the true law, [N, 3]. */
+/* Return the vertices moved by the true law, [N, 3] (malloc), and set the largest displacement,
+ * mm. */
 static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   const supine_model model = truth();
   supine_solution solution = {0};
@@ -31,7 +32,7 @@ static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   return positions;
 }
 
-TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
+TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -59,7 +60,7 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   }
   const supine_patient patient = fit.patient;
   const supine_patient_surface_report surface = fit.surface;
-  /* The basis counts from the emptier state, so the scale has the opposite sign. */
+  /* The scale is -1, as the model measures displacement from the emptier state. */
   supine_patient_record record = {.patient = patient, .from_surface = true};
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
@@ -78,21 +79,22 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
     square += pow(positions[i] - expected[i], 2.0) / (double)rest.mesh.vertex_count;
   }
   const double *c = patient.power.c;
-  printf("largest move %.1f mm; points %.3f mm RMS off; surface %.2f -> %.2f "
-         "mm\n",
-         largest, sqrt(square), surface.before, surface.after);
+  printf(
+      "largest displacement %.1f mm; points off by %.3f mm RMS; distance of the surfaces %.2f mm, "
+      "after the fit %.2f mm\n",
+      largest, sqrt(square), surface.before, surface.after);
   for (size_t k = 0; k < SUPINE_PATIENT_CONSTANTS; ++k) {
     printf(" c%zu %.3f +- %.3f", k + 1, c[k], fit.report.error[k]);
   }
   printf("\n");
   assert_true(sqrt(square) <= 0.15);
-  /* The force is recovered without use of (18): supine, its heights are 1 - Y. */
+  /* The force is recovered without use of (18). Supine, the height is 1 - Y. */
   const supine_patient_applied *applied = &fit.applied;
-  printf("force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, residual "
-         "%.3f, "
-         "%.0f blocks\n",
-         applied->correlation, applied->slopes[0], applied->slopes[1], applied->slopes[2],
-         applied->spread, applied->residual, applied->blocks);
+  printf(
+      "force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, spread %.3f, residual %.3f, "
+      "%.0f blocks\n",
+      applied->correlation, applied->slopes[0], applied->slopes[1], applied->slopes[2],
+      applied->spread, applied->residual, applied->blocks);
   assert_true(applied->correlation > 0.9);
   static const double slopes[3] = {0.0, -0.6, 0.0};
   for (size_t k = 0; k < 3; ++k) {
@@ -109,9 +111,10 @@ TEST(test_fit_surface_known_law_recovers_it_on_another_mesh) {
   supine_lungs_free(&other);
 }
 
-/* Law and kriging from surfaces with another mesh, moved by a law far from deep. The volume change
- * is the integral of the displacement along the normal, which the rows hold: it follows. */
-TEST(test_fit_surface_other_law_reaches_the_state_and_its_volume) {
+/* Surfaces of different meshes, moved by a law far from `deep`, are fitted by `deep` and kriging:
+ * the surface reaches the other state and has its volume, as the change of volume is the integral
+ * of the displacement along the normal, which the fit matches. */
+TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_mesh coarse = helper_lump(9, 70.3, 5);
   supine_mesh fine = helper_lump(15, 70.3, 5);
   supine_lungs rest = {0};
@@ -127,8 +130,8 @@ TEST(test_fit_surface_other_law_reaches_the_state_and_its_volume) {
   assert_int_equal(
       supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error),
       SUPINE_OK);
-  printf("largest move %.1f mm; %.2f mm before, %.3f in the end; deep alone %.2f, held out %.3f "
-         "mm\n",
+  printf("largest displacement %.1f mm; distance %.2f mm, fitted %.3f; held out: deep %.2f, with "
+         "kriging %.3f mm\n",
          largest, fit.surface.before, fit.surface.after,
          fit.report.held_out[SUPINE_PATIENT_SCORE_LAW],
          fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
@@ -156,7 +159,7 @@ TEST(test_fit_surface_other_law_reaches_the_state_and_its_volume) {
   supine_lungs_free(&other);
 }
 
-/* Add to the positions the part along the surface of a draw of g, the correction of the law. */
+/* Draw a correction g of the law, and add its part along the surface to the positions. */
 static void slide(const supine_lungs *lungs, const supine_patient_power *law, unsigned long seed,
                   double *positions) {
   const size_t n = lungs->mesh.vertex_count;
@@ -200,9 +203,9 @@ static void slide(const supine_lungs *lungs, const supine_patient_power *law, un
   free(normals);
 }
 
-/* Surfaces do not show the motion along them. Here the truth is the deep law and sliding with the
- * covariance of other patients: the surfaces fit to a fraction of a millimetre, and points are
- * wrong by millimetres, as the expected error must state. */
+/* Surfaces do not show motion along them. Surfaces that are moved by the deep law and slide with
+ * the covariance of other patients are fitted to a fraction of a millimetre, but points err by
+ * millimetres, which the expected error must state. */
 TEST(test_fit_surface_alone_expected_error_includes_sliding) {
   enum { SEEDS = 5 };
   supine_mesh lump = helper_lump(6, 70.3, 5);
@@ -240,21 +243,22 @@ TEST(test_fit_surface_alone_expected_error_includes_sliding) {
       square += supine_dot(u, u) / (double)n;
     }
     ratio[seed] = fit.report.expected_point / sqrt(square);
-    printf("true error %.2f mm, expected %.2f; surface %.2f -> %.3f, held out %.3f\n", sqrt(square),
-           fit.report.expected_point, fit.surface.before, fit.surface.after,
-           fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
+    printf(
+        "true error %.2f mm, expected %.2f; surface %.2f mm, after the fit %.3f, held out %.3f\n",
+        sqrt(square), fit.report.expected_point, fit.surface.before, fit.surface.after,
+        fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
   }
   gsl_sort(ratio, 1, SEEDS);
-  printf("expected over true error: median %.2f, %.2f to %.2f\n", ratio[SEEDS / 2], ratio[0],
-         ratio[SEEDS - 1]);
+  printf("expected error over true error: median %.2f, range %.2f to %.2f\n", ratio[SEEDS / 2],
+         ratio[0], ratio[SEEDS - 1]);
   assert_true(ratio[SEEDS / 2] > 0.75 && ratio[SEEDS / 2] < 1.35);
   free(moved.vertices);
   supine_mesh_free(&lump);
   supine_lungs_free(&rest);
 }
 
-/* A force fixed to the body does not follow gravity: its correlation with height is low. Reversing
- * gravity reverses the correlation. */
+/* The correlation with height is low for a force fixed to the body, high for one along gravity, and
+ * reversed if gravity is reversed. */
 TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
   supine_mesh lump = helper_lump(9, 70.3, 5);
   supine_lungs rest = {0};
@@ -278,7 +282,7 @@ TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
         supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error),
         SUPINE_OK);
     found[k] = fit.applied.correlation;
-    printf("correlation %.3f, c7 to c9 %.3f %.3f %.3f, varies by %.3f, residual %.3f\n",
+    printf("correlation %.3f, c7 to c9 %.3f %.3f %.3f, spread %.3f, residual %.3f\n",
            fit.applied.correlation, fit.applied.slopes[0], fit.applied.slopes[1],
            fit.applied.slopes[2], fit.applied.spread, fit.applied.residual);
     assert_true(fit.applied.residual < 0.1 * fit.applied.spread);
@@ -294,12 +298,13 @@ TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
   supine_lungs_free(&rest);
 }
 
-/* The standard deviation is estimated as 1.4826 times the median, and weights vanish at 4.685 of it
- * (95 % efficiency: Tukey's biweight). Outliers hardly change it. */
+/* Weights are Tukey's biweight, which vanishes at 4.685 standard deviations (95 % efficiency). The
+ * standard deviation is 1.4826 times the median distance, which outliers hardly change. */
 TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
   enum { NORMAL = 2000, LOOK = 4, OUTLIERS = 100, COUNT = NORMAL + LOOK + OUTLIERS };
   static const double sigma = 0.37;
-  static const double look[LOOK] = {1.5, -3.0, 4.5, -4.9}; /* standard deviations */
+  /* Distances to check, in standard deviations. */
+  static const double look[LOOK] = {1.5, -3.0, 4.5, -4.9};
   supine_patient_matching m = {.count = COUNT};
   m.rows = calloc(COUNT, sizeof *m.rows);
   m.match = malloc(COUNT * sizeof *m.match);
@@ -315,7 +320,7 @@ TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
   for (size_t k = 0; k < LOOK; ++k) {
     const double t = look[k] / 4.685;
     const double expected = fabs(t) < 1.0 ? pow(1.0 - t * t, 2.0) : 0.0;
-    /* the outliers, 5 % of all, raise the median by 6 % */
+    /* The outliers, 5 % of all rows, raise the median by 6 %. */
     assert_true(fabs(m.rows[NORMAL + k].weight - expected) < 0.07);
     assert_true(k > 1 || m.rows[NORMAL + k].weight >= expected);
   }
@@ -335,7 +340,7 @@ static void refused(const supine_lungs *rest, const supine_mesh *moved, const ch
       supine_patient_fit_surface(rest, moved, &no_landmarks, &options, false, &fit, &error),
       SUPINE_ERROR_MESH);
   if (strstr(error.message, words) == NULL) {
-    fail_msg("'%s' does not say '%s'", error.message, words);
+    fail_msg("the message '%s' lacks '%s'", error.message, words);
   }
 }
 
@@ -357,7 +362,7 @@ TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
     moved.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
   }
   refused(&rest, &moved, "do not overlap along z");
-  for (size_t i = 0; i < n; ++i) { /* the other side of the chest */
+  for (size_t i = 0; i < n; ++i) { /* moves the lung to the other side of the chest */
     moved.vertices[i] = rest.mesh.vertices[i] - (i % 3 == 0 ? 150.0 : 0.0);
   }
   refused(&rest, &moved, "do not overlap along x");

@@ -7,7 +7,8 @@
 #include <cairo.h>
 #include <webp/demux.h>
 
-#define OPEN SUPINE_GOLDEN "/open_surface.safetensors" /* made before they were refused */
+/* Basis of an open surface, made by a version that accepted open surfaces. */
+#define OPEN SUPINE_GOLDEN "/open_surface.safetensors"
 
 static size_t count_words(const char *text, const char *word) {
   size_t count = 0;
@@ -67,9 +68,9 @@ static void check_posture(const json_t *posture) {
     share += json_number_value(json_object_get(slab, "share"));
     volume += json_number_value(json_object_get(slab, "volume_ml"));
   }
-  assert_true(fabs(gain - 400) < 0.05); /* positions are floats */
+  assert_true(fabs(gain - 400) < 0.05); /* tolerance of float positions, mL */
   assert_true(fabs(share - 1) < 1e-4);
-  /* slabs are counted from the rest of the posture */
+  /* Volumes of slabs are those at rest in the posture. */
   assert_true(fabs(volume - number(posture, "volume_ml", "left") -
                    number(posture, "volume_ml", "right")) < 0.05);
   const json_t *top = json_array_get(slabs, 1);
@@ -93,14 +94,15 @@ TEST(test_compare_json_has_stated_values) {
     const json_t *posture = json_array_get(postures, i);
     check_posture(posture);
     assert_true(number(posture, "displacement_mm", "rms") <=
-                farthest * (1 + 1e-3)); /* sampled 4.5 degrees apart */
+                farthest * (1 + 1e-3)); /* tolerance: directions are sampled 4.5 degrees apart */
   }
   const json_t *tilted = json_object_get(json_array_get(postures, 2), "gravity");
   assert_true(fabs(json_number_value(json_array_get(tilted, 2)) - 0.258819045) < 1e-8);
   json_decref(root);
 }
 
-/* Assert that elements are closed in order, attributes are quoted, and no '<' or '&' is stray. */
+/* Assert that elements are closed in order, attributes are quoted, and no '<' or '&' is left
+ * unescaped. */
 static void check_markup(const char *text) {
   char open[64][16];
   size_t depth = 0;
@@ -214,7 +216,8 @@ TEST(test_render_misuse_usage_error) {
   assert_int_equal(count_files("a.png"), 0);
 }
 
-/* Run supine render; print a line and return false if drawing is not available. */
+/* Run supine render with these arguments. Return false, and print why, if drawing is not
+ * available. */
 SUPINE_PRINTF(1, 2)
 static bool render(const char *format, ...) {
   char arguments[512];
@@ -231,7 +234,7 @@ static bool render(const char *format, ...) {
   return true;
 }
 
-/* Return the mean difference of red, green and blue, 0 to 255, of two pictures of one size. */
+/* Return the mean difference of red, green and blue of two pictures of one size, 0 to 255. */
 static double png_difference(const char *a, const char *b) {
   cairo_surface_t *image[2] = {cairo_image_surface_create_from_png(a),
                                cairo_image_surface_create_from_png(b)};
@@ -258,7 +261,8 @@ static double png_difference(const char *a, const char *b) {
   return sum / (3.0 * width * height);
 }
 
-/* Fonts and drivers change a picture by less than another posture does. */
+/* The picture is near the golden one: versions of fonts change it by less than another posture
+ * does. */
 TEST(test_render_same_as_golden_picture) {
   static const double tolerance = 1.5;
   char path[256];
@@ -270,13 +274,15 @@ TEST(test_render_same_as_golden_picture) {
   assert_true(render("lungs.safetensors --posture left --largest 40 --size 240x180 -o other.png"));
   (void)snprintf(path, sizeof path, "%s/other.png", folder);
   const double other = png_difference(path, SUPINE_GOLDEN "/render_prone.png");
-  print_message("golden picture: %.3f apart, left side %.3f, of 255\n", same, other);
+  print_message(
+      "difference from the golden picture: %.3f of 255, of a picture on the left side: %.3f\n",
+      same, other);
   assert_true(same < tolerance);
   assert_true(other > 2 * tolerance);
 }
 
-/* Compute the mean position of orange pixels in the upper left of a picture, the arrow of the ball,
- * relative to the centre of the ball. */
+/* Find the arrow of gravity on the ball in the upper left of a picture: compute the mean position
+ * of its orange pixels relative to the centre of the ball, in pixels. */
 static void find_arrow(const char *path, double place[2]) {
   cairo_surface_t *image = cairo_image_surface_create_from_png(path);
   assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
@@ -286,10 +292,11 @@ static void find_arrow(const char *path, double place[2]) {
   double count = 0;
   int low[2] = {width, width};
   int high[2] = {0, 0};
-  for (int y = width / 24; y < width / 5; ++y) { /* inside the card, left of the title */
+  /* Inside the frame of the ball, left of the title. */
+  for (int y = width / 24; y < width / 5; ++y) {
     const unsigned char *row = cairo_image_surface_get_data(image) + (ptrdiff_t)y * stride;
     for (int x = width / 24; x < width / 5; ++x) {
-      const unsigned char *pixel = row + (ptrdiff_t)4 * x; /* blue, green, red */
+      const unsigned char *pixel = row + (ptrdiff_t)4 * x; /* bytes: blue, green, red */
       const int at[2] = {x, y};
       const bool orange = pixel[2] > 180 && pixel[1] < 140 && pixel[0] < 110;
       for (int k = 0; k < 2; ++k) {
@@ -307,12 +314,12 @@ static void find_arrow(const char *path, double place[2]) {
   }
 }
 
-/* From the front, left is on the right and feet are below; supine and prone, the view is along
- * gravity. */
+/* Seen from the front, the patient's left is on the right and the feet are below. Supine and prone,
+ * gravity is along the view. */
 TEST(test_render_arrow_points_along_gravity) {
   static const struct {
     const char *posture;
-    int toward[2]; /* right, down */
+    int toward[2]; /* direction of the arrow: right, down */
   } cases[] = {{"supine", {0, 0}}, {"prone", {0, 0}},   {"left", {1, 0}},
                {"right", {-1, 0}}, {"upright", {0, 1}}, {"inverted", {0, -1}}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -331,7 +338,7 @@ TEST(test_render_arrow_points_along_gravity) {
   }
 }
 
-/* A single point inside is visible. */
+/* A picture shows even a single point inside the lungs. */
 TEST(test_render_one_point_inside_visible) {
   char path[2][256];
   (void)snprintf(path[0], sizeof path[0], "%s/one.csv", folder);
@@ -351,7 +358,7 @@ TEST(test_render_one_point_inside_visible) {
   assert_true(png_difference(path[0], path[1]) > 0.02);
 }
 
-/* Transparent lungs are a grey shell, fainter at lower opacity; opaque ones are coloured. */
+/* Opaque lungs are coloured; transparent lungs are a grey shell, fainter at lower opacity. */
 TEST(test_render_opacity_below_one_draws_a_grey_shell) {
   static const char *const shares[3] = {"1", "0.5", "0.25"};
   cairo_surface_t *image[3];
@@ -367,14 +374,15 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
     image[i] = cairo_image_surface_create_from_png(path);
     assert_int_equal(cairo_surface_status(image[i]), CAIRO_STATUS_SUCCESS);
   }
-  for (int y = 70; y < 110; ++y) { /* between the ball and the bar */
+  for (int y = 70; y < 110; ++y) { /* rows between the ball and the colour bar */
     const unsigned char *row[3];
     for (int i = 0; i < 3; ++i) {
       row[i] = cairo_image_surface_get_data(image[i]) +
                (ptrdiff_t)y * cairo_image_surface_get_stride(image[i]);
     }
     for (int x = 0; x < 4 * 240; x += 4) {
-      if (abs(row[0][x] - row[0][x + 1]) > 40) { /* blue minus green: violet */
+      /* Coloured lungs are violet: blue and green differ. */
+      if (abs(row[0][x] - row[0][x + 1]) > 40) {
         ++coloured;
         for (int i = 1; i < 3; ++i) {
           assert_in_range(abs(row[i][x] - row[i][x + 1]), 0, 8);
@@ -385,13 +393,14 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
     }
   }
   assert_true(coloured > 500);
-  assert_true(most > 25); /* the rim */
+  assert_true(most > 25); /* the rim of the shell is much fainter at the lower opacity */
   for (int i = 0; i < 3; ++i) {
     cairo_surface_destroy(image[i]);
   }
 }
 
-/* Decode frame `wanted` of an animation, RGBA (malloc), and its information. */
+/* Return frame `wanted` of an animation, RGBA (malloc), its time in ms, and the size of the
+ * animation. */
 static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo *info, int *time) {
   size_t size = 0;
   char *bytes = test_read(in_folder(name), &size);
@@ -412,7 +421,7 @@ static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo
   return copy;
 }
 
-/* Return the mean difference of two frames, 0 to 255. */
+/* Return the mean difference of red, green and blue of two frames, 0 to 255. */
 static double frame_difference(const unsigned char *a, const unsigned char *b, size_t area) {
   double sum = 0;
   for (size_t i = 0; i < 4 * area; ++i) {
@@ -421,10 +430,13 @@ static double frame_difference(const unsigned char *a, const unsigned char *b, s
   return sum / (3.0 * (double)area);
 }
 
-/* All frames differ; the last pauses; an animation there and back begins and ends alike. */
+/* All frames of an animation differ, the last is shown for a second, and an animation back begins
+ * where the other ends. */
 TEST(test_render_turn_animates_between_postures) {
   enum { FRAMES = 7, WIDTH = 240, HEIGHT = 180 };
-  static const double loss = 2.5; /* of 255, by the codec and the text of the angle */
+  /* Largest difference between frames of equal postures, which is due to the codec and to the text
+   * of the angle. */
+  static const double loss = 2.5;
   WebPAnimInfo info;
   int time = 0;
   if (!render("lungs.safetensors --turn supine:left:0.4s --size 240x180 -o there.webp")) {
@@ -440,7 +452,7 @@ TEST(test_render_turn_animates_between_postures) {
   assert_int_equal(info.canvas_width, WIDTH);
   assert_int_equal(info.canvas_height, HEIGHT);
   assert_int_equal(info.frame_count, FRAMES);
-  assert_int_equal(info.loop_count, 0); /* repeat for ever */
+  assert_int_equal(info.loop_count, 0); /* 0: repeat for ever */
   unsigned char *first = read_frame("back.webp", 0, &info, &time);
   unsigned char *last = read_frame("back.webp", FRAMES - 1, &info, &time);
   assert_true(frame_difference(frame[0], last, WIDTH * HEIGHT) < loss);
@@ -460,7 +472,7 @@ TEST(test_render_turn_animates_between_postures) {
          "nothere.safetensors");
 }
 
-/* Return red, green and blue of a corner of the picture. */
+/* Compute red, green and blue of the upper left corner of a picture, 0 to 255. */
 static void corner_of(const char *name, int rgb[3]) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -474,7 +486,7 @@ static void corner_of(const char *name, int rgb[3]) {
   cairo_surface_destroy(image);
 }
 
-/* The background is nearly white and nearly grey. */
+/* The background is nearly white, with nearly equal red, green and blue. */
 TEST(test_render_background_nearly_white) {
   int rgb[3];
   if (!render("lungs.safetensors --posture supine --size 260x380 -o light.png")) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Directions of gravity by posture, quaternion and tilt. */
+/* Directions of gravity from names of postures, quaternions and tilts. */
 #include <float.h>
 
 #include "test.h"
@@ -58,7 +58,7 @@ TEST(test_posture_name_every_index_known) {
   assert_null(supine_posture_name(supine_posture_count()));
 }
 
-TEST(test_nearest_misspelling_suggests) {
+TEST(test_nearest_misspelling_gives_name) {
   static const char *const cases[][2] = {
       {"suppine", "supine"},
       {"spuine", "supine"},
@@ -85,21 +85,24 @@ TEST(test_quaternion_known_orientations_literal) {
   const double h = sqrt(0.5);
   double g[3];
   assert_int_equal(supine_posture_quaternion((double[]){1, 0, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* body axes equal world axes: upright */
+  assert_vector(g, 0, 0, -1); /* upright: the axes of body and world are equal */
   assert_false(signbit(g[0]) || signbit(g[1]));
-  /* Rotated by +90 degrees about x, body y (the back) points to world z: prone. */
+  /* Prone: after a rotation by +90 degrees about x, the back (y of the body) points to z of the
+   * world. */
   assert_int_equal(supine_posture_quaternion((double[]){h, h, 0, 0}, g), SUPINE_OK);
   assert_vector(g, 0, -1, 0);
   assert_int_equal(supine_posture_quaternion((double[]){-3 * h, 3 * h, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, 1, 0); /* -90 degrees; sign and length do not matter: supine */
-  /* +90 degrees about y takes body z (head) to world x and body x (left) to world -z. */
+  /* Supine: -90 degrees; sign and length of the quaternion do not matter. */
+  assert_vector(g, 0, 1, 0);
+  /* On the left side: +90 degrees about y rotates the head (z of the body) to x of the world, and
+   * left (x) to -z. */
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, h, 0}, g), SUPINE_OK);
   assert_vector(g, 1, 0, 0);
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, 0, h}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* a turn about gravity changes nothing */
+  assert_vector(g, 0, 0, -1); /* a rotation about gravity changes nothing */
 }
 
-/* v_world = q v q*, written out with cross products. */
+/* Rotate v by the quaternion q: out = q v q*, written with cross products. */
 static void rotate(const double q[4], const double v[3], double out[3]) {
   const double t[3] = {2 * (q[2] * v[2] - q[3] * v[1]), 2 * (q[3] * v[0] - q[1] * v[2]),
                        2 * (q[1] * v[1] - q[2] * v[0])};
@@ -141,15 +144,15 @@ TEST(test_quaternion_zero_or_not_finite_refused) {
 }
 
 TEST(test_tilt_postures_literal) {
-  const double c = 0.96592582628906831; /* cos 15 degrees, Abramowitz & Stegun 4.3.128 */
-  const double s = 0.25881904510252074; /* sin 15 degrees */
+  const double c = 0.96592582628906831; /* cosine of 15 degrees, Abramowitz & Stegun 4.3.128 */
+  const double s = 0.25881904510252074; /* sine of 15 degrees */
   double g[3] = {0, 1, 0};
   assert_int_equal(supine_posture_tilt(g, 15, g), SUPINE_OK);
   assert_vector(g, 0, c, s); /* Trendelenburg: the head is lower */
   assert_int_equal(supine_posture_tilt((double[]){0, -1, 0}, 15, g), SUPINE_OK);
   assert_vector(g, 0, -c, -s);
   assert_int_equal(supine_posture_tilt((double[]){0, 0, -1}, 15, g), SUPINE_OK);
-  assert_vector(g, 0, s, -c); /* leaning back */
+  assert_vector(g, 0, s, -c); /* leaning backwards */
   assert_int_equal(supine_posture_tilt((double[]){1, 0, 0}, 37, g), SUPINE_OK);
   assert_vector(g, 1, 0, 0);
   assert_int_equal(supine_posture_tilt((double[]){0, 1, 0}, 360 * 1e6 + 90, g), SUPINE_OK);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* From lungs to a basis file: coefficients, stated errors and volumes against the full physics. */
+/* Bases of lungs: coefficients, stated errors and volumes against the full physics. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
@@ -31,7 +31,7 @@ static int setup(void **state) {
 static int teardown(void **state) {
   (void)state;
   (void)unlink(path);
-  return rmdir(folder); /* fails where a temporary file is left */
+  return rmdir(folder); /* fails if a temporary file is left */
 }
 
 static supine_lungs phantom(size_t vertices) {
@@ -48,12 +48,12 @@ static supine_lungs real_pair(void) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
-    skip(); /* does not return */
+    skip(); /* skip() does not return */
   }
   return lungs;
 }
 
-static double reach; /* of the next bases; 0: that of the paper */
+static double reach; /* reach of bases made next, mm; 0: the paper's links */
 
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
@@ -71,7 +71,8 @@ static supine_precompute_report make_basis(const supine_lungs *lungs, size_t ban
   return report;
 }
 
-/* Open with the file's precision; compact storage states its own error. */
+/* Open the basis in exact storage, so that errors of compact storage do not add to those
+ * measured. */
 static supine_basis *open_basis(void) {
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;
@@ -82,8 +83,8 @@ static supine_basis *open_basis(void) {
   return basis;
 }
 
-/* Coefficients in the file against a direct factorisation over all nodes, with one right-hand side
- * for each harmonic and the same quadrature of the force. */
+/* Compare the coefficients in the file with a direct factorisation over all nodes, with one
+ * right-hand side for each harmonic and the same quadrature of the force. */
 static void check_coefficients(const char *const *names, supine_axes axes) {
   enum { BAND = 3, TERMS = 16, LATITUDES = 32 };
   supine_lungs lungs = {0};
@@ -97,7 +98,7 @@ static void check_coefficients(const char *const *names, supine_axes axes) {
   assert_int_equal(supine_sh_grid_create(LATITUDES, 2 * LATITUDES, &grid), SUPINE_OK);
   double *projected = calloc(TERMS * n, sizeof *projected);
   double *force = malloc(n * sizeof *force);
-  /* the force is linear in position: projecting it at four points determines it */
+  /* The force is linear in position, so its projections have four moments each. */
   double moments[TERMS][4] = {{0.0}};
   for (size_t d = 0; d < 2 * LATITUDES * LATITUDES; ++d) {
     double g[3];
@@ -140,7 +141,7 @@ static void check_coefficients(const char *const *names, supine_axes axes) {
       worst = fmax(worst, fabs(force[i] - (double)coefficients[i * TERMS + t]));
     }
   }
-  printf("%s: %zu vertices, coefficients within %.1e of the largest\n", names[0], n,
+  printf("%s: %zu vertices, coefficients differ by %.1e of the largest\n", names[0], n,
          worst / largest);
   assert_true(worst <= 1e-5 * largest);
   supine_safetensors_close(file);
@@ -163,7 +164,7 @@ TEST(test_precompute_real_ras_lungs_coefficients_equal_direct_solution) {
   check_coefficients(names, SUPINE_AXES_RAS);
 }
 
-/* Compute the mean and the standard error of the mean over directions. */
+/* Mean over directions, and its standard error. */
 typedef struct sample_mean {
   double mean, error;
 } sample_mean;
@@ -181,9 +182,9 @@ static sample_mean mean_of(size_t count, const double *values) {
 
 enum { CHECKED = 300 };
 
-/* For each direction, compute the mean squared difference over vertices between basis and
- * supine_physics_solve: of the field in error2 (with field2), and in mm if both breathe `volume`.
- */
+/* For each direction, compute means over vertices: the squared distance error2 between the basis
+ * and supine_physics_solve and the squared displacement field2, both at scale 1, and the squared
+ * distance error_mm2 at `volume` mL, in mm^2. */
 static void true_errors(const supine_lungs *lungs, const supine_model *model,
                         const supine_basis *basis, size_t count, const double *directions,
                         double volume, double *error2, double *field2, double *error_mm2) {
@@ -219,7 +220,7 @@ static void true_errors(const supine_lungs *lungs, const supine_model *model,
   free(should);
 }
 
-/* Return the relative RMS error of the first modes of a basis. */
+/* Return the relative RMS error of a basis that is cut to its first `kept` modes. */
 static double error_of_first(size_t kept, const supine_lungs *lungs, const supine_model *model,
                              const supine_basis *basis, size_t count, const double *directions) {
   const size_t n = lungs->mesh.vertex_count;
@@ -248,8 +249,8 @@ static double error_of_first(size_t kept, const supine_lungs *lungs, const supin
   return sqrt(error2 / field2);
 }
 
-/* The file's table states the error of the first modes and of the first bands, measured on a
- * limited number of vertices. */
+/* Check the tables in the file: the error of the first modes equals the measured one, and the error
+ * of the first bands falls with the band. */
 static void check_error_table(const supine_lungs *lungs, const supine_model *model,
                               const supine_basis *basis, size_t count, const double *directions) {
   const supine_tensor *by_modes = supine_basis_tensor(basis, "error_modes");
@@ -264,14 +265,14 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
   const double *bands = by_band->data;
   for (size_t l = 0; l < by_band->shape[0]; ++l) {
     assert_true(l == 0 || bands[l] <= (1.0 + 1e-12) * bands[l - 1]);
-    if (modes == by_band->shape[0] * by_band->shape[0]) { /* the modes are the harmonics */
+    if (modes == by_band->shape[0] * by_band->shape[0]) { /* if the modes are the harmonics */
       assert_close(bands[l], left[(l + 1) * (l + 1) - 1], 1e-4 * bands[l]);
     }
   }
 }
 
-/* On the held-out directions, the stated error equals that of deforming and solving one by one: to
- * rounding, and with softening to the error of the few solves. */
+/* Check that the stated error equals that measured in the held-out directions one by one: up to
+ * rounding or, with softening, up to the error of combining solves for a few directions. */
 static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
                                double soften) {
   enum { HELD_OUT = 40 };
@@ -302,7 +303,8 @@ static void check_stated_error(const supine_lungs *lungs, size_t band, size_t mo
   supine_basis_close(basis);
 }
 
-/* On other directions it may differ by chance: by four standard errors of this sample. */
+/* Check that the stated error equals that measured in other directions within four standard errors
+ * of this sample. */
 static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t modes,
                                   double soften, const char *what) {
   const supine_precompute_report report = make_basis(lungs, band, modes, soften, 0);
@@ -322,7 +324,7 @@ static void check_error_elsewhere(const supine_lungs *lungs, size_t band, size_t
   true_errors(lungs, &model, basis, CHECKED, g, stated->volume, error2, field2, error_mm2);
   const sample_mean error = mean_of(CHECKED, error2);
   const sample_mean field = mean_of(CHECKED, field2);
-  printf("%s, soften %g: stated %.3f %%, %.4f mm; found %.3f %%, %.4f mm\n", what, soften,
+  printf("%s, soften %g: stated error %.3f %%, %.4f mm; found %.3f %%, %.4f mm\n", what, soften,
          100.0 * stated->relative_rms, stated->rms_mm, 100.0 * sqrt(error.mean / field.mean),
          sqrt(mean_of(CHECKED, error_mm2).mean));
   assert_true(error.error < 0.2 * error.mean); /* so that the test is meaningful */
@@ -339,7 +341,7 @@ TEST(test_precompute_stated_error_equals_deform_against_solve) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_other_directions_stated_error) {
+TEST(test_precompute_other_directions_error_as_stated) {
   supine_lungs lungs = phantom(1500);
   check_error_elsewhere(&lungs, 3, 0, 0.0, "phantom, 16 harmonics");
   check_error_elsewhere(&lungs, 15, 16, 0.0, "phantom, best modes of band 15");
@@ -347,8 +349,8 @@ TEST(test_precompute_other_directions_stated_error) {
   supine_lungs_free(&lungs);
 }
 
-/* Compare the default basis with the paper's form: least ratio of their errors, and largest error.
- */
+/* Check that the error of a basis of best modes is at most `most`, and that the error of the
+ * paper's form is at least `least_ratio` times as large. */
 static void check_default_basis(const char *name, supine_axes axes, double soften, double most,
                                 double least_ratio) {
   supine_lungs lungs = {0};
@@ -359,7 +361,7 @@ static void check_default_basis(const char *name, supine_axes axes, double softe
   const supine_precompute_report harmonics = make_basis(&lungs, 3, 0, soften, 0);
   const supine_precompute_report modes = make_basis(&lungs, 23, 16, soften, 0);
   const double error = modes.accuracy.relative_rms;
-  printf("%s, soften %g: harmonics %.2f %%, %zu modes %.3f %%\n", name, soften,
+  printf("%s, soften %g: error with harmonics %.2f %%, with %zu modes %.3f %%\n", name, soften,
          100.0 * harmonics.accuracy.relative_rms, modes.mode_count, 100.0 * error);
   assert_true(modes.mode_count <= (soften == 0.0 ? 4 : 16));
   assert_true(error <= most);
@@ -367,7 +369,7 @@ static void check_default_basis(const char *name, supine_axes axes, double softe
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_real_lung_default_error_within_half_a_percent) {
+TEST(test_precompute_real_lung_default_error_within_0_6_percent) {
   check_default_basis("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 0.0, 0.005, 8.0);
   check_default_basis("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 1.0, 0.006, 8.0);
 }
@@ -377,7 +379,7 @@ TEST(test_precompute_another_real_lung_same_error_ratio) {
   check_default_basis("covid/covid002_right.ply", SUPINE_AXES_RAS, 1.0, 0.006, 8.0);
 }
 
-/* Return the volume of the deformed surface, mL above rest. */
+/* Return the volume that the deformed surface gains beyond the reference surface, mL. */
 static double measured_volume(const supine_basis *basis, const double *weights,
                               const double *scales) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -428,7 +430,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
       worst = fmax(worst, fabs(measured_volume(basis, weights, scales) - volume));
     }
   }
-  printf("volumes within %.4f mL\n", worst);
+  printf("volumes off by at most %.4f mL\n", worst);
   assert_true(worst <= 0.05);
   supine_basis_close(basis);
 }
@@ -436,7 +438,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
 TEST(test_precompute_volumes_exact_in_every_direction) {
   supine_lungs lungs = phantom(3000);
   check_volumes(&lungs, 3, 0, 0.0, -300.0);
-  /* head down, a phantom with softening folds at -299 mL */
+  /* Not -300 mL: a softened phantom folds at -299 mL head down. */
   check_volumes(&lungs, 7, 10, 1.0, -200.0);
   supine_lungs_free(&lungs);
 }
@@ -467,8 +469,8 @@ static void normal_of(const float *xyz, const uint32_t *corner, double *normal) 
   normal[2] = u[0][0] * u[1][1] - u[0][1] * u[1][0];
 }
 
-/* Return the share of reversed triangles when the library deforms the file's lungs, worst of six
- * postures. */
+/* Return the share of triangles that are reversed when the library deforms the lungs to `volume`
+ * mL, the largest of six postures. */
 static double turned_over_at_run_time(double volume) {
   supine_basis *basis = open_basis();
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -502,9 +504,9 @@ static double turned_over_at_run_time(double volume) {
   return worst;
 }
 
-/* Lungs emptied in one posture, unchanged in the opposite one and half emptied in the others: more
- * triangles are reversed than with all postures half emptied. Postures with many reversed triangles
- * are used: left, supine and right. */
+/* If lungs empty in one posture, keep their volume in the opposite one and half empty in the
+ * others, more triangles are reversed than if they half empty in all postures. The postures left,
+ * supine and right, with many reversed triangles, are tested. */
 TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   supine_lungs lungs = phantom(1500);
   const size_t n = lungs.mesh.vertex_count;
@@ -524,8 +526,9 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   static const int postures[] = {0, 1, 3};
   for (size_t p = 0; p < sizeof postures / sizeof *postures; ++p) {
     const int g = postures[p];
-    /* Volumes change by `part` at one end of an axis, by 0 at the other and by half of it between:
-     * bands 0 and 1, whose functions are 0.2821 and 0.4886 along the axis. */
+    /* The volume at rest changes by `part` mL at one end of an axis, by 0 at the other and by half
+     * between: coefficients of bands 0 and 1, whose functions are 0.2821 and 0.4886 along the
+     * axis. */
     static const size_t term[3] = {3, 1, 2};
     const double part = -0.76 * full;
     const double sign = g < 3 ? 1.0 : -1.0;
@@ -539,7 +542,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
         SUPINE_OK);
     assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least),
                      SUPINE_OK);
-    assert_true(share > least + 0.02); /* 0.16, 0.14, 0.12 and 0.08 */
+    assert_true(share > least + 0.02); /* the shares are 0.08 to 0.16 */
   }
   supine_physics_volume_forms_free(&forms);
   supine_projection_compression_free(&field);
@@ -548,7 +551,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_precompute_turned_over_equals_run_time) {
+TEST(test_precompute_turned_over_share_equals_run_time) {
   supine_lungs lungs = phantom(3000);
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 7, .modes = 4, .held_out = 20};
@@ -561,7 +564,7 @@ TEST(test_precompute_turned_over_equals_run_time) {
   assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over < 0.001);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
-  options.model.stiffness = stiffness; /* so irregular that triangles reverse */
+  options.model.stiffness = stiffness; /* so irregular that triangles are reversed */
   assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over > 0.01);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
@@ -575,8 +578,8 @@ TEST(test_precompute_reach_fine_real_surface_few_reversed) {
   reach = 10.0;
   const supine_precompute_report length = make_basis(&lungs, 7, 4, 0.0, 20);
   reach = 0.0;
-  printf("turned over at %g mL: %.2f %%; with a reach of 10 mm %.4f %%\n", links.accuracy.volume,
-         100.0 * links.turned_over, 100.0 * length.turned_over);
+  printf("reversed triangles at %g mL: %.2f %%; with a reach of 10 mm %.4f %%\n",
+         links.accuracy.volume, 100.0 * links.turned_over, 100.0 * length.turned_over);
   assert_true(links.turned_over > 0.01);
   assert_true(length.turned_over < 1e-4);
   supine_lungs_free(&lungs);
@@ -601,12 +604,12 @@ TEST(test_precompute_bad_options_refused) {
   supine_error error;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.band = 8;
-  options.modes = 0; /* 81 harmonics */
+  options.modes = 0; /* all 81 harmonics */
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.modes = 65;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.modes = 16;
-  options.model.force.soften = 1.0; /* softening needs a reach */
+  options.model.force.soften = 1.0; /* refused, as softening needs a reach */
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }

@@ -17,7 +17,7 @@ static void write_text(const char *name, const char *text) {
   write_file(name, text, strlen(text));
 }
 
-/* Read a file of the folder into bytes [size]; return its length. */
+/* Read the beginning of a file of the folder into bytes [size]; return the number of bytes read. */
 static size_t take_file(const char *name, char *bytes, size_t size) {
   size_t length = 0;
   char *text = test_read(in_folder(name), &length);
@@ -68,7 +68,8 @@ TEST(test_deform_all_spellings_of_prone_same_file) {
            ways[i]);
     assert_int_equal(take_file("way.stl", other, sizeof other), length);
     size_t differing = 0;
-    for (size_t at = 84; at + 50 <= length; at += 50) { /* corners of each facet, not its normal */
+    /* Compare the corners of each facet, not its normal. */
+    for (size_t at = 84; at + 50 <= length; at += 50) {
       for (size_t k = 3; k < 12; ++k) {
         float p;
         float q;
@@ -93,12 +94,13 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume scan-5700 -o b.ply");
   EXPECT(5, "outside the 10 to 120 %",
          "deform lungs.safetensors --posture left --volume full+1300 -o b.ply");
-  EXPECT(1, "name all of them", "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
+  EXPECT(1, "name all of them",
+         "deform lungs.safetensors --posture left --volume left=rest -o b.ply");
   EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
   EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
-  EXPECT(5, "left: 7915 mL are 132 % of", /* at the end of the breath */
+  EXPECT(5, "left: 7915 mL are 132 % of", /* limit exceeded at the end of the breath */
          "compare lungs.safetensors --postures left --volume rest --breath 5000 -o b.html");
   EXPECT(5, "7692 mL are 128 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 -o b.vtp");
@@ -112,8 +114,8 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume scan-5500 --allow-folds -o a.ply");
 }
 
-/* Volumes of rest and full inflation, of synthetic lungs of 2714.1 and 3285.9 mL; the shares are
- * those of resting.h. */
+/* Volumes at rest and at full inflation are those of the shares in resting.h, for synthetic lungs
+ * of 2714.1 and 3285.9 mL. */
 TEST(test_deform_rest_and_full_volumes_by_posture) {
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture supine -o a.ply");
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture inverted --volume rest -o a.ply");
@@ -131,7 +133,7 @@ TEST(test_deform_rest_and_full_volumes_by_posture) {
   EXPECT(1, "all lungs together", "solve lungs.ply --posture left --volume left=rest -o b.ply");
 }
 
-/* Return the largest difference of a coordinate between two PLY files written by the program. */
+/* Return the largest difference of a coordinate between two PLY files that the program wrote. */
 static double positions_apart(const char *first, const char *second) {
   static char text[2][1 << 20];
   const char *names[2] = {first, second};
@@ -163,7 +165,7 @@ static double positions_apart(const char *first, const char *second) {
   return apart;
 }
 
-/* A basis reproduces the scan's own state and frame. */
+/* A basis reproduces its scan, in the state and in the frame of the scan. */
 TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(0, "-2000.00 mL",
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
@@ -183,19 +185,20 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   char head[256] = "";
   (void)take_file("ras.ply", head, sizeof head - 1);
   assert_non_null(strstr(head, "SPACE=RAS cm\n"));
-  /* That put the left lung first; the order stays from here on. */
+  /* The file has the left lung first, so its order does not change. */
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "again.ply",
          "deform ras.safetensors --posture left --volume scan --as-scanned -o again.ply");
-  assert_true(positions_apart("ras.ply", "again.ply") < 2e-5); /* float32's rounding of 200 mm */
+  /* The tolerance, mm, is the rounding of float32 at 200 mm. */
+  assert_true(positions_apart("ras.ply", "again.ply") < 2e-5);
   EXPECT(0, "breath",
          "breathe ras.safetensors --posture left --as-scanned --fps 0.2 -o breath.vtp");
   static char text[1 << 20];
   assert_true(take_file("breath.vtp", text, sizeof text) > 0);
   assert_non_null(strstr(text, "RAS"));
   EXPECT(0, "frames", "breathe ras.safetensors --posture left --fps 0.2 -o breath.vtp");
-  assert_true(take_file("breath.vtp", text, sizeof text) >
-              0); /* one file or many: the same arrays */
+  /* Without --as-scanned, the file has the same arrays. */
+  assert_true(take_file("breath.vtp", text, sizeof text) > 0);
   assert_non_null(strstr(text, "Name=\"displacement_magnitude\""));
   EXPECT(1, "is for VTP files",
          "breathe ras.safetensors --posture left --as-scanned -o b.safetensors");
@@ -220,7 +223,8 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(1, "deep or paper", "precompute low.ply --law shallow -o b.safetensors");
   EXPECT(1, "leave --scanned out",
          "precompute low.ply --law paper --scanned supine:rest -o b.safetensors");
-  EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply"); /* rest, as scanned */
+  /* Rest is the state of the scan. */
+  EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply");
   assert_true(positions_apart("low.ply", "rested.ply") < 0.005);
   EXPECT(0, "paper law\n  scan taken as the reference",
          "precompute lungs.ply --law paper --band 3 -o a.safetensors");
@@ -266,7 +270,7 @@ TEST(test_basis_damaged_or_foreign_refused) {
   assert_int_equal(count_files("e."), 0);
 }
 
-TEST(test_mesh_bad_input_message_names_it_no_file_left) {
+TEST(test_mesh_bad_input_named_and_no_file_left) {
   static char bytes[1 << 20];
   EXPECT(2, "missing.ply", "precompute missing.ply -o f.safetensors");
   write_text("empty.ply", "");
@@ -346,7 +350,7 @@ TEST(test_mesh_hostile_files_never_crash) {
   char defects[] = SUPINE_TEST_DATA "/defects";
   char *real = realpath(defects, NULL);
   if (real == NULL) {
-    printf("skipped: %s is not there\n", defects);
+    printf("skipped: %s is missing\n", defects);
     skip();
     return;
   }

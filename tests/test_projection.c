@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The projection against full solves and plain quadrature, and modes against a dense singular value
- * decomposition. */
+/* The projection onto harmonics against full solves and plain quadrature, and modes against a dense
+ * singular value decomposition. */
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
@@ -30,7 +30,7 @@ static int teardown(void **state) {
   return 0;
 }
 
-/* Multiply the factors of a projection: coefficients [N, P]. */
+/* Return the coefficients [N, terms] of a projection, the product of its factors (malloc). */
 static double *coefficients_of(const supine_projection *projection) {
   const size_t terms = supine_sh_count(projection->band);
   double *c = calloc(projection->vertex_count * terms + 1, sizeof *c);
@@ -45,7 +45,7 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
-/* Compute the weights of the span at some directions, [count, R]. */
+/* Return the weights of the span in `count` directions, [count, rank] (malloc). */
 static double *weights_at(const supine_lungs *lungs, const supine_model *model,
                           const supine_span *span, size_t count, const double *g) {
   double *range = malloc(2 * count * sizeof *range);
@@ -60,8 +60,8 @@ static double *weights_at(const supine_lungs *lungs, const supine_model *model,
   return weights;
 }
 
-/* The grid resolves the kinks of the lowest and highest vertex: a grid with many times the
- * directions gives the same functions, to far below any stated error. */
+/* A grid of many times as many directions gives the same functions, far below any stated error,
+ * although heights have kinks where the lowest or highest vertex changes. */
 TEST(test_projection_finer_grid_same_functions) {
   enum { LATITUDES = 512, LONGITUDES = 513 };
   static const size_t bands[] = {1, 15};
@@ -95,7 +95,8 @@ TEST(test_projection_finer_grid_same_functions) {
       missed += pow(made.functions[i] - fine[i], 2.0);
       all += pow(fine[i], 2.0);
     }
-    printf("band %zu: %.1e of the functions folds back\n", bands[b], sqrt(missed / all));
+    printf("band %zu: functions differ by %.1e from those of the fine grid\n", bands[b],
+           sqrt(missed / all));
     assert_true(sqrt(missed / all) < most[b]);
     supine_projection_free(&made);
     supine_sh_grid_destroy(grid);
@@ -105,8 +106,8 @@ TEST(test_projection_finer_grid_same_functions) {
   }
 }
 
-/* The transfer does not depend on gravity, so a sum of few solves gives any solve: to rounding
- * without softening, and with it to a hundredth of the error of the modes. */
+/* Check that a sum of at most `rank_most` solves gives the solve for any direction, as the transfer
+ * does not depend on gravity, with a relative error below `most`. */
 static void check_superposition(const supine_lungs *lungs, const supine_model *model,
                                 size_t rank_most, double most) {
   enum { COUNT = 20 };
@@ -131,8 +132,8 @@ static void check_superposition(const supine_lungs *lungs, const supine_model *m
     }
     supine_physics_solution_free(&solution);
   }
-  printf("soften %g, reach %g: %zu solves, %.1e RMS from the full solve\n", model->force.soften,
-         model->reach, made.rank, sqrt(missed / all));
+  printf("soften %g, reach %g: %zu solves, difference from the full solve %.1e RMS\n",
+         model->force.soften, model->reach, made.rank, sqrt(missed / all));
   assert_true(made.rank <= rank_most);
   assert_true(sqrt(missed / all) < most);
   supine_projection_free(&made);
@@ -185,7 +186,8 @@ TEST(test_projection_impossible_softening_refused) {
   supine_mesh_free(&mesh);
 }
 
-/* Compare singular values and fields with a dense decomposition of the weighted matrix. */
+/* Compare singular values, errors and functions of the modes with a dense decomposition of the
+ * weighted matrix. */
 static void check_modes(const supine_projection *projection, const double *weight, size_t most) {
   const size_t n = projection->vertex_count;
   const size_t terms = supine_sh_count(projection->band);
@@ -211,13 +213,13 @@ static void check_modes(const supine_projection *projection, const double *weigh
   double tail = 0.0;
   for (size_t k = 0; k < terms; ++k) {
     const double should = gsl_vector_get(s, k);
-    if (k < modes.mode_count) { /* the Gram matrix halves the digits of small values */
+    if (k < modes.mode_count) { /* a Gram matrix gives small values half the digits */
       assert_close(singular[k], should, 1e-7 * gsl_vector_get(s, 0));
     } else {
       tail += should * should;
     }
   }
-  double error = 0.0; /* the error of the modes is that of the best approximation of this rank */
+  double error = 0.0; /* squared error of the best approximation of this rank */
   for (size_t i = 0; i < n; ++i) {
     for (size_t t = 0; t < terms; ++t) {
       double is = 0.0;
@@ -228,7 +230,7 @@ static void check_modes(const supine_projection *projection, const double *weigh
     }
   }
   assert_close(sqrt(error / energy), sqrt(tail / energy), 1e-6);
-  for (size_t a = 0; a < modes.mode_count; ++a) { /* orthonormal functions */
+  for (size_t a = 0; a < modes.mode_count; ++a) { /* the functions are orthonormal */
     for (size_t b = 0; b <= a; ++b) {
       double dot = 0.0;
       for (size_t t = 0; t < terms; ++t) {
@@ -266,8 +268,8 @@ TEST(test_modes_equal_dense_decomposition) {
   free(weight);
 }
 
-/* Singular values of 3e-7 and 3e-8 of the first are just above and below the rounding of the Gram
- * matrix. */
+/* A mode is kept if its singular value is 3e-7 of the first, and dropped if it is 3e-8, below the
+ * rounding of the Gram matrix. */
 TEST(test_modes_below_rounding_dropped) {
   enum { ROWS = 7, TERMS = 4 };
   static const double sizes[TERMS] = {2.0, 0.5, 2.0 * 3e-7, 2.0 * 3e-8};
@@ -291,7 +293,7 @@ TEST(test_modes_below_rounding_dropped) {
   supine_projection_compression_free(&modes);
 }
 
-/* Bins are 1/256 of a power of two wide, and a percentile is the upper edge of its bin. */
+/* A percentile is the upper edge of its bin; bins are 1/256 of a power of two wide. */
 TEST(test_tally_percentile_is_upper_edge_of_bin) {
   supine_tally *tally = calloc(1, sizeof *tally);
   supine_tally *other = calloc(1, sizeof *other);

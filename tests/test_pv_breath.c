@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A breath: volume V(t) and pressure P(t). */
+/* A breath: volume and pressure over time. */
 #include <float.h>
 
 #include "test.h"
@@ -8,8 +8,8 @@
 
 enum { FRAMES = 401 };
 
-/* Tolerance: a phase of about 10 rounds to a few epsilon, and the volume changes by a few tidal
- * volumes in the time of a breath. */
+/* Relative tolerance of volumes: a phase of about 10 breaths is rounded to a few epsilon, and the
+ * volume changes by a few tidal volumes per breath. */
 static const double rounding = 256.0 * DBL_EPSILON;
 
 static supine_pv_breath breath_of(supine_pv_course course) {
@@ -20,7 +20,7 @@ static supine_pv_breath breath_of(supine_pv_course course) {
                             .course = course};
 }
 
-TEST(test_breath_each_course_rests_and_reaches_tidal) {
+TEST(test_breath_each_course_starts_at_rest_and_reaches_tidal_volume) {
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
     const supine_pv_breath breath = breath_of((supine_pv_course)course);
     const double period = 60.0 / breath.rate;
@@ -34,7 +34,7 @@ TEST(test_breath_each_course_rests_and_reaches_tidal) {
       assert_close(volumes[0], 0.0, rounding * breath.tidal);
       assert_close(volumes[1], breath.tidal, rounding * breath.tidal);
       assert_close(pressures[0], breath.rest_pressure, 1e-9);
-      double held[2]; /* the peak pressure gives the tidal volume on the inhale limb */
+      double held[2]; /* on the inhale limb, the peak pressure gives the tidal volume */
       const double limb[2] = {breath.rest_pressure, pressures[1]};
       assert_int_equal(
           supine_breath_curve_evaluate(&supine_breath_normal()->limb[0], 2, limb, held, NULL, NULL),
@@ -74,7 +74,7 @@ TEST(test_breath_each_course_rises_then_falls_and_repeats) {
   }
 }
 
-/* Pressure follows the course of the breath, and volume the limbs. */
+/* Pressure follows the course of the breath, and volume follows the limbs. */
 TEST(test_breath_volume_follows_scaled_limbs) {
   const supine_pv *normal = supine_breath_normal();
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
@@ -107,7 +107,7 @@ TEST(test_breath_volume_follows_scaled_limbs) {
   }
 }
 
-/* At constant flow, pressures are found from volumes, also on a limb of two steep parts. */
+/* At constant flow, pressures belong to the volumes, even on a limb with two steep parts. */
 TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   enum { COUNT = 61 };
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};
@@ -129,8 +129,8 @@ TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   }
 }
 
-/* [Santhanam2008] V: 500 mL over 5 s of inhalation, in steps of 15 ms (66.66 a second): 1.5 mL. */
-TEST(test_breath_constant_flow_has_step_of_paper) {
+/* 500 mL inhaled over 5 s change by 1.5 mL in each step of 15 ms, as in [Santhanam2008] V. */
+TEST(test_breath_constant_flow_has_volume_step_of_paper) {
   const supine_pv_breath breath = {
       .tidal = 500.0, .rate = 6.0, .inhale_fraction = 0.5, .course = SUPINE_PV_CONSTANT_FLOW};
   double times[334];
@@ -157,7 +157,8 @@ TEST(test_breath_default_is_quiet_breathing) {
       supine_breath_evaluate(supine_breath_normal(), &breath, 2, times, volumes, pressures, NULL),
       SUPINE_OK);
   assert_close(volumes[1], 500.0, 500.0 * rounding);
-  /* Compliance b s' / d of the sigmoid is 262 mL/cmH2O at 5 cmH2O, and rises to 310 at 10. */
+  /* The compliance of the built-in sigmoid rises from 262 mL/cmH2O at 5 cmH2O to 310 at 10
+   * cmH2O. */
   assert_true(pressures[1] - pressures[0] > 500.0 / 310.0 &&
               pressures[1] - pressures[0] < 500.0 / 262.0);
 }
@@ -169,7 +170,7 @@ static void expect_argument(const supine_pv *pv, const supine_pv_breath *breath,
   assert_int_equal(supine_breath_evaluate(pv, breath, 1, &time, &volume, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   if (strstr(error.message, text) == NULL) {
-    fail_msg("\"%s\" has no \"%s\"", error.message, text);
+    fail_msg("the message '%s' lacks '%s'", error.message, text);
   }
 }
 
@@ -199,7 +200,7 @@ TEST(test_breath_out_of_range_refused) {
   expect_argument(normal, &breath, 1.0, "tidal volume 5000 mL is larger than");
   breath = breath_of(SUPINE_PV_COURSE_COUNT);
   expect_argument(normal, &breath, 1.0, "unknown pressure course");
-  supine_pv narrow = *normal; /* the exhale limb ends below the peak pressure */
+  supine_pv narrow = *normal; /* an exhale limb that ends below the peak pressure */
   narrow.limb[SUPINE_PV_EXHALE].pressure[1] = 6.0;
   breath = breath_of(SUPINE_PV_COSINE);
   expect_argument(&narrow, &breath, 1.0, "outside the exhale limb's range");

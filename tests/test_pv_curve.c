@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The equation of a limb, its inverse, and the built-in normal lung. */
+/* The equation of a limb, and the built-in normal lung. */
 #include <float.h>
 
 #include "test.h"
@@ -8,8 +8,7 @@
 
 enum { COUNT = 61 };
 
-/* Error of quadrature and rounding relative to the volume range: some 400 times a double's epsilon.
- */
+/* Tolerance of quadrature and rounding relative to the volume range, some 400 epsilon. */
 static const double integration = 1e-13;
 
 static const supine_pv_curve sigmoid = {
@@ -23,7 +22,7 @@ static void spread(double low, double high, double *at) {
 }
 
 TEST(test_evaluate_constant_control_gives_salazar_knowles) {
-  /* V = Vmax (1 - exp(-k P)), emphysema to fibrosis */
+  /* V = Vmax (1 - exp(-k P)), k per cmH2O from emphysema to fibrosis */
   static const double k[] = {0.31, 0.0914, 0.043};
   for (size_t i = 0; i < sizeof k / sizeof *k; ++i) {
     const double most = 6413.0;
@@ -47,7 +46,7 @@ TEST(test_evaluate_constant_control_gives_salazar_knowles) {
 }
 
 TEST(test_evaluate_second_control_gives_gaussian_compliance) {
-  /* u = c_2 x: compliance is exp(c_2 (x^2 - 1) / 2), its integral the error function */
+  /* With u = c_2 x, compliance is exp(c_2 (x^2 - 1) / 2), and its integral is an error function. */
   const double c2 = -7.3;
   const double root = sqrt(-c2 / 2.0);
   const supine_pv_curve curve = {{0.0, 40.0}, {0.0, 1000.0}, {0.0, c2, 0.0, 0.0, 0.0}};
@@ -62,7 +61,8 @@ TEST(test_evaluate_second_control_gives_gaussian_compliance) {
   }
 }
 
-/* u' by finite differences of the log compliance equals the sum over Legendre polynomials. */
+/* The derivative of the log compliance by x, from finite differences, equals the sum u(x) of
+ * Legendre polynomials. */
 TEST(test_evaluate_any_controls_satisfy_equation) {
   const double half = 0.5 * (sigmoid.pressure[1] - sigmoid.pressure[0]);
   const double step = 1e-4;
@@ -155,7 +155,7 @@ TEST(test_normal_lung_has_stated_curves) {
     const double share =
         (1.0 / (1.0 + exp(-(p - 10.0) / 6.0)) - 1.0 / (1.0 + exp(10.0 / 6.0))) / rise;
     assert_close(inhale[j], 6000.0 * share, 2.0); /* within 0.03 % of the range */
-    assert_true(exhale[j] >= inhale[j] - 1e-9);   /* hysteresis */
+    assert_true(exhale[j] >= inhale[j] - 1e-9);   /* hysteresis: more volume on the exhale limb */
   }
 }
 

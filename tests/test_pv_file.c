@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Files of pressure-volume samples and of fitted parameters. */
+/* Files of pressure-volume samples and of fitted curves. */
 #include "test.h"
 
 #include "program/options/pv.h"
@@ -36,7 +36,7 @@ static void expect_load(const char *text, size_t size, const char *expected) {
   supine_error error = {0};
   assert_int_equal(supine_breath_fit_file(path, 0.95, &pv, reports, &error), SUPINE_ERROR_FORMAT);
   if (strstr(error.message, expected) == NULL || strstr(error.message, path) == NULL) {
-    fail_msg("\"%s\" has no \"%s\"", error.message, expected);
+    fail_msg("the message '%s' lacks '%s'", error.message, expected);
   }
 }
 
@@ -72,7 +72,7 @@ TEST(test_fit_file_malformed_names_the_line) {
   expect_load(nul, sizeof nul - 1, ":2: a NUL byte");
 }
 
-TEST(test_load_missing_file_or_folder_reports_read) {
+TEST(test_load_missing_file_or_folder_reports_read_error) {
   supine_pv pv;
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   supine_error error = {0};
@@ -106,7 +106,7 @@ TEST(test_load_limbs_same_numbers) {
   assert_memory_equal(&read, &written, sizeof read);
 }
 
-TEST(test_load_one_limb_serves_both) {
+TEST(test_load_one_limb_used_for_both) {
   static const char *const texts[] = {
       "{" CURVE("exhale", "0, 30", "0, 6000", "-1, 2, 3, 4, 5") "}",
       "{" CURVE("inhale", "0, 30", "0, 6000", "-1, 2, 3, 4, 5") "}"};
@@ -118,7 +118,7 @@ TEST(test_load_one_limb_serves_both) {
   }
 }
 
-TEST(test_load_malformed_parameters_names_the_fault) {
+TEST(test_load_malformed_parameters_message_names_fault) {
   static const struct {
     const char *text;
     const char *expected;
@@ -145,7 +145,7 @@ TEST(test_load_malformed_parameters_names_the_fault) {
     supine_error error = {0};
     assert_int_equal(load(bad[i].text, &pv, &error), SUPINE_ERROR_FORMAT);
     if (strstr(error.message, bad[i].expected) == NULL || strstr(error.message, path) == NULL) {
-      fail_msg("\"%s\" has no \"%s\"", error.message, bad[i].expected);
+      fail_msg("the message '%s' lacks '%s'", error.message, bad[i].expected);
     }
   }
 }
@@ -168,7 +168,7 @@ static void write_limbs(bool inhale, bool exhale) {
   assert_int_equal(fclose(file), 0);
 }
 
-TEST(test_fit_file_each_limb_its_own_or_the_other) {
+TEST(test_fit_file_missing_limb_uses_the_other) {
   for (int which = 1; which <= 3; ++which) {
     write_limbs((which & 1) != 0, (which & 2) != 0);
     supine_pv pv;

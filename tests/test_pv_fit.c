@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fits to pressure-volume samples: published curves, noise, confidence, refused samples. */
+/* Fits to pressure-volume samples: published curves, noise, confidence intervals, refused
+ * samples. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -9,18 +10,19 @@
 
 enum { SAMPLES = 33, HELD_OUT = 211 };
 
-/* A published curve: Venegas' sigmoid if d > 0, else Salazar-Knowles. */
+/* A published curve: Venegas' sigmoid a + b / (1 + exp(-(P - c) / d)) if d > 0, else Salazar and
+ * Knowles' exponential b (1 - exp(-c P)). */
 typedef struct truth {
   const char *name;
-  double low, high;  /* cmH2O */
-  double a, b, c, d; /* mL, mL, cmH2O, cmH2O; or b = Vmax, c = k per cmH2O */
+  double low, high;  /* range of pressures, cmH2O */
+  double a, b, c, d; /* a, b in mL; c, d in cmH2O, or c per cmH2O if d is 0 */
 } truth;
 
-/* Salazar-Knowles: k = ln 2 / h, h = 7.58 +- 2.53 cmH2O over 20 normal subjects [Salazar1964]: the
- * mean, one and two deviations either way; then k of two and three times the mean (lost recoil),
- * and half of it (fibrosis). Venegas: b d between 10^3.3 and 10^5 mL cmH2O around the range that
- * Narusawa (J. Appl. Physiol. 91, 2001) found over published curves; small b and d, large c: ARDS.
- */
+/* Salazar and Knowles: c = ln 2 / h with h = 7.58 (SD 2.53) cmH2O over 20 normal subjects
+ * [Salazar1964], at the mean and at one and two deviations from it; then two and three times c
+ * (lost recoil) and half of it (fibrosis). Venegas: b d between 10^3.3 and 10^5 mL cmH2O, about the
+ * range that Narusawa (J. Appl. Physiol. 91, 2001) found over published curves; ARDS has a small b
+ * and d and a large c. */
 static const truth truths[] = {
     {"Salazar-Knowles, normal mean", 0.0, 30.0, 0.0, 6413.0, 0.0914, 0.0},
     {"Salazar-Knowles, normal +1 SD", 0.0, 30.0, 0.0, 6413.0, 0.0686, 0.0},
@@ -44,7 +46,7 @@ static double truth_volume(const truth *lung, double pressure) {
                        : -lung->b * expm1(-lung->c * pressure);
 }
 
-/* Sample the true volumes at unevenly spaced pressures. */
+/* Compute the true volumes at `count` unevenly spaced pressures. */
 static void truth_sample(const truth *lung, size_t count, double *pressures, double *volumes) {
   for (size_t j = 0; j < count; ++j) {
     const double share = (double)j / (double)(count - 1);
@@ -58,7 +60,7 @@ static double truth_range(const truth *lung) {
   return truth_volume(lung, lung->high) - truth_volume(lung, lung->low);
 }
 
-/* Return the RMS distance to the truth at other pressures, % of the volume range. */
+/* Return the RMS error of a curve at held-out pressures, % of the range of volumes. */
 static double held_out_percent(const truth *lung, const supine_pv_curve *curve) {
   double pressures[HELD_OUT];
   double volumes[HELD_OUT];
@@ -75,7 +77,7 @@ static double held_out_percent(const truth *lung, const supine_pv_curve *curve) 
   return 100.0 * sqrt(sum / HELD_OUT) / truth_range(lung);
 }
 
-/* Fit samples as the lines 100, 101, ... of a file s.csv. */
+/* Fit samples as if they were lines 100, 101, ... of a file s.csv. */
 static supine_status fit(size_t count, const double *pressures, const double *volumes,
                          double confidence, supine_pv_curve *curve, supine_pv_report *report,
                          supine_error *error) {
@@ -97,15 +99,16 @@ TEST(test_fit_published_curves_under_one_percent) {
     supine_pv_report report;
     assert_int_equal(fit(SAMPLES, pressures, volumes, 0.95, &curve, &report, NULL), SUPINE_OK);
     const double held_out = held_out_percent(&truths[i], &curve);
-    print_message("%-34s RMS %.4f %%, held out %.4f %%\n", truths[i].name, report.rms_percent,
+    print_message("%-34s error %.4f %% RMS, held out %.4f %%\n", truths[i].name, report.rms_percent,
                   held_out);
     assert_true(report.rms_percent < 1.0);
     assert_true(held_out < 1.0);
-    assert_true(held_out < 0.3); /* % of the range: the limit of the form of the curve */
+    assert_true(held_out < 0.3); /* %, the limit of this form of curves */
     assert_close(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
                  1e-9 * report.rms + 1e-12);
     assert_true(curve.pressure[0] == truths[i].low && curve.pressure[1] == truths[i].high);
-    if (truths[i].d == 0.0) { /* exact: c_1 = -k (P_high - P_low) / 2 */
+    /* An exponential has one control parameter, exactly -c (high - low) / 2. */
+    if (truths[i].d == 0.0) {
       assert_close(curve.control[0], -0.5 * truths[i].c * truths[i].high, 1e-6);
       for (size_t c = 1; c < SUPINE_PV_CONTROLS; ++c) {
         assert_close(curve.control[c], 0.0, 1e-6);
@@ -135,8 +138,8 @@ TEST(test_fit_one_percent_noise_near_truth) {
       }
       worst = fmax(worst, held_out_percent(&truths[i], &curve));
     }
-    print_message("%-34s 1 %% noise: worst of %d is %.3f %% from the truth\n", truths[i].name,
-                  (int)SEEDS, worst);
+    print_message("%-34s 1 %% noise: largest of %d errors %.3f %%\n", truths[i].name, (int)SEEDS,
+                  worst);
     assert_true(worst < 1.0);
   }
   gsl_rng_free(random);
@@ -155,7 +158,7 @@ static void model_sample(size_t count, double *pressures, double *volumes) {
                    SUPINE_OK);
 }
 
-TEST(test_fit_model_own_data_recovers_parameters) {
+TEST(test_fit_data_of_model_recovers_parameters) {
   static const size_t counts[] = {8, 9, 13, 33};
   for (size_t n = 0; n < sizeof counts / sizeof *counts; ++n) {
     for (int reversed = 0; reversed <= 1; ++reversed) {
@@ -184,8 +187,8 @@ TEST(test_fit_model_own_data_recovers_parameters) {
   }
 }
 
-/* The number of fits whose interval contains the true parameter is binomial: with 400 seeds and
- * 0.95, 380 +- 4.4. Allowed are 5 deviations; a rate of 0.80 would be outside. */
+/* The number of 400 fits whose interval contains the true parameter is binomial, 380 (SD 4.4) at a
+ * rate of 0.95. Five deviations are allowed. */
 TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
   enum { SEEDS = 400, COUNT = 21 };
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -220,14 +223,14 @@ TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
   for (size_t level = 0; level < 2; ++level) {
     const double deviation = sqrt(SEEDS * levels[level] * (1.0 - levels[level]));
     for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
-      print_message("unknown %zu: %.1f %% of intervals at %.0f %%\n", i,
+      print_message("unknown %zu: %.1f %% of the intervals of %.0f %% hold the true value\n", i,
                     100.0 * covered[level][i] / SEEDS, 100.0 * levels[level]);
       assert_close(covered[level][i], SEEDS * levels[level], 5.0 * deviation);
     }
   }
 }
 
-/* The fit is a minimum: a small change of any parameter increases the misfit. */
+/* The fit is a minimum: a small change of any parameter increases the residual. */
 TEST(test_fit_result_at_minimum) {
   double pressures[SAMPLES];
   double volumes[SAMPLES];
@@ -261,7 +264,7 @@ static void expect_format(size_t count, const double *pressures, const double *v
   supine_error error = {0};
   assert_int_equal(fit(count, pressures, volumes, 0.95, &curve, NULL, &error), SUPINE_ERROR_FORMAT);
   if (strstr(error.message, text) == NULL || strstr(error.message, more) == NULL) {
-    fail_msg("\"%s\" has no \"%s\", \"%s\"", error.message, text, more);
+    fail_msg("the message '%s' lacks '%s' or '%s'", error.message, text, more);
   }
 }
 
@@ -271,7 +274,7 @@ TEST(test_fit_bad_samples_message_names_line) {
   model_sample(SAMPLES, p, v);
   expect_format(0, p, v, "0 samples", "at least 8");
   expect_format(7, p, v, "7 samples", "at least 8");
-  for (size_t count = 8; count <= SAMPLES; count += 25) { /* few and many */
+  for (size_t count = 8; count <= SAMPLES; count += 25) { /* few samples and many */
     model_sample(count, p, v);
     p[5] = p[4];
     expect_format(count, p, v, "s.csv:105", "repeats the one before");
@@ -293,7 +296,7 @@ TEST(test_fit_bad_samples_message_names_line) {
   }
 }
 
-TEST(test_fit_fall_beyond_a_tenth_of_the_range_refused) {
+TEST(test_fit_curve_falling_over_a_tenth_of_range_refused) {
   double p[SAMPLES];
   double v[SAMPLES];
   model_sample(SAMPLES, p, v);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Build the wheel of the Python package, install it without a network into a clean environment, and test it.
+"""Build the wheel of the Python package, install it without network access into a clean environment, and test it.
 
     test_python.py SOURCE_FOLDER LIBRARY SUPINE CC"""
 import importlib.util
@@ -18,7 +18,7 @@ for wanted in ("pip", "setuptools", "wheel", "numpy"):
         sys.exit(77)
 
 with tempfile.TemporaryDirectory() as folder:
-    # The user's own modules must not replace Debian's.
+    # The user's own Python modules must not replace Debian's.
     clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PIP_"))}
     clean.update(SUPINE_LIBRARY=library, HOME=folder, PIP_CONFIG_FILE=os.devnull, PIP_NO_CACHE_DIR="1",
                  PIP_DISABLE_PIP_VERSION_CHECK="1", PIP_NO_INDEX="1", LD_LIBRARY_PATH=os.path.dirname(library),
@@ -30,7 +30,7 @@ with tempfile.TemporaryDirectory() as folder:
         assert done.returncode == 0, f"{' '.join(arguments)}\n{done.stdout}"
         return done.stdout
 
-    # Build in a copy, as building leaves files beside the sources.
+    # Build in a copy of the sources, as the build leaves files beside them.
     for name in ("CMakeLists.txt", "sh", "runtime"):
         path = os.path.join(source, name)
         target = os.path.join(folder, "source", name)
@@ -42,7 +42,7 @@ with tempfile.TemporaryDirectory() as folder:
     run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", "wheels",
         "source/runtime/python")
     wheel, = os.listdir(os.path.join(folder, "wheels"))
-    # The tag states the newest glibc that the library's symbols need.
+    # The platform tag states the newest version of glibc that the symbols of the library need.
     wanted = re.findall(r"GLIBC_2\.(\d+)", run("objdump", "-T", library))
     assert f"-py3-none-manylinux_2_{max(map(int, wanted))}_" in wheel, wheel
     with zipfile.ZipFile(os.path.join(folder, "wheels", wheel)) as opened:
@@ -60,7 +60,7 @@ with tempfile.TemporaryDirectory() as folder:
     run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
     print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
 
-    # The examples; the one with VTK only if it is installed.
+    # Run the examples of README.md, that with VTK only if VTK is installed.
     with open(f"{source}/runtime/python/README.md", encoding="utf-8") as readme:
         text = readme.read()
     if importlib.util.find_spec("vtk") is None:

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The reach in mm: its definition, its balance, and its independence of the mesh. */
+/* The reach, mm: its definition, the balance of forces, and its independence of the mesh. */
 #include <float.h>
 
 #include "test.h"
@@ -13,9 +13,9 @@
 
 #include "lungs_helpers.h"
 
-static supine_model model; /* with the reach of the current test */
+static supine_model model; /* the paper's law with the reach of the current test */
 
-/* Solve one right-hand side on lungs. */
+/* Return the catch [N] of a force [N] for stiffness [N] (malloc). */
 static double *solve(const supine_lungs *lungs, const double *stiffness, const double *force) {
   const size_t n = lungs->mesh.vertex_count;
   supine_equilibrium *equilibrium = NULL;
@@ -56,7 +56,8 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 3.0 * area[one.triangles[0]];
 }
 
-/* Solve over all nodes (masses and springs) by the link weights of equilibrium.h alone. */
+/* The solution equals a dense one over all nodes, masses and springs, from the link weights in
+ * equilibrium.h. */
 TEST(test_reach_equals_dense_definition) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);
@@ -75,11 +76,11 @@ TEST(test_reach_equals_dense_definition) {
   for (size_t i = 0; i < n; ++i) {
     mean += area[i] / (double)n;
   }
-  gsl_matrix *weight = gsl_matrix_calloc(nodes, nodes); /* 1 / D */
+  gsl_matrix *weight = gsl_matrix_calloc(nodes, nodes); /* link weights */
   double *s = calloc(nodes, sizeof *s);
   double *a = calloc(n, sizeof *a);
   for (size_t i = 0; i < n; ++i) {
-    a[i] = 1.0 / (e[i] / exp(mean_log)); /* expandability: beside the force */
+    a[i] = 1.0 / (e[i] / exp(mean_log)); /* expandability, which multiplies the force */
     s[i] = 1.0;
     gsl_matrix_set(weight, i, i, area[i] / mean);
   }
@@ -107,7 +108,7 @@ TEST(test_reach_equals_dense_definition) {
       gsl_matrix_set(weight, n + k, edge[c], w);
     }
   }
-  /* I - A with A[i, j] = S_i w_ij / Z_j, and the share kept by a mass. */
+  /* The matrix I - A, with A[i, j] = S_i w_ij / Z_j for link weights w. */
   gsl_matrix *matrix = gsl_matrix_alloc(nodes, nodes);
   gsl_vector *b = gsl_vector_calloc(nodes);
   gsl_vector *x = gsl_vector_alloc(nodes);
@@ -133,7 +134,8 @@ TEST(test_reach_equals_dense_definition) {
   double given = 0.0;
   for (size_t i = 0; i < n; ++i) {
     const double own = area[i] / mean;
-    const double expected = s[i] * own / z[i] * gsl_vector_get(x, i); /* Te[i->i] x_i */
+    /* catch of mass i: the share Te[i->i] that it keeps, times x_i */
+    const double expected = s[i] * own / z[i] * gsl_vector_get(x, i);
     assert_true(fabs(own * found[i] - expected) < 1e-10 * largest);
     balance += own * found[i];
     given += own * a[i] * force[i];
@@ -166,8 +168,8 @@ TEST(test_reach_constant_force_stays_constant) {
   supine_lungs_free(&lungs);
 }
 
-/* Make a sphere of 100 mm about the origin; its vertices are shifted within the surface by up to
- * `irregularity` of a link. */
+/* Make a sphere of radius 100 mm about the origin, whose vertices are shifted within the surface by
+ * up to about `irregularity` times the length of a link. */
 static supine_mesh sphere(size_t frequency, double irregularity) {
   supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
                       .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
@@ -188,8 +190,8 @@ static supine_mesh sphere(size_t frequency, double irregularity) {
   return mesh;
 }
 
-/* Return the relative error of the damping of a harmonic. (1 - R^2 Laplacian) F = Y_lm on a sphere
- * of radius r has F = Y_lm / (1 + l (l + 1) R^2 / r^2). */
+/* Return the relative error of the damping of a harmonic on a sphere of radius r. The solution of
+ * (1 - R^2 Laplacian) F = Y_lm is F = Y_lm / (1 + l (l + 1) R^2 / r^2). */
 static double harmonic_error(size_t frequency, double irregularity, double reach, size_t l, int m) {
   supine_lungs lungs = lungs_of(sphere(frequency, irregularity), reach);
   const size_t n = lungs.mesh.vertex_count;
@@ -222,9 +224,10 @@ TEST(test_reach_sphere_damps_harmonics_as_laplacian) {
       const double coarse = harmonic_error(8, 0.0, reaches[r], l, m);
       const double fine = harmonic_error(24, 0.0, reaches[r], l, m);
       const double rough = harmonic_error(24, 0.15, reaches[r], l, m);
-      printf("R %2.0f mm, l %zu: error %.2e with 642 vertices, %.2e with 5762, %.2e irregular\n",
+      printf("reach %2.0f mm, l = %zu: error %.2e with 642 vertices, %.2e with 5762, %.2e if "
+             "irregular\n",
              reaches[r], l, coarse, fine, rough);
-      /* Links are not isotropic, so finer meshes do not reduce it to 0. */
+      /* A limit remains in finer meshes, as links are not isotropic. */
       assert_true(coarse < 0.1);
       assert_true(fine < 0.1);
       assert_true(rough < 0.15);
@@ -232,7 +235,7 @@ TEST(test_reach_sphere_damps_harmonics_as_laplacian) {
   }
 }
 
-/* Return the area-weighted RMS distance over which a unit force spreads. */
+/* Return the area-weighted RMS distance over which a unit force spreads on a sphere, mm. */
 static double spread(size_t frequency, double reach) {
   supine_lungs lungs = lungs_of(sphere(frequency, 0.1), reach);
   const size_t n = lungs.mesh.vertex_count;
@@ -259,7 +262,8 @@ static double spread(size_t frequency, double reach) {
   return sqrt(square / sum);
 }
 
-/* In the plane the response to a point is K_0(r / R), of RMS radius 2 R. */
+/* A force spreads twice the reach R in any mesh, as the response K_0(r / R) to a point in the plane
+ * has the RMS radius 2 R. */
 TEST(test_reach_finer_mesh_same_length) {
   double with[3];
   double without[3];
@@ -275,8 +279,7 @@ TEST(test_reach_finer_mesh_same_length) {
   assert_true(without[2] < 0.6 * without[0]);
 }
 
-/* Tissue twice as expandable moves twice as far, at distances beyond the reach from its boundary.
- */
+/* Tissue that is twice as expandable moves twice as far, except near its boundary. */
 TEST(test_reach_half_twice_expandable_moves_twice_as_far) {
   const double reach = 10.0;
   supine_lungs lungs = lungs_of(sphere(24, 0.1), reach);
@@ -299,7 +302,8 @@ TEST(test_reach_half_twice_expandable_moves_twice_as_far) {
       largest = fmax(largest, fabs(uneven[i] / even[i] / (z > 0.0 ? M_SQRT2 : M_SQRT1_2) - 1.0));
     }
   }
-  printf("a = 2 beside 1: %.3f to %.3f of even tissue\n", ratio[1] / count[1], ratio[0] / count[0]);
+  printf("expandability 2 beside 1: displacement over that of uniform tissue %.3f and %.3f\n",
+         ratio[1] / count[1], ratio[0] / count[0]);
   assert_true(largest < 0.02);
   assert_true(fabs(ratio[1] / count[1] / (ratio[0] / count[0]) - 2.0) < 0.02);
   free(force);

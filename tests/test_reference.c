@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Full inflation as the reference: estimated from scans in any state; rest by posture. */
+/* The reference surface at full inflation, estimated from scans in any state, and the volume at
+ * rest by posture. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -15,7 +16,7 @@
 
 #include "tests/poses.h"
 
-static const double promised = 0.005; /* mm, error of a reproduced scan */
+static const double promised = 0.005; /* documented error of a reproduced scan, mm */
 
 static char path[] = "/tmp/supine-reference-XXXXXX";
 
@@ -37,7 +38,7 @@ static supine_scan scan_named(const char *text) {
   return scan;
 }
 
-/* Compute the reference of lungs at full inflation. */
+/* Return the reference of lungs scanned at full inflation. */
 static supine_reference reference_of(supine_lungs *full, const supine_model *model) {
   const supine_scan scan = scan_named("full");
   const supine_resting resting = supine_reference_resting_default();
@@ -47,7 +48,8 @@ static supine_reference reference_of(supine_lungs *full, const supine_model *mod
   return found;
 }
 
-/* Make a scan: the same lungs with a total of `volume` mL in a posture, divided by the model. */
+/* Return a scan of the same lungs with gravity along g and `volume` mL in total, which the model
+ * divides between the lungs. */
 static supine_lungs scan_of(supine_lungs *full, const supine_model *model, const double g[3],
                             double volume) {
   const supine_reference reference = reference_of(full, model);
@@ -113,14 +115,15 @@ TEST(test_resting_axes_values_interpolated_by_harmonics) {
   }
 }
 
-TEST(test_resting_defaults_and_options) {
+TEST(test_resting_options_override_defaults) {
   static const double left[6] = {0.413, 0.563, 0.418, 0.464, 0.418, 0.481};
   static const double right[6] = {0.546, 0.435, 0.440, 0.475, 0.440, 0.506};
   supine_resting resting = supine_reference_resting_default();
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
-  /* one share for both lungs keeps their proportion, and is exact for lungs of usual size */
+  /* One share for both lungs keeps the proportion of their shares, and is their mean for lungs of
+   * usual size. */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
@@ -140,8 +143,8 @@ TEST(test_resting_defaults_and_options) {
   }
 }
 
-/* Volumes in mL become shares of the lungs' own full volumes; volumes not given keep their
- * proportion. */
+/* Volumes in mL become shares of the full volumes of these lungs. Postures without a given volume
+ * keep their proportion to the others. */
 TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
@@ -208,10 +211,9 @@ TEST(test_scan_parse_states_accepted_or_refused) {
   }
 }
 
-/* Between rest and full inflation, both lungs have gained the same fraction of what they gain in
- * total (Milic-Emili's lines); below rest, their volumes keep the proportion that they have at
- * rest. */
-TEST(test_share_out_any_volume_follows_lines) {
+/* Between rest and full inflation, both lungs have gained the same fraction of their whole gain
+ * (Milic-Emili). Below rest, their volumes have the proportion that they have at rest. */
+TEST(test_share_out_any_volume_divided_along_straight_lines) {
   static const double left_side[3] = {1.0, 0.0, 0.0};
   static const double upright[3] = {0.0, 0.0, -1.0};
   const supine_reference r = {.known = true,
@@ -252,11 +254,11 @@ TEST(test_law_constants_equal_table) {
   }
 }
 
-/* The full inflation of one person is the same from scans in any state. */
+/* The surface at full inflation is the same from scans of a person in any state. */
 TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   static const struct {
     const char *scanned;
-    double volume; /* of the scan, mL */
+    double volume; /* volume of the scan, mL; relative to rest if the state is */
   } scans[] = {
       {"supine:full-3000", 3000.0},    {"supine+15:full-2200", 3800.0}, {"prone:rest", 0.0},
       {"left:full-900", 5100.0},       {"right:rest+800", 800.0},       {"supine:rest-150", -150.0},
@@ -281,7 +283,8 @@ TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
       fail_msg("%s", error.message);
     }
     const double off = farthest(lungs.mesh.vertices, full.mesh.vertices, n);
-    printf("%s: %zu solves, full surface within %.1e mm\n", scans[s].scanned, found.solves, off);
+    printf("%s: %zu solves, surface at full inflation off by %.1e mm\n", scans[s].scanned,
+           found.solves, off);
     assert_true(found.known && found.solves > 2 && found.solves <= 15);
     assert_true(off < 2.0 * promised);
     supine_reference_share_out(&whole, g, volume, ml);
@@ -299,7 +302,8 @@ TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   supine_lungs_free(&full);
 }
 
-/* ECSC 1993, by hand: a man of 1.78 m has 7.1422 L, 6.4402 L supine, and 0.86 L of tissue. */
+/* By the equations of ECSC 1993 a man of 1.78 m has 7.1422 L, 6.4402 L supine; tissue adds 0.86
+ * L. */
 TEST(test_capacity_height_and_sex_literal) {
   static const struct {
     supine_person person;
@@ -321,14 +325,14 @@ TEST(test_capacity_height_and_sex_literal) {
   }
 }
 
-/* A scan is doubted if its size is not that of an adult at full inflation, or if given rest volumes
- * disagree. */
-TEST(test_doubt_odd_scan_names_option) {
+/* The state of a scan is doubted if full inflation is not of an adult's size, or if the given rest
+ * volume disagrees with the scan. */
+TEST(test_doubt_implausible_volume_names_option) {
   static const struct {
     const char *scanned;
-    double full;        /* of each lung */
-    double rest;        /* volume at rest supine by --resting, mL, or 0 */
-    const char *doubts; /* expected doubts, or NULL */
+    double full;        /* full volume of each lung, mL */
+    double rest;        /* volume at rest supine given by --resting, mL; 0 if not given */
+    const char *doubts; /* expected text; NULL if nothing is doubted */
   } known[] = {{"full", 3000.0, 0.0, NULL},
                {"full", 1700.0, 0.0, "--scanned supine:rest"},
                {"supine:rest", 5100.0, 0.0, "--scanned full"},
@@ -356,7 +360,7 @@ TEST(test_doubt_odd_scan_names_option) {
   }
 }
 
-/* At most 30 solves for real lungs at 0.35 of full inflation or more. */
+/* Real lungs, even at rest at 0.35 of full inflation, reach full inflation in at most 30 solves. */
 TEST(test_reference_real_scans_reach_full_inflation) {
   static const char *const pairs[][2] = {{"lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj"},
                                          {"covid/covid001_left.ply", "covid/covid001_right.ply"}};
@@ -378,14 +382,15 @@ TEST(test_reference_real_scans_reach_full_inflation) {
         fail_msg("%s %s: %s", pairs[p][0], states[s], error.message);
       }
       const double moved = farthest(lungs.mesh.vertices, lungs.scanned, lungs.mesh.vertex_count);
-      printf("%s %s: %zu solves, %.1f mm\n", pairs[p][0], states[s], found.solves, moved);
+      printf("%s %s: %zu solves, displacement up to %.1f mm\n", pairs[p][0], states[s],
+             found.solves, moved);
       assert_true(found.solves <= 30 && moved > 30.0);
       supine_lungs_free(&lungs);
     }
   }
 }
 
-/* Make a basis of lungs as scanned. */
+/* Make a basis of lungs scanned in a state; return its RMS error, mm, in rms_mm. */
 static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, double *rms_mm) {
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
@@ -406,7 +411,7 @@ static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, doub
   return basis;
 }
 
-/* Compute the positions of a basis in a state, and the volumes of its lungs. */
+/* Return the positions of a basis in a state (malloc), and set the volume of each lung, mL. */
 static double *positions_in(const supine_basis *basis, const supine_state *state, double *ml) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
   supine_pose pose;
@@ -426,8 +431,9 @@ static double *positions_in(const supine_basis *basis, const supine_state *state
   return placed;
 }
 
-/* A basis from a scan below full inflation, evaluated by the library. */
-TEST(test_basis_scan_reproduced_and_rest_right) {
+/* A basis from a scan in any state reproduces the scan, and has the right surface and volumes at
+ * rest. */
+TEST(test_basis_reproduces_scan_and_volumes_at_rest) {
   static const char *const scans[] = {"supine-20:full-2500", "supine:rest", "left:rest",
                                       "upright:rest+300", "upright:full"};
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -452,10 +458,10 @@ TEST(test_basis_scan_reproduced_and_rest_right) {
     const supine_state as_scanned = supine_basis_scan(basis);
     double *placed = positions_in(basis, &as_scanned, ml);
     double *posed = positions_in(basis, &scan.state, ml);
-    printf("%s: scan reproduced within %.4f and %.4f mm; basis errs by %.4f mm RMS\n", scans[s],
-           farthest(placed, scanned, n), farthest(posed, scanned, n), rms);
+    printf("%s: scan reproduced within %.4f and %.4f mm; error of the basis %.4f mm RMS\n",
+           scans[s], farthest(placed, scanned, n), farthest(posed, scanned, n), rms);
     assert_true(farthest(placed, scanned, n) < promised);
-    /* full inflation in the file follows the compressed field: a few mL from the true one */
+    /* Full inflation in the file is that of the compressed field, a few mL from the true one. */
     assert_true(farthest(posed, scanned, n) <
                 (rests && scan.state.volume.ml == 0.0 ? promised : 0.15));
     free(placed);
@@ -495,7 +501,7 @@ TEST(test_reference_impossible_states_refused) {
     }
     assert_false(found.known);
   }
-  supine_model rough = model; /* folds on the way to full inflation */
+  supine_model rough = model; /* a model that folds on the way to full inflation */
   rough.reach = 0.0;
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 5;
@@ -513,7 +519,7 @@ TEST(test_reference_impossible_states_refused) {
   supine_lungs_free(&lungs);
 }
 
-/* A single lung moves nearly as in its pair. */
+/* A lung alone moves nearly as it does in the pair. */
 TEST(test_reference_single_lung_moves_as_in_pair) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   static const double postures[][3] = {{0, 1, 0},  {0, -1, 0}, {1, 0, 0},
@@ -539,7 +545,8 @@ TEST(test_reference_single_lung_moves_as_in_pair) {
         square += miss * miss;
       }
       const double rms = sqrt(square / (double)one.vertex_count);
-      printf("posture %zu, %s alone: F within %.4f RMS\n", p, side == 0 ? "left" : "right", rms);
+      printf("posture %zu, %s lung alone: catch off by %.4f RMS\n", p, side == 0 ? "left" : "right",
+             rms);
       assert_true(rms < 0.03);
       supine_physics_solution_free(&one);
     }

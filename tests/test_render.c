@@ -28,7 +28,7 @@ TEST(test_view_axes_any_view_right_handed_orthonormal) {
   assert_null(supine_render_view_name(SUPINE_VIEW_COUNT));
 }
 
-/* `towards` points from the lungs to the viewer. */
+/* The axis `towards` of each view points from the lungs to the viewer. */
 TEST(test_view_axes_each_view_points_to_viewer) {
   static const struct {
     supine_view view;
@@ -47,7 +47,8 @@ static double linear(double encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
 }
 
-/* Return L* of CIE 1976 from sRGB, a measure not used to make the map. */
+/* Return the lightness L* of CIE 1976 of an sRGB colour. The colour maps were made by another
+ * measure. */
 static double lightness(const double rgb[3]) {
   const double y = 0.2126 * linear(rgb[0]) + 0.7152 * linear(rgb[1]) + 0.0722 * linear(rgb[2]);
   return 116 * cbrt(y) - 16;
@@ -65,7 +66,8 @@ TEST(test_colours_increasing_value_even_steps_of_lightness) {
         assert_true(rgb[k] >= 0 && rgb[k] <= 1);
       }
       if (i > 0) {
-        assert_true(here - before > 0.5 && here - before < 1.8); /* about 70 in 64 steps */
+        /* The sum of all 64 steps is about 70. */
+        assert_true(here - before > 0.5 && here - before < 1.8);
       }
       before = here;
     }
@@ -93,7 +95,7 @@ TEST(test_bar_any_range_ends_at_round_tick) {
   }
 }
 
-/* A synthetic basis, opened, with a renderer. */
+/* An open synthetic basis with a renderer and a value for each vertex. */
 typedef struct made {
   fixture *f;
   unsigned char *bytes;
@@ -161,14 +163,16 @@ TEST(test_draw_lungs_background_transparent) {
     assert_int_equal(pixels[PIXELS - 1], 0);
     for (size_t i = 0; i < PIXELS; ++i) {
       for (int shift = 0; shift < 24; shift += 8) {
-        assert_true((pixels[i] >> shift & 255U) <= pixels[i] >> 24); /* premultiplied */
+        /* Colours are premultiplied by opacity. */
+        assert_true((pixels[i] >> shift & 255U) <= pixels[i] >> 24);
       }
     }
   }
   unmake(&m);
 }
 
-/* The values of the synthetic lungs increase with z, so from the front the top is lighter. */
+/* Seen from the front, the head is at the top: values increase with z, so the upper half is
+ * lighter. */
 TEST(test_draw_anterior_head_on_top) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
@@ -186,7 +190,7 @@ TEST(test_draw_anterior_head_on_top) {
   unmake(&m);
 }
 
-/* The outermost vertices are projected to the outermost pixels drawn. */
+/* The outermost vertices are projected near the outermost pixels that are drawn. */
 TEST(test_project_outer_vertices_match_drawing) {
   static uint32_t pixels[PIXELS];
   made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
@@ -219,7 +223,7 @@ TEST(test_project_outer_vertices_match_drawing) {
         drawn[2 * side + 1] = fmax(drawn[2 * side + 1], place[side] + 1);
       }
     }
-    for (int end = 0; end < 4; ++end) { /* triangles taper to nothing at a corner */
+    for (int end = 0; end < 4; ++end) { /* a corner of a triangle covers no pixel */
       assert_true(fabs(is[end] - drawn[end]) < 3);
     }
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Basis files: valid ones open, and every damage is refused. */
+/* Basis files: valid files open, and damaged files are refused. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -11,7 +11,7 @@
 
 #include "tests/poses.h"
 
-/* Open from a copy of exactly this size, so that a sanitizer sees any read past its end. */
+/* Open a basis from a copy of exactly this size, so that a sanitizer sees any read past its end. */
 static supine_status open_copy(const unsigned char *bytes, size_t size, supine_error *error) {
   unsigned char *copy = malloc(size == 0 ? 1 : size);
   assert_non_null(copy);
@@ -73,7 +73,7 @@ TEST(test_open_every_truncation_refused) {
   fixture_destroy(f);
 }
 
-/* Assert that two bases are equal in everything they state. */
+/* Assert that two basis files hold the same basis. */
 static void assert_same_basis(const unsigned char *a, const unsigned char *b, size_t size) {
   supine_basis *left = NULL;
   supine_basis *right = NULL;
@@ -123,7 +123,7 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
     damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
     const supine_status status = open_copy(damaged, size, NULL);
     if (status == SUPINE_OK) {
-      assert_true(bit / 8 < 8 + header); /* never in the data */
+      assert_true(bit / 8 < 8 + header); /* changed data are always detected */
       assert_same_basis(bytes, damaged, size);
       ++accepted;
     } else {
@@ -131,9 +131,9 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
     }
     damaged[bit / 8] ^= (unsigned char)(1U << bit % 8);
   }
-  /* Only white space of the padding may change unnoticed. */
+  /* Only white space in the padding may change unnoticed. */
   assert_true(accepted <= 8);
-  /* Bytes of the header: each value. */
+  /* Try other values of each byte of the header. */
   for (size_t i = 0; i < 8 + header; ++i) {
     for (unsigned value = 0; value < 256; value += 7) {
       damaged[i] = (unsigned char)value;
@@ -148,7 +148,7 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
   fixture_destroy(f);
 }
 
-/* Write the fixture after `spoil` changed it; assert that the file is refused. */
+/* Assert that the file of a fixture that `spoil` has changed is refused for this reason. */
 static void expect_refused(void (*spoil)(fixture *), const char *reason) {
   fixture *f = fixture_create(12, 3, 1, 2, false, true, 9, 4);
   spoil(f);
@@ -157,7 +157,7 @@ static void expect_refused(void (*spoil)(fixture *), const char *reason) {
   supine_error error = {0};
   assert_int_equal(open_copy(bytes, size, &error), SUPINE_ERROR_FORMAT);
   if (strstr(error.message, reason) == NULL) {
-    fail_msg("'%s' does not say '%s'", error.message, reason);
+    fail_msg("the message '%s' lacks '%s'", error.message, reason);
   }
   free(bytes);
   fixture_destroy(f);
@@ -179,7 +179,7 @@ static void spoil_mode(fixture *f) {
   f->mode[11] = (double)NAN;
 }
 
-/* A finite but impossible value: positions would overflow. */
+/* Make coefficients of modes finite, but so large that positions would overflow. */
 static void spoil_mode_size(fixture *f) {
   f->mode[11] = 1e277;
 }
@@ -284,14 +284,15 @@ static supine_status open_parts(const parts *p) {
 TEST(test_open_wrong_structure_refused) {
   parts p = sound();
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  for (size_t i = 0; i < 9; ++i) { /* each tensor missing, misnamed, of another type */
+  for (size_t i = 0; i < 9; ++i) { /* each tensor in turn is missing or has another type */
     p = sound();
     p.tensors[i].name = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
     p = sound();
     p.tensors[i].dtype = p.tensors[i].dtype == SUPINE_U8 ? SUPINE_U32 : SUPINE_U8;
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
-    for (size_t axis = 0; axis < p.tensors[i].rank; ++axis) { /* each axis longer or empty */
+    /* Each axis in turn is longer or empty. */
+    for (size_t axis = 0; axis < p.tensors[i].rank; ++axis) {
       p = sound();
       p.tensors[i].shape[axis] += 1;
       const bool free_axis = (i == 1 && axis == 0);
@@ -300,14 +301,14 @@ TEST(test_open_wrong_structure_refused) {
       assert_int_equal(open_parts(&p), free_axis ? SUPINE_OK : SUPINE_ERROR_FORMAT);
     }
   }
-  for (size_t i = 0; i < 3; ++i) { /* each metadata string missing or changed */
+  for (size_t i = 0; i < 3; ++i) { /* each metadata string in turn is changed or missing */
     p = sound();
     p.metadata[i].value = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
     p.metadata[i].key = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
-  p = sound(); /* resting volumes are optional; if present, they have nine terms */
+  p = sound(); /* volumes at rest are optional; they have nine terms */
   p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9].dtype = SUPINE_F32;
@@ -316,16 +317,17 @@ TEST(test_open_wrong_structure_refused) {
     p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, zeros64};
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
-  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, zeros64}; /* by lung */
+  /* Volumes at rest have one row for each lung. */
+  p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
-  p = sound(); /* kind vector needs [N, 3, K] */
+  p = sound(); /* a basis of kind `vector` needs coefficients [N, 3, K] */
   p.metadata[2].value = "vector";
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   p.tensors[3] = (supine_tensor){"coefficients", SUPINE_F32, 3, {4, 3, 1}, zeros};
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  p = sound(); /* without volume forms the surface is open */
+  p = sound(); /* without volume forms, the surface counts as open */
   p.tensor_count = 6;
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensor_count = 7;
@@ -385,7 +387,7 @@ TEST(test_open_foreign_files_refused) {
   assert_int_equal(supine_basis_open("/tmp", &basis, &error), SUPINE_ERROR_READ);
 }
 
-/* The accessors of a basis return the file's own numbers. */
+/* Assert that the accessors of a basis return the numbers of the file. */
 static void check_view(bool vector, bool volume) {
   fixture *f = fixture_create(26, 3, 1, 2, vector, volume, 9, 41);
   size_t size = 0;
@@ -410,7 +412,8 @@ static void check_view(bool vector, bool volume) {
       box[3 + i % 3] = fmaxf(box[3 + i % 3], f->vertex[i]);
     }
     assert_memory_equal(info->bounds + 6 * lung, box, sizeof box);
-    assert_string_equal(info->lung_names[lung], lung == 0 ? "0" : "1"); /* unnamed in the file */
+    /* Lungs without names in the file are numbered. */
+    assert_string_equal(info->lung_names[lung], lung == 0 ? "0" : "1");
   }
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
   assert_non_null(lung);
@@ -460,7 +463,7 @@ TEST(test_weights_bad_gravity_refused) {
   assert_int_equal(supine_basis_weights(basis, (double[]){0, (double)NAN, 0}, weights),
                    SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_basis_weights(basis, (double[]){0, 2.5, 0}, weights), SUPINE_OK);
-  /* Values of Y(0,0), Y(1,-1), Y(1,0), Y(1,1) at (0,1,0), in the order of sh.h. */
+  /* Y(0,0), Y(1,-1), Y(1,0) and Y(1,1) at (0,1,0), in the order of sh.h. */
   const double y[4] = {0.28209479177387814, 0.48860251190291992, 0, 0};
   for (size_t k = 0; k < 2; ++k) {
     double want = 0;

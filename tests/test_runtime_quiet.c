@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* System calls of the library: memory and files when opening, none afterwards; and failing
- * allocations. Linked with --wrap, which redirects the calls to this file. */
+/* System calls of the library: for memory and files when a basis is opened, none afterwards; and
+ * failing allocations. The linker option --wrap redirects these calls to this file. */
 #include <sys/types.h>
 
 #include "test.h"
@@ -13,10 +13,10 @@
 
 #include "tests/poses.h"
 
-static size_t calls;    /* of any wrapped function */
-static size_t live;     /* blocks that are allocated and not yet freed */
-static size_t fail_at;  /* which allocation to refuse, from 1; 0: none */
-static size_t attempts; /* allocations so far */
+static size_t calls;    /* calls of wrapped functions while counting */
+static size_t live;     /* blocks allocated and not yet freed */
+static size_t fail_at;  /* number of the allocation to refuse, from 1; 0: none */
+static size_t attempts; /* calls so far that may be refused */
 static bool counting;
 
 static bool refuse(void) {
@@ -121,7 +121,7 @@ static void use_all(const supine_basis *basis, float *xyz) {
   (void)supine_basis_pose(basis, &state, &pose, &error);
   state = supine_basis_scan(basis);
   for (state.volume.ml = 3; state.volume.ml < 1e10;
-       state.volume.ml *= 1e9) { /* the last volume is out of reach */
+       state.volume.ml *= 1e9) { /* mL; the last is out of reach */
     if (supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK &&
         supine_basis_get_info(basis)->has_volume) {
       supine_basis_volumes(basis, &pose, scales);
@@ -189,13 +189,13 @@ TEST(test_evaluate_open_basis_no_system_calls) {
   supine_basis_close(basis);
   counting = false;
   assert_int_equal(status, SUPINE_OK);
-  assert_true(opening > 5); /* the wrapping works */
+  assert_true(opening > 5); /* shows that calls are counted */
   assert_int_equal(using, 0);
   assert_int_equal(live, 0);
   setting_close(&s);
 }
 
-TEST(test_open_each_allocation_failing_reports_memory) {
+TEST(test_open_each_allocation_failing_reports_memory_error) {
   setting s = setting_open();
   supine_status status = SUPINE_ERROR_MEMORY;
   size_t failures = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Several threads on one basis: each with its own orientation, and all sharing one. */
+/* Several threads use one basis: each in its own orientation, and all together in a shared one. */
 #include <pthread.h>
 
 #include "test.h"
@@ -15,9 +15,10 @@ enum { THREADS = 4, VERTICES = 1003 };
 typedef struct job {
   const supine_basis *basis;
   size_t number;
-  float *shared;                 /* [N, 3]; each thread writes its own range */
-  float own[3 * VERTICES];       /* positions in an orientation of its own */
-  float batch[3 * 2 * VERTICES]; /* positions in the shared orientation, then its own */
+  /* [N, 3] positions in the shared orientation, of which each thread writes a range */
+  float *shared;
+  float own[3 * VERTICES];       /* positions in the thread's own orientation */
+  float batch[3 * 2 * VERTICES]; /* positions in the shared orientation, then in the thread's own */
 } job;
 
 static void frame(const supine_basis *basis, size_t number, double *weights, double *scales) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Safetensors files: round trips and refused files. */
+/* Safetensors files: round trips, refused files and checksums. */
 #include <inttypes.h>
 
 #include "test.h"
@@ -11,7 +11,7 @@
 
 #include "runtime_fixture.h"
 
-/* A file in memory of exactly its size, so that a sanitizer sees any read past its end. */
+/* Open a file in memory, of exactly its size, so that a sanitizer sees any read past its end. */
 static supine_status open_text(const char *header, size_t data_size, supine_error *error) {
   const size_t length = strlen(header);
   const size_t size = 8 + length + data_size;
@@ -86,7 +86,7 @@ TEST(test_write_then_open_same_content) {
   fixture_folder_remove(folder);
 }
 
-/* Data begins at a multiple of 8 bytes, for any length of the header. */
+/* Data begin at a multiple of 8 bytes, for any length of the header. */
 TEST(test_write_header_any_length_padded_to_eight_bytes) {
   char *folder = fixture_folder();
   char path[256];
@@ -154,7 +154,7 @@ TEST(test_write_refused_or_failing_leaves_no_file) {
   (void)snprintf(path, sizeof path, "%s/a", folder);
   assert_int_equal(supine_writer_safetensors_write(path, twice, 2, NULL, 0, NULL),
                    SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(rmdir(folder), 0); /* fails if a file is left in it */
+  assert_int_equal(rmdir(folder), 0); /* fails if a file is left in the folder */
   free(folder);
 }
 
@@ -172,7 +172,7 @@ TEST(test_open_valid_headers_accepted) {
       {"{\"__metadata__\":{}," A8 "}", 2},
       {"{\"__metadata__\":{\"\\u00e9\\ud83e\\udec1\\/\\b\\f\\n\\r\\t\":\"\"}," A8 "}", 2},
       {"{\"b\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[2,6]}," A8 "}",
-       6}, /* misaligned */
+       6}, /* misaligned data */
       {"{\"e\":{\"dtype\":\"F64\",\"shape\":[0,9],\"data_offsets\":[2,2]}," A8 "}", 2},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -192,14 +192,17 @@ TEST(test_open_bad_headers_refused) {
       {" {}", 0},
       {"{", 0},
       {"{}x", 0},
-      {"{" A8 "}", 1},                                                               /* truncated */
-      {"{" A8 "}", 3},                                                               /* trailing */
-      {"{" A8 ",}", 2},                                                              /* comma */
-      {"{" A8 " " A8 "}", 2},                                                        /* no comma */
-      {"{" A8 "," A8 "}", 4},                                                        /* twice */
-      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[1,3]}}", 3}, /* overlap */
-      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[3,5]}}", 5}, /* hole */
-      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}}", 2}, /* shared */
+      {"{" A8 "}", 1},        /* truncated data */
+      {"{" A8 "}", 3},        /* trailing data */
+      {"{" A8 ",}", 2},       /* trailing comma */
+      {"{" A8 " " A8 "}", 2}, /* missing comma */
+      {"{" A8 "," A8 "}", 4}, /* repeated name */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[1,3]}}",
+       3}, /* overlapping data */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[3,5]}}",
+       5}, /* unused bytes */
+      {"{" A8 ",\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[0,2]}}",
+       2}, /* shared data */
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[2,0]}}", 2},
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[3],\"data_offsets\":[0,2]}}", 2},
       {"{\"a\":{\"dtype\":\"F16\",\"shape\":[1],\"data_offsets\":[0,2]}}", 2},
@@ -233,7 +236,7 @@ TEST(test_open_bad_headers_refused) {
       {"{\"a\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[18446744073709551613,"
        "18446744073709551615]}}",
        2},
-      /* Names and metadata strings. */
+      /* Invalid metadata strings and names. */
       {"{\"__metadata__\":{\"k\":1}}", 0},
       {"{\"__metadata__\":{\"k\":\"v\",}}", 0},
       {"{\"__metadata__\":{\"k\":\"v\",\"k\":\"w\"}}", 0},
@@ -287,7 +290,7 @@ TEST(test_open_hostile_lengths_refused) {
   }
 }
 
-TEST(test_open_unreadable_paths_report_read) {
+TEST(test_open_unreadable_paths_report_read_error) {
   supine_safetensors *file = NULL;
   supine_error error;
   assert_int_equal(supine_safetensors_open("/nonexistent", &file, &error), SUPINE_ERROR_READ);
@@ -325,7 +328,7 @@ TEST(test_open_memory_any_alignment_same_content) {
 }
 
 TEST(test_checksum_any_changed_bit_or_order_differs) {
-  /* Sizes around one block of 64 bytes; each bit is changed. */
+  /* Change each bit of data whose sizes include those near blocks of 64 bytes. */
   for (size_t size = 1; size <= 200; size += size < 130 ? 43 : 7) {
     unsigned char data[256] = {0};
     uint64_t random = size;
@@ -358,7 +361,7 @@ TEST(test_checksum_any_changed_bit_or_order_differs) {
               supine_safetensors_checksum(&flat, 1, pairs, 1));
 }
 
-/* Pin the format: with another hash, every existing file would be refused. */
+/* The checksum must never change: with another hash, every existing file would be refused. */
 TEST(test_checksum_sample_literal) {
   const supine_tensor tensor = {"four", SUPINE_F32, 2, {2, 2}, four};
   const supine_metadata pair = {"key", "value"};

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read a breath written as VTP by VTK's own reader, and compare every frame with the same breath as
-safetensors.
+"""Read a breath in VTP by VTK's reader, and compare its frames with those of the same breath in safetensors.
 
     test_series_vtk.py SUPINE
 """
@@ -19,7 +18,7 @@ except ImportError:
     sys.exit(77)
 
 supine = sys.argv[1]
-HALF_STEP = 1 / 512  # mm: lengths are rounded to 1/256
+HALF_STEP = 1 / 512  # mm, largest rounding of lengths, which have steps of 1/256 mm
 
 
 def read(path, step=None):
@@ -43,7 +42,7 @@ def normals_of(points, triangles):
 
 
 def check_surface(surface, points, triangles, rest, lung):
-    """Check every array of a frame."""
+    """Check every array of a frame; return its field data."""
     data = surface.GetPointData()
     found = vtk_to_numpy(surface.GetPoints().GetData())
     assert np.abs(found - points).max() <= HALF_STEP * 1.01
@@ -54,7 +53,7 @@ def check_surface(surface, points, triangles, rest, lung):
     normals = vtk_to_numpy(data.GetNormals()).astype(float)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 0.01
     cosine = (normals * normals_of(points, triangles)).sum(1) / np.linalg.norm(normals, axis=1)
-    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.3  # a grid of 1/256 turns by 0.2
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.3  # degrees; steps of 1/256 rotate a normal by up to 0.2
     assert (vtk_to_numpy(data.GetArray("lung")) == lung).all()
     fields = surface.GetFieldData()
     assert fields.GetAbstractArray("SPACE").GetValue(0) == "LPS"
@@ -86,9 +85,9 @@ with tempfile.TemporaryDirectory() as folder:
     points, triangles = exact["positions"].astype(float), exact["triangles"]
     rest, lung = basis["vertices"].astype(float), basis["lung"]
     frames = len(points)
-    assert frames == 11 and np.ptp(exact["volume"].sum(1)) > 50  # it breathes: mL
+    assert frames == 11 and np.ptp(exact["volume"].sum(1)) > 50  # volumes vary by more than 50 mL
 
-    # The file holds the triangles once.
+    # Frames have the same triangles, which the file holds once.
     for step in (0, 7, 3, 10):
         steps, surface = read("breath.vtp", step)
         fields = check_surface(surface, points[step], triangles, rest, lung)
@@ -96,7 +95,7 @@ with tempfile.TemporaryDirectory() as folder:
         for name, wanted in (("time_s", "time"), ("gravity_LPS", "gravity"), ("volume_mL", "volume")):
             table = vtk_to_numpy(fields.GetArray(name))
             assert (table == exact[wanted]).all(), name
-    # Displacement counts from the scan, of a basis that knows no rest as well.
+    # Displacements are measured from the scan, also in a basis without a rest volume.
     run("precompute", "lungs.ply", "-o", "paper.safetensors", "--law", "paper", "--band", "3")
     for name in ("paper.vtp", "paper_exact.safetensors"):
         run("breathe", "paper.safetensors", "--posture", "supine", "--fps", "4", "-o", name)
@@ -108,14 +107,14 @@ with tempfile.TemporaryDirectory() as folder:
         check_surface(surface, other["positions"][step].astype(float), triangles,
                       paper["vertices"].astype(float), paper["lung"])
         moved = np.abs(vtk_to_numpy(surface.GetPointData().GetArray("displacement"))).max()
-        assert (moved > 1) == (step != 0), moved  # mm; the first frame is the scan
-    # Size relative to the uncompressed arrays: points, displacement, magnitude, triangles, offsets.
+        assert (moved > 1) == (step != 0), moved  # mm; only the first frame is the scan
+    # Size relative to uncompressed points, displacements, magnitudes, triangles and offsets.
     n, m = len(rest), len(triangles)
     share = os.path.getsize("breath.vtp") / (frames * (28 * n + 16 * m))
     print(f"{frames} frames of {n} vertices: {share:.3f} of the bytes without compression")
-    assert share <= 0.42  # by the fastest level; the slowest leaves 0.39
+    assert share <= 0.42  # at the fastest level of compression; the slowest gives 0.39
 
-    # A single surface, also in the axes of the scan.
+    # A single surface has the same arrays.
     run("deform", "lungs.safetensors", "--posture", "prone", "-o", "prone.vtp")
     _, surface = read("prone.vtp")
     found = vtk_to_numpy(surface.GetPoints().GetData())
@@ -124,6 +123,6 @@ with tempfile.TemporaryDirectory() as folder:
     measured = vtk.vtkMassProperties()
     measured.SetInputData(surface)
     measured.Update()
-    held = sum(fields.GetArray("volume_mL").GetTuple(0))  # gas and tissue
+    held = sum(fields.GetArray("volume_mL").GetTuple(0))  # mL of gas and tissue
     assert abs(measured.GetVolume() / 1000 - held) < 0.05, held
-    print("every array as it was computed")
+    print("all arrays equal those computed")

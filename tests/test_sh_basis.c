@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Y_lm of a direction: closed forms, orthonormality, addition theorem, edges. */
+/* Y_lm of a direction: closed forms, orthonormality, addition theorem, edge cases. */
 #include <float.h>
 
 #include "sh/grid.h"
@@ -10,9 +10,10 @@
 
 enum { COUNT_MAX = (SUPINE_SH_BAND_MAX + 1) * (SUPINE_SH_BAND_MAX + 1) };
 
-/* Real harmonics of a unit vector as polynomials: Wikipedia, "Table of spherical harmonics", "Real
- * spherical harmonics", l = 0 to 4, which agrees with R. Ramamoorthi and P. Hanrahan, "An
- * efficient representation for irradiance environment maps", SIGGRAPH 2001, (3) for l <= 2. */
+/* Compute the real harmonics of a unit vector for l = 0 to 4 as polynomials, from Wikipedia, "Table
+ * of spherical harmonics", section "Real spherical harmonics". For l <= 2 they agree with (3) of R.
+ * Ramamoorthi and P. Hanrahan, "An efficient representation for irradiance environment maps",
+ * SIGGRAPH 2001. */
 static void closed_forms(const double d[3], double y[25]) {
   const double x = d[0];
   const double yy = d[1];
@@ -49,7 +50,7 @@ static void closed_forms(const double d[3], double y[25]) {
   y[24] = 0.1875 * sqrt(35 * p) * (x * x * (x * x - 3 * yy * yy) - yy * yy * (3 * x * x - yy * yy));
 }
 
-TEST(test_index_every_harmonic_is_its_position) {
+TEST(test_index_every_harmonic_equals_position) {
   size_t position = 0;
   for (size_t l = 0; l <= SUPINE_SH_BAND_MAX; ++l) {
     for (int m = -(int)l; m <= (int)l; ++m, ++position) {
@@ -75,7 +76,8 @@ TEST(test_evaluate_to_band_4_matches_closed_forms) {
   }
 }
 
-/* Return the largest deviation of the Gram matrix under the quadrature rule from the identity. */
+/* Return the largest deviation from the identity of the Gram matrix of all harmonics, integrated by
+ * the quadrature rule. */
 static double gram_error(size_t band) {
   const size_t count = supine_sh_count(band);
   supine_sh_grid *grid = NULL;
@@ -119,8 +121,8 @@ TEST(test_evaluate_under_rule_orthonormal) {
   }
 }
 
-/* The full test at band 64 needs 7e10 products. Sums over a ring are exact for longitudes > 2 band
- * and separate the orders, so it suffices to integrate each order over latitude. */
+/* All harmonics up to band 64 are orthonormal. The full Gram matrix would need 7e10 products, but
+ * sums over a ring separate the orders m, so each order is integrated over latitude only. */
 TEST(test_evaluate_band_64_orthonormal_in_latitude) {
   const size_t band = SUPINE_SH_BAND_MAX;
   supine_sh_grid *grid = NULL;
@@ -151,7 +153,7 @@ TEST(test_evaluate_band_64_orthonormal_in_latitude) {
   supine_sh_grid_destroy(grid);
 }
 
-/* sum over m of Y_lm(a) Y_lm(b) = (2 l + 1) / (4 pi) P_l(a.b) */
+/* The sum over m of Y_lm(a) Y_lm(b) is (2 l + 1) / (4 pi) P_l(a.b). */
 TEST(test_evaluate_two_directions_obey_addition_theorem) {
   const double tolerance = 2048 * DBL_EPSILON;
   static double ya[COUNT_MAX];
@@ -195,7 +197,7 @@ TEST(test_evaluate_poles_only_zonal) {
   }
 }
 
-/* Y(l, 1) near the pole is sqrt((2 l + 1) l (l + 1) / (8 pi)) x: it must be accurate where 1 - z^2
+/* Y(l, 1) near the pole is sqrt((2 l + 1) l (l + 1) / (8 pi)) x, and is accurate even where 1 - z^2
  * has lost all digits. */
 TEST(test_evaluate_near_pole_keeps_relative_accuracy) {
   static double y[COUNT_MAX];

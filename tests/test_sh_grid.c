@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The quadrature rule: literal nodes, exactness, directions, refusals. */
+/* The quadrature rule: literal nodes, exactness, directions, refused arguments. */
 #include <float.h>
 
 #include "sh/grid.h"
@@ -7,7 +7,8 @@
 
 #include "sh_helpers.h"
 
-/* M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, table 25.4, n = 5. */
+/* The nodes and weights are those of M. Abramowitz and I. A. Stegun, Handbook of Mathematical
+ * Functions, table 25.4, n = 5. */
 TEST(test_grid_five_latitudes_match_table) {
   static const double z[] = {0.906179845938664, 0.538469310105683, 0, -0.538469310105683,
                              -0.906179845938664};
@@ -24,7 +25,8 @@ TEST(test_grid_five_latitudes_match_table) {
   supine_sh_grid_destroy(grid);
 }
 
-/* n nodes integrate z^p exactly for p < 2 n. GSL has tables for some n and computes others. */
+/* n latitudes integrate z^p exactly for p < 2 n. GSL has tables of nodes for some n and computes
+ * them for others. */
 TEST(test_grid_any_size_integrates_powers) {
   static const size_t sizes[] = {1, 2, 7, 16, 17, 20, 21, 31, 33, 63, 65, 127, 130};
   for (size_t s = 0; s < sizeof sizes / sizeof *sizes; ++s) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Templates: names, sections, escapes. */
+/* Templates: names, sections, included files, escapes. */
 #include "program/export/template.h"
 #include "test.h"
 
@@ -7,7 +7,7 @@ static void write_large(const void *context, const char *name, FILE *file) {
   (void)fprintf(file, "[%s %s]", (const char *)context, name);
 }
 
-/* Expand a template with data; the other assets are fixed. */
+/* Assert the expansion of a template with JSON data; the files that it may include are fixed. */
 static void check(const char *text, const char *json, const char *expected) {
   const supine_asset assets[] = {{"main.html", text, strlen(text)},
                                  {"part.html", "<i>{{title}}</i>", 16},
@@ -66,7 +66,8 @@ TEST(test_template_inner_names_hide_outer) {
         "{\"x\": 1, \"a\": {\"x\": 2, \"a\": {\"x\": 3}}}", "231");
 }
 
-/* An unclosed section extends to the end; nothing is read beyond it. */
+/* An unclosed section or tag extends to the end of the template, and nothing is read beyond the
+ * end. */
 TEST(test_template_unclosed_tags_end_with_text) {
   check("{{#a}}x{{b}}", "{\"a\": [{\"b\": 1}, {\"b\": 2}]}", "x1x2");
   check("x{{a", "{\"a\": 1}", "x{{a");

@@ -4,7 +4,7 @@
 #include "precompute/precompute.h"
 #include "test.h"
 
-enum { VERTICES = 9000 }; /* several blocks of each sum, with a short last block */
+enum { VERTICES = 9000 }; /* enough for several blocks of each parallel sum, the last one short */
 
 static supine_lungs phantom(void) {
   supine_mesh mesh = {0};
@@ -15,7 +15,7 @@ static supine_lungs phantom(void) {
   return lungs;
 }
 
-/* Return the bytes of a basis computed with `threads` threads. */
+/* Return the bytes of a basis computed with `threads` threads (malloc), and set their number. */
 static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precompute_options *options,
                                const char *threads, size_t *size) {
   char path[] = "/tmp/supine-threads-XXXXXX";

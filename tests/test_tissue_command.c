@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Tissue options of solve and precompute: accepted and refused values, warnings and output. */
+/* Options for tissue of `solve` and `precompute`: accepted and refused values, warnings and
+ * output. */
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "test.h"
@@ -11,7 +12,7 @@
 
 static char folder[] = "/tmp/supine-tissue-XXXXXX";
 static char lungs[64], csv[64], out[64], other[64];
-static char text[16384]; /* stderr of the command */
+static char text[16384]; /* stderr of the last command */
 
 static int setup(void **state) {
   (void)state;
@@ -128,7 +129,7 @@ TEST(test_solve_bad_expandability_file_message_names_vertex) {
   assert_int_equal(solve("--expandability", "/nowhere/a.csv", out), SUPINE_EXIT_INPUT);
 }
 
-/* A file with the values of the built-in model gives the same lungs. */
+/* A file of expandability 1 gives the same bytes as uniform tissue. */
 TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   char ply[80];
   (void)snprintf(ply, sizeof ply, "%s.ply", other);
@@ -148,10 +149,10 @@ TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   (void)unlink(ply);
 }
 
-/* The basis of a collapsed lung: volumes measured on surfaces are exact for each lung and in total.
- */
+/* In a basis with a collapsed lung, the volumes measured on the surface are exact for each lung and
+ * in total. */
 TEST(test_precompute_collapsed_lung_volumes_exact) {
-  double volumes[2][2]; /* [healthy or collapsed][lung] at one scale, mL */
+  double volumes[2][2]; /* [healthy, collapsed][lung] volume gained, mL */
   double rests[2][2];
   supine_basis *healthy = NULL;
   static const char *const shares[] = {"left:1", "left:0.3"};
@@ -210,7 +211,7 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
     free(xyz);
     if (ill == 0) {
       healthy = basis;
-    } else { /* 0.3 of its healthy volume change at this scale */
+    } else { /* the collapsed lung gains 0.3 of a healthy one at equal scale */
       const double was = posed_lung_volume(healthy, 0, weights, scales[0]);
       assert_true(fabs(volumes[1][0] - 0.3 * was) < 1e-4);
       supine_basis_close(basis);
@@ -219,7 +220,7 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
   supine_basis_close(healthy);
   assert_true(fabs(rests[1][0] - 0.3 * rests[0][0]) < 0.05);
   assert_true(fabs(rests[1][1] - rests[0][1]) < 0.05);
-  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the healthy lung takes the rest */
+  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the healthy lung gains over 50 mL more */
   assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
 }
 
@@ -230,7 +231,7 @@ TEST(test_solve_missing_lung_refused) {
   (void)snprintf(one, sizeof one, "%s.ply", other);
   assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
   left = mesh;
-  left.vertex_count = mesh.vertex_count / 2; /* the phantom's lungs are alike */
+  left.vertex_count = mesh.vertex_count / 2; /* both lungs of the phantom have as many vertices */
   left.triangle_count = mesh.triangle_count / 2;
   assert_int_equal(supine_mesh_save(one, &left, NULL, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Meshes and stiffnesses far from those of lungs: the solver reaches the required residual. */
+/* Meshes and stiffness unlike those of lungs: the solver reaches the required residual. */
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
 #include "test.h"
@@ -12,8 +12,9 @@ static supine_mesh phantom(void) {
   return mesh;
 }
 
-/* Return the largest difference of the force of a solution from the applied force, relative to the
- * largest force; with a reach, of the right-hand sides of the equilibrium, which are a f. */
+/* Return the largest difference between the force of a solution and the applied force, relative to
+ * the largest force. With a reach, compare forces divided by the stiffness, the right-hand sides of
+ * the equilibrium. */
 static double residual(const supine_lungs *lungs, const supine_model *model, const double g[3],
                        const supine_solution *solution) {
   const size_t n = solution->vertex_count;
@@ -33,8 +34,8 @@ static double residual(const supine_lungs *lungs, const supine_model *model, con
   return relative;
 }
 
-/* Solve with and without a reach: finite results, with the required residual, and positive without
- * a reach, as they are sums over paths. */
+/* Solve with and without a reach. Assert that the catch is finite with the required residual and,
+ * without a reach, positive, as it is a sum over paths. */
 static void check(const char *what, supine_mesh *mesh, const double *stiffness) {
   static const double g[3] = {0.48, 0.64, -0.6};
   supine_lungs lungs = {0};
@@ -51,7 +52,7 @@ static void check(const char *what, supine_mesh *mesh, const double *stiffness) 
       fail_msg("%s, reach %g: %s", what, model.reach, error.message);
     }
     const double left = residual(&lungs, &model, g, &solution);
-    printf("%s, reach %2.0f: %zu vertices, residual %.0e\n", what, model.reach,
+    printf("%s, reach %2.0f mm: %zu vertices, residual %.0e\n", what, model.reach,
            solution.vertex_count, left);
     assert_true(left <= 1e-10);
     for (size_t i = 0; i < solution.vertex_count; ++i) {
@@ -64,7 +65,8 @@ static void check(const char *what, supine_mesh *mesh, const double *stiffness) 
   supine_mesh_free(mesh);
 }
 
-/* Move every third vertex to a thousandth of its link from a neighbour. */
+/* Make slivers: move a corner of every seventh triangle to a thousandth of its distance from the
+ * next corner. */
 TEST(test_solve_slivers_reaches_residual) {
   supine_mesh mesh = phantom();
   for (size_t t = 0; t < mesh.triangle_count; t += 7) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The transform: round trips, comparison with quadrature, refused arguments. */
+/* The transform of fields on a grid: round trips, comparison with quadrature, refused arguments. */
 #include <float.h>
 
 #include "sh/transform.h"
@@ -35,7 +35,7 @@ static double *make(size_t count, uint64_t seed) {
   return numbers;
 }
 
-/* Compute coefficients [fields, count] of values [points, fields], from the last latitude to the
+/* Compute coefficients [fields, count] of values [points, fields], adding latitudes from last to
  * first. */
 static void forward(const setup *s, size_t fields, const double *values, double *coefficients) {
   const size_t latitudes = s->grid->latitudes;
@@ -52,12 +52,13 @@ static double largest_difference(const double *a, const double *b, size_t count)
   double worst = 0;
   for (size_t i = 0; i < count; ++i) {
     const double off = fabs(a[i] - b[i]);
-    worst = off <= worst ? worst : off; /* keeps NaN */
+    worst = off <= worst ? worst : off; /* false for NaN, which is kept */
   }
   return worst;
 }
 
-/* Compute grid values of fields with known coefficients [fields, count], harmonic by harmonic. */
+/* Compute the grid values [points, fields] of fields with coefficients [fields, count] by summing
+ * harmonics. */
 static void sum_harmonics(const setup *s, size_t fields, const double *coefficients,
                           double *values) {
   double *y = make(s->count, 0);
@@ -96,7 +97,7 @@ TEST(test_transform_band_limited_round_trip) {
   }
 }
 
-TEST(test_forward_highest_band_one_harmonic_is_one_coefficient) {
+TEST(test_forward_harmonic_of_highest_band_gives_one_coefficient) {
   setup s = set_up(SUPINE_SH_BAND_MAX, SUPINE_SH_BAND_MAX + 1, 2 * SUPINE_SH_BAND_MAX + 2);
   static const size_t chosen[] = {0, 2, 4095, 4096, 4097, 4159, 4160, 4161, 4223, 4224};
   enum { FIELDS = sizeof chosen / sizeof *chosen };
@@ -123,7 +124,7 @@ TEST(test_forward_highest_band_one_harmonic_is_one_coefficient) {
   tear_down(&s);
 }
 
-/* Values without a band limit: the transform still equals plain quadrature. */
+/* For values without a band limit, the transform still equals plain quadrature. */
 TEST(test_forward_any_values_equal_direct_quadrature) {
   enum { FIELDS = 5 };
   setup s = set_up(6, 9, 20);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* [Santhanam2008] III-C and IV-B on a real lung: displacement by volume, ventilation by height, and
+/* [Santhanam2008] III-C and IV-B on real lungs: displacement by volume, ventilation by height, and
  * the effect of mesh resolution. */
 #include "test.h"
 
@@ -18,8 +18,8 @@ static bool load(const char *left, const char *right, supine_lungs *lungs) {
   return helper_real_lungs(names, 2, SUPINE_AXES_AUTO, lungs);
 }
 
-/* III-C: in one orientation every vertex moves along a line, nearly in proportion to the volume; by
- * the run-time library on a basis file. */
+/* In one orientation every vertex moves along a line, nearly in proportion to the volume
+ * ([Santhanam2008] III-C), as computed by the run-time library from a basis file. */
 TEST(test_deform_one_orientation_linear_in_volume) {
   char path[] = "/tmp/supine-validation-XXXXXX";
   supine_lungs lungs = {0};
@@ -69,8 +69,8 @@ TEST(test_deform_one_orientation_linear_in_volume) {
         }
       }
     }
-    printf("%s: displacement within %.2f %% of proportional to the volume up to 500 mL, directions "
-           "within %.1e of one line (1 - cos)\n",
+    printf("%s: displacement deviates by at most %.2f %% from proportional to the volume up to 500 "
+           "mL; displacements within %.1e of one line (1 - cosine)\n",
            posture_names[p], 100.0 * bend, turn);
     assert_true(bend < 0.02);
     assert_true(turn < 1e-6);
@@ -82,8 +82,8 @@ TEST(test_deform_one_orientation_linear_in_volume) {
   free(part);
 }
 
-/* Kaneko et al., J. Appl. Physiol. 21, 1966, 767-777: in supine, prone and both lateral postures
- * ventilation rises from the uppermost to the lowermost zone, with much the same gradient. */
+/* Supine, prone and on either side, ventilation increases from the uppermost to the lowermost zone
+ * with about the same gradient, as Kaneko et al. found (J. Appl. Physiol. 21, 1966, 767-777). */
 TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
   supine_lungs lungs = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &lungs)) {
@@ -94,12 +94,12 @@ TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
   for (size_t p = 0; p < 4; ++p) {
     ventilation found = {0};
     assert_int_equal(ventilation_measure(&lungs, postures[p], 500.0, &found), SUPINE_OK);
-    printf("%-6s index from uppermost to lowermost:", posture_names[p]);
+    printf("%-6s ventilation index from uppermost to lowermost:", posture_names[p]);
     for (size_t z = 0; z < ZONES; ++z) {
       printf(" %.2f", found.index[z]);
       assert_true(z == 0 || found.index[z] > found.index[z - 1]);
     }
-    printf("; slope %.2f over the height, %.3f a cm\n       swept:", found.slope,
+    printf("; slope %.2f over the height, %.3f per cm\n       swept:", found.slope,
            10.0 * found.slope / found.height);
     for (size_t z = 0; z < ZONES; ++z) {
       printf(" %.2f", found.swept[z]);
@@ -112,8 +112,8 @@ TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
   supine_lungs_free(&lungs);
 }
 
-/* The same lungs at 5k and 20k vertices each: a reach removes most of the difference. */
-TEST(test_solve_reach_less_change_with_resolution) {
+/* A reach removes most of the difference between the same lungs at 5,000 and at 20,000 vertices. */
+TEST(test_solve_reach_reduces_change_with_resolution) {
   supine_lungs coarse = {0};
   supine_lungs fine = {0};
   if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &coarse) ||
@@ -136,10 +136,9 @@ TEST(test_solve_reach_less_change_with_resolution) {
     drift[with] = drift_of(&coarse.mesh, moves[0], &fine.mesh, moves[1]);
     assert_int_equal(spread_of(&coarse, reach, vertex, &spread[with][0]), SUPINE_OK);
     assert_int_equal(spread_of(&fine, reach, same, &spread[with][1]), SUPINE_OK);
-    printf(
-        "reach %2.0f mm, 5k to 20k: displacements drift by %.2f %% RMS; a unit force spreads %.2f, "
-        "then %.2f mm\n",
-        reach, 100.0 * drift[with], spread[with][0], spread[with][1]);
+    printf("reach %2.0f mm, 5k to 20k: displacements change by %.2f %% RMS; a unit force spreads "
+           "%.2f, then %.2f mm\n",
+           reach, 100.0 * drift[with], spread[with][0], spread[with][1]);
   }
   assert_true(drift[1] < 0.5 * drift[0]);
   assert_true(fabs(spread[1][1] / spread[1][0] - 1.0) < 0.03);

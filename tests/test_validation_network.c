@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* [Santhanam2008] Figs. 7 to 9: sheet, ring and convergence, against a mass-spring-damper system
- * that is integrated to rest. */
+/* [Santhanam2008] Figs. 7 to 9: a sheet, a ring and convergence, compared with a mass-spring-damper
+ * system integrated until it is at rest. */
 #include "test.h"
 #include "validation.h"
 
-/* Fig. 8 */
+/* A plane sheet moves as a mass-spring-damper system does ([Santhanam2008] Fig. 8). */
 TEST(test_solve_plane_equals_mass_spring_damper) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -16,16 +16,16 @@ TEST(test_solve_plane_equals_mass_spring_damper) {
   mass_spring_damper system = damper_create(&f, stiffness, force);
   assert_true(damper_integrate(&system, stiffness, 40.0, 1, theirs, NULL, NULL));
   const double difference = relative_rms(n, ours, theirs);
-  printf("sheet of %zu masses: %.2e %% RMS difference to a mass-spring-damper system at rest\n", n,
-         100.0 * difference);
+  printf("sheet of %zu masses: difference from a mass-spring-damper system at rest %.2e %% RMS\n",
+         n, 100.0 * difference);
   assert_true(difference < 1e-3);
-  assert_true(difference < 1e-6); /* only the integration error is left */
+  assert_true(difference < 1e-6); /* tolerance of the integration */
   double middle = 0.0;
   double corner = ours[0];
   for (size_t i = 0; i < n; ++i) {
     middle = fmax(middle, ours[i]);
   }
-  assert_true(middle > 5.0 * corner); /* not a trivial field */
+  assert_true(middle > 5.0 * corner); /* so that the field is not trivial */
   damper_free(&system);
   frame_free(&f);
   free(force);
@@ -34,7 +34,7 @@ TEST(test_solve_plane_equals_mass_spring_damper) {
   free(theirs);
 }
 
-/* With stiffness that varies fourfold, over links of all lengths. */
+/* The same holds with stiffness that varies fourfold and links of unequal length. */
 TEST(test_solve_irregular_plane_equals_mass_spring_damper) {
   frame f = frame_plane(15, 7.0);
   const size_t n = f.mesh.vertex_count;
@@ -52,7 +52,7 @@ TEST(test_solve_irregular_plane_equals_mass_spring_damper) {
   mass_spring_damper system = damper_create(&f, stiffness, force);
   assert_true(damper_integrate(&system, stiffness, 60.0, 1, theirs, NULL, NULL));
   const double difference = relative_rms(n, ours, theirs);
-  printf("irregular sheet: %.2e %% RMS difference\n", 100.0 * difference);
+  printf("irregular sheet: difference %.2e %% RMS\n", 100.0 * difference);
   assert_true(difference < 1e-6);
   damper_free(&system);
   frame_free(&f);
@@ -62,7 +62,7 @@ TEST(test_solve_irregular_plane_equals_mass_spring_damper) {
   free(theirs);
 }
 
-/* Fig. 9 */
+/* A uniform ring expands into a circle ([Santhanam2008] Fig. 9). */
 TEST(test_solve_uniform_ring_stays_circle) {
   enum { COUNT = 60 };
   frame f = frame_ring(COUNT, 50.0);
@@ -71,7 +71,7 @@ TEST(test_solve_uniform_ring_stays_circle) {
   assert_int_equal(frame_solve(&f, NULL, force, catch_), SUPINE_OK);
   double low = INFINITY;
   double high = 0.0;
-  for (size_t i = 0; i < COUNT; ++i) { /* radii of the expanded ring */
+  for (size_t i = 0; i < COUNT; ++i) { /* radius of the expanded ring at each mass */
     const double *p = f.mesh.vertices + 3 * i;
     const double scale = 10.0;
     const double radius = hypot(p[0], p[1]);
@@ -80,7 +80,7 @@ TEST(test_solve_uniform_ring_stays_circle) {
     low = fmin(low, hypot(x, y));
     high = fmax(high, hypot(x, y));
   }
-  assert_true(low > 51.0); /* it expands */
+  assert_true(low > 51.0); /* larger than the radius before, 50 mm */
   assert_true(high - low <= 1e-10);
   free(force);
   frame_free(&f);
@@ -98,10 +98,10 @@ TEST(test_solve_mixed_ring_stiff_part_moves_less) {
     assert_int_equal(frame_solve(&f, stiffness, force, catch_), SUPINE_OK);
     const double middle = catch_[COUNT / 2];
     const double opposite = catch_[0];
-    printf("ring, one third %g times as stiff: it moves %.4f, the opposite side %.4f\n", factors[k],
-           middle, opposite);
+    printf("ring with a third %g times as stiff: the third moves %.4f, the opposite side %.4f\n",
+           factors[k], middle, opposite);
     for (size_t i = 0; i < COUNT; ++i) {
-      assert_true(catch_[i] > 0.0); /* like a balloon: nothing moves inwards */
+      assert_true(catch_[i] > 0.0); /* nothing moves inwards, as in a balloon */
     }
     assert_true(middle / opposite < last);
     assert_true(factors[k] == 1.0 ? fabs(middle / opposite - 1.0) < 1e-10
@@ -118,7 +118,8 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Fig. 7: work to reach 1e-6 of the converged solution, in visits of a link from one end. */
+/* Pitcher/Catcher needs fewer visits of a link from one of its ends to reach an error of 1e-6
+ * ([Santhanam2008] Fig. 7). */
 TEST(test_pitcher_catcher_converges_before_mass_spring_damper) {
   frame f = frame_plane(15, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -138,7 +139,8 @@ TEST(test_pitcher_catcher_converges_before_mass_spring_damper) {
   const size_t links = 2 * f.topology.edge_count;
   const size_t work[2] = {distributions * 4 * f.topology.edge_count / (n + f.topology.edge_count),
                           system.evaluations * links};
-  printf("to 1e-6: Pitcher/Catcher %zu link visits, mass-spring-damper %zu\n", work[0], work[1]);
+  printf("link visits to an error of 1e-6: Pitcher/Catcher %zu, mass-spring-damper %zu\n", work[0],
+         work[1]);
   assert_true(work[0] < work[1]);
   damper_free(&system);
   frame_free(&f);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volumes by their forms against volumes of the surface, and the scale for a given volume. */
+/* Volumes by volume forms against volumes of the surface, and the scale or the gains for a given
+ * volume. */
 #include <float.h>
 
 #include "test.h"
@@ -91,8 +92,8 @@ TEST(test_scale_random_volumes_reached) {
   fixture_destroy(f);
 }
 
-/* Make a basis whose volume is exactly a s + b s^2 + c s^3: one mode, one constant harmonic, weight
- * 1. */
+/* Make a basis whose volume is exactly a s + b s^2 + c s^3 mL at scale s: one mode, whose weight is
+ * 1 in any direction. */
 static supine_basis *open_cubic(double a, double b, double c, unsigned char **bytes) {
   fixture *f = fixture_create(5, 1, 0, 1, false, true, 1, 3);
   f->mode[0] = 1 / 0.28209479177387814;
@@ -104,29 +105,30 @@ static supine_basis *open_cubic(double a, double b, double c, unsigned char **by
   return basis;
 }
 
-TEST(test_scale_cubics_branch_of_rest_only) {
+TEST(test_scale_cubic_root_on_branch_of_rest) {
   static const struct {
-    double a, b, c, volume, scale; /* scale NAN: not reachable */
+    /* Volume in mL; the expected scale, NAN if it cannot be reached. */
+    double a, b, c, volume, scale;
   } cases[] = {
-      {2, 0, 0, 10, 5},           /* linear */
-      {2, 0, 0, -10, -5},         /**/
-      {-2, 0, 0, 10, -5},         /* the field shrinks the lung */
-      {0, 0, 0, 1, NAN},          /* nothing moves */
-      {0, 0, 1, 8, NAN},          /* zero slope at s = 0 */
-      {0, 0, 0, 0, 0},            /**/
-      {2, 1, 0, 8, 2},            /* 2 s + s^2 = 8: s = 2, not -4 */
-      {2, 1, 0, -0.75, -0.5},     /* turns back at s = -1, V = -1 */
-      {2, 1, 0, -1, -1},          /* just reached */
-      {2, 1, 0, -1.0001, NAN},    /**/
-      {1, 0, 1, 10, 2},           /* s + s^3 */
-      {1, 0, 1, -30, -3},         /**/
-      {3, 0, -1, 2, 1},           /* 3 s - s^3 turns at s = 1, V = 2; s = -2 gives 2 too */
-      {3, 0, -1, 2.001, NAN},     /* although s = -2.0001 would give it */
-      {3, 0, -1, 1.375, 0.5},     /**/
-      {6, -4.5, 1, 2.5, 1},       /* turns at s = 1 (2.5) and at s = 2 */
-      {6, -4.5, 1, 2.6, NAN},     /* reached again only beyond both turns */
+      {2, 0, 0, 10, 5}, /* linear */
+      {2, 0, 0, -10, -5},
+      {-2, 0, 0, 10, -5}, /* the field shrinks the lung */
+      {0, 0, 0, 1, NAN},  /* nothing moves */
+      {0, 0, 1, 8, NAN},  /* the slope is 0 at s = 0 */
+      {0, 0, 0, 0, 0},
+      {2, 1, 0, 8, 2},        /* 2 s + s^2 = 8: s = 2, not -4 */
+      {2, 1, 0, -0.75, -0.5}, /* has its minimum V = -1 at s = -1 */
+      {2, 1, 0, -1, -1},      /* the minimum itself */
+      {2, 1, 0, -1.0001, NAN},
+      {1, 0, 1, 10, 2}, /* s + s^3 */
+      {1, 0, 1, -30, -3},
+      {3, 0, -1, 2, 1},       /* 3 s - s^3 has a maximum V = 2 at s = 1; s = -2 also gives 2 */
+      {3, 0, -1, 2.001, NAN}, /* only s near -2 gives it, beyond the minimum */
+      {3, 0, -1, 1.375, 0.5},
+      {6, -4.5, 1, 2.5, 1},       /* maximum V = 2.5 at s = 1, minimum at s = 2 */
+      {6, -4.5, 1, 2.6, NAN},     /* reached only beyond both extremes */
       {1e-300, 0, 0, 1e300, NAN}, /* overflows */
-      {1e-3, 0, 0, 1e3, 1e6},     /**/
+      {1e-3, 0, 0, 1e3, 1e6},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
     unsigned char *bytes = NULL;
@@ -144,7 +146,7 @@ TEST(test_scale_cubics_branch_of_rest_only) {
       assert_true(strlen(error.message) > 0);
     } else {
       assert_int_equal(status, SUPINE_OK);
-      /* If the slope vanishes, the root is known only to the square root of epsilon. */
+      /* Where the slope is 0, the root is known only to the square root of epsilon. */
       assert_true(fabs(scale - cases[i].scale) <= 4e-8 * fabs(cases[i].scale));
     }
     supine_basis_close(basis);
@@ -179,8 +181,8 @@ TEST(test_pose_open_surface_refused) {
   fixture_destroy(f);
 }
 
-/* Make a lung whose volume is the product of the lengths of its axes, 3000 mL at full inflation: at
- * gains of -1 the axes are shorter by a fifth to a third. */
+/* Volume form of a box of 3000 mL at full inflation, whose axes are shorter by 20 to 30 % at gains
+ * of -1. */
 static const supine_volume_form box_form = {{3000 * 0.2, 3000 * 0.25, 3000 * 0.3, 3000 * 0.25 * 0.3,
                                              3000 * 0.2 * 0.3, 3000 * 0.2 * 0.25,
                                              3000 * 0.2 * 0.25 * 0.3}};
@@ -198,8 +200,7 @@ TEST(test_volume_form_gains_any_volume_reached_on_path) {
     assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, part * rest, gains, NULL),
                      SUPINE_OK);
     assert_true(fabs(box_volume(gains) - part * rest) <= 1e-9);
-    /* The differences between axes are those of the bend times a common factor: all poses are on
-     * one path. */
+    /* All poses are on one path: gains of the axes differ by the bend times a common factor. */
     assert_true(fabs(gains[1] + gains[2] - 2 * gains[0]) <= 1e-12);
     for (size_t axis = 0; axis < 3; ++axis) {
       assert_true(gains[axis] < last[axis]);
@@ -218,11 +219,11 @@ TEST(test_volume_form_gains_at_rest_equal_on_all_axes) {
   }
 }
 
-/* Slopes of the path: 1, 0.1, 1.9 at rest; 1, 1.45, 0.55 at full inflation. */
+/* The path has the slopes 1, 0.1, 1.9 at rest and 1, 1.45, 0.55 at full inflation. */
 TEST(test_volume_bend_path_has_stated_slopes) {
   static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
   for (size_t end = 0; end < 2; ++end) {
-    for (int side = -1; side <= 1; side += 2) { /* value and slope are continuous at rest */
+    for (int side = -1; side <= 1; side += 2) { /* the slope is the same on both sides */
       double at[3];
       double near[3];
       supine_volume_bend(box_bend, (double)end, at);
@@ -235,7 +236,8 @@ TEST(test_volume_bend_path_has_stated_slopes) {
   }
 }
 
-/* Full inflation and beyond, between full inflation and rest, and below rest. */
+/* The path has the stated values beyond full inflation, between full inflation and rest, and below
+ * rest. */
 TEST(test_volume_bend_path_has_stated_values) {
   static const double at[][3] = {
       {-0.2, -0.2864, -0.1136}, {0.4, 0.5512, 0.2488}, {1.3, 1.244062423021089, 1.355937576978911}};

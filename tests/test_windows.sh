@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Build the run-time library for Windows by Debian's gcc-mingw-w64-x86-64-win32, without warnings. It exports
-# what the headers declare and needs only system libraries. Under wine (wine64) its results are the same bits.
+# Build the run-time library for Windows by Debian's gcc-mingw-w64-x86-64-win32, without warnings. Check that it
+# exports what the headers declare and needs only system libraries, and that under wine (wine64) its results have the
+# same bits as here.
 #
 #     test_windows.sh CMAKE SOURCE_FOLDER LIBRARY CC
 set -eu
@@ -15,11 +16,11 @@ trap 'rm -rf "$work"' EXIT
 dll=$work/build/runtime/libsupine_runtime.dll
 
 x86_64-w64-mingw32-objdump -p "$dll" >"$work/dump"
-grep 'DLL Name' "$work/dump" | grep -viE 'KERNEL32|msvcrt' && { echo "needs more than the system"; exit 1; }
+grep 'DLL Name' "$work/dump" | grep -viE 'KERNEL32|msvcrt' && { echo "the library needs more than system libraries"; exit 1; }
 sed -n 's/.*\[ *[0-9]*\] .*\(supine_[a-z0-9_]*\)$/\1/p' "$work/dump" | sort -u >"$work/shown"
 nm -g --defined-only "$library" | awk 'NF == 3 {print $3}' | sort -u >"$work/here"
 [ "$(grep -cx 'supine_deform' "$work/shown")" = 1 ]
-[ -z "$(comm -23 "$work/shown" "$work/here")" ] || { echo "shows what is not of the library"; exit 1; }
+[ -z "$(comm -23 "$work/shown" "$work/here")" ] || { echo "the library exports names that the other build does not define"; exit 1; }
 for header in "$source"/runtime/include/supine/*.h; do
   printf '#include "%s"\n' "$header"
 done >"$work/all.c"
@@ -36,7 +37,7 @@ x86_64-w64-mingw32-gcc -O2 $include "$source/tests/python/reference.c" "$dll.a" 
 cp "$dll" "$source/tests/golden/basis_2.safetensors" "$work"
 cd "$work"
 export WINEPREFIX="$work/wine" WINEDEBUG=-all
-# Wine's server outlives the programs, and writes when it ends.
+# Wine's server runs on after the programs, and writes files when it ends.
 trap '{ wineserver -k; wineserver -w; } >/dev/null 2>&1 || true; rm -rf "$work"' EXIT
 run() {
   timeout 400 "$wine" "$@"
@@ -52,4 +53,4 @@ run ./reference.exe cut prone 0.5 2>log && exit 1
 grep -q '^cut: truncated' log || { cat log; exit 1; }
 run ./reference.exe nowhere prone 0.5 2>log && exit 1
 grep -q '^nowhere: cannot read' log || { cat log; exit 1; }
-echo "built, and run under wine: bit for bit as here"
+echo "built, and run under wine: same bits as here"

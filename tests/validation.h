@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Validations of [Santhanam2008] IV, shared by tests and bench_validation. */
+/* Validations of [Santhanam2008] IV, shared by the tests and bench_validation. */
 #ifndef SUPINE_VALIDATION_H
 #define SUPINE_VALIDATION_H
 
@@ -18,7 +18,7 @@
 #include "precompute/precompute.h"
 #include <supine/volume.h>
 
-/* Masses and links; triangles are optional. */
+/* A network of masses and links; triangles are optional. */
 typedef struct frame {
   supine_mesh mesh;
   supine_topology topology;
@@ -29,7 +29,7 @@ static inline void frame_free(frame *f) {
   supine_mesh_topology_free(&f->topology);
 }
 
-/* Make a flat sheet of side x side masses, `spacing` mm apart, with links along rows, columns and
+/* Return a flat sheet of side x side masses, `spacing` mm apart, with links along rows, columns and
  * one diagonal. */
 static inline frame frame_plane(size_t side, double spacing) {
   frame f = {.mesh = {.vertex_count = side * side, .triangle_count = 2 * (side - 1) * (side - 1)}};
@@ -54,7 +54,7 @@ static inline frame frame_plane(size_t side, double spacing) {
   return f;
 }
 
-/* Make a ring of evenly spaced masses with the given radius, mm. */
+/* Return a ring of evenly spaced masses with this radius, mm. */
 static inline frame frame_ring(size_t count, double radius) {
   frame f = {.mesh = {.vertex_count = count}, .topology = {.edge_count = count}};
   f.mesh.vertices = calloc(3 * count, sizeof *f.mesh.vertices);
@@ -64,7 +64,7 @@ static inline frame frame_ring(size_t count, double radius) {
     const double angle = 2.0 * M_PI * (double)i / (double)count;
     f.mesh.vertices[3 * i] = radius * cos(angle);
     f.mesh.vertices[3 * i + 1] = radius * sin(angle);
-    if (i > 0) { /* sorted: (0, 1), (0, count - 1), (1, 2), ... */
+    if (i > 0) { /* links in sorted order: (0, 1), (0, count - 1), (1, 2), ... */
       const size_t e = i == 1 ? 0 : i;
       f.topology.edges[2 * e] = (uint32_t)(i - 1);
       f.topology.edges[2 * e + 1] = (uint32_t)i;
@@ -73,7 +73,7 @@ static inline frame frame_ring(size_t count, double radius) {
   return f;
 }
 
-/* Solve for F. */
+/* Solve for the catch F [N] of the masses under a force [N]. */
 static inline supine_status frame_solve(const frame *f, const double *stiffness,
                                         const double *force, double *catch_) {
   supine_equilibrium *equilibrium = NULL;
@@ -89,22 +89,24 @@ static inline supine_status frame_solve(const frame *f, const double *stiffness,
   return status;
 }
 
-/* Unit masses between springs and dampers, each tied to the ground by a spring:
+/* Unit masses linked by springs, each with a damper and a spring to the ground: the position y_i of
+ * mass i obeys
  *
  *     y_i'' = p_i - ground_i y_i - sum over links of k_ij (y_i - y_j) - damping y_i' */
 typedef struct mass_spring_damper {
   size_t count;
   size_t links;
-  const uint32_t *ends; /* [links, 2] */
-  double *k;            /* [links] */
-  double *ground;       /* [count] */
-  double *push;         /* [count] p */
+  const uint32_t *ends; /* [links, 2] masses at the ends */
+  double *k;            /* [links] spring constant k_ij */
+  double *ground;       /* [count] spring constant to the ground */
+  double *push;         /* [count] push p_i */
   double damping;
   size_t evaluations; /* number of evaluations of the right-hand side so far */
 } mass_spring_damper;
 
-/* Compute the spring constants of equilibrium.h from its formulas, for stiffness E of geometric
- * mean 1: links have k_ij, and the ground has the excess of the diagonal over the sum of k_ij. */
+/* Create the system that has the equilibrium defined in equilibrium.h, for stiffness E of geometric
+ * mean 1: its springs have the constants k_ij of links, and those to the ground the excess of the
+ * diagonal over the sum of k_ij. */
 static inline mass_spring_damper damper_create(const frame *f, const double *stiffness,
                                                const double *force) {
   const size_t n = f->mesh.vertex_count;
@@ -160,8 +162,8 @@ static inline int damper_slope(double time, const double *state, double *slope, 
   return GSL_SUCCESS;
 }
 
-/* Integrate from rest; call `seen` (optional) at `marks` evenly spaced times. Set catch_ to F = y /
- * E. Return false if GSL fails. */
+/* Integrate for `seconds` from y = 0, set catch_ to F = y / E, and call `seen`, if given, at
+ * `marks` evenly spaced times. Return false if GSL fails. */
 static inline bool damper_integrate(mass_spring_damper *system, const double *stiffness,
                                     double seconds, size_t marks, double *catch_,
                                     void (*seen)(void *context, size_t evaluations,
@@ -191,7 +193,7 @@ static inline bool damper_integrate(mass_spring_damper *system, const double *st
   return good;
 }
 
-/* Return the RMS of a - b relative to that of b. */
+/* Return the RMS of a - b relative to the RMS of b. */
 static inline double relative_rms(size_t count, const double *a, const double *b) {
   double difference = 0.0;
   double norm = 0.0;
@@ -202,7 +204,8 @@ static inline double relative_rms(size_t count, const double *a, const double *b
   return sqrt(difference / norm);
 }
 
-/* Return a force: a peak in the middle of the sheet, a fifth of it wide, plus a slope. */
+/* Return a force on a sheet: a peak at its centre, with a radius of a fifth of its side, plus a
+ * slope (malloc). */
 static inline double *plane_force(const frame *f) {
   const size_t n = f->mesh.vertex_count;
   const double *last = f->mesh.vertices + 3 * (n - 1);
@@ -224,7 +227,7 @@ static inline double *ones(size_t count) {
   return values;
 }
 
-/* Scale to geometric mean 1. */
+/* Scale the stiffness to geometric mean 1. */
 static inline void normalise_stiffness(size_t count, double *stiffness) {
   double sum = 0.0;
   for (size_t i = 0; i < count; ++i) {
@@ -235,7 +238,8 @@ static inline void normalise_stiffness(size_t count, double *stiffness) {
   }
 }
 
-/* Return the stiffness of a ring whose middle third is `factor` times as stiff. */
+/* Return the stiffness of a ring whose middle third is `factor` times as stiff as the rest
+ * (malloc). */
 static inline double *ring_stiffness(size_t count, double factor) {
   double *stiffness = calloc(count, sizeof *stiffness);
   for (size_t i = 0; i < count; ++i) {
@@ -244,18 +248,17 @@ static inline double *ring_stiffness(size_t count, double factor) {
   return stiffness;
 }
 
-/* Ventilation of ten slabs of equal height along gravity; 0 is uppermost. */
+/* number of slabs of equal height along gravity; 0 is the uppermost */
 enum { ZONES = 10 };
 
 typedef struct ventilation {
-  double index[ZONES]; /* displacement relative to that of the direction law alone, mean 1 */
-  double swept[ZONES]; /* share of the breath swept by the zone's surface, relative to its share of
-                          the area */
-  double slope;        /* least-squares slope of the index over the height, 0 to 1 */
-  double height;       /* mm from the uppermost to the lowermost point */
+  double index[ZONES]; /* mean catch, relative to the mean over all slabs */
+  double swept[ZONES]; /* share of the breath that a zone sweeps over its share of the area */
+  double slope;        /* least-squares slope of the index over relative height, 0 to 1 */
+  double height;       /* height of the lungs along gravity, mm */
 } ventilation;
 
-/* Measure a breath of `volume` mL with gravity along g. */
+/* Measure the ventilation of a breath of `volume` mL with gravity along g. */
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
@@ -292,7 +295,7 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
     caught[zone] += area[i] * solution.catch_[i];
   }
   for (size_t t = 0; t < lungs->mesh.triangle_count;
-       ++t) { /* volume swept, by the mean of both areas */
+       ++t) { /* volume swept by each triangle, with the mean of its areas before and after */
     const uint32_t *c = lungs->mesh.triangles + 3 * t;
     double middle[3] = {0.0, 0.0, 0.0};
     double move[3] = {0.0, 0.0, 0.0};
@@ -348,12 +351,12 @@ cleanup:
   return status;
 }
 
-/* Search for nearest vertices by a grid of cells of `size` mm. */
+/* A grid of cells of `size` mm, to search for the nearest vertex. */
 typedef struct nearest_grid {
   double low[3], size;
   size_t cells[3];
-  size_t *begin;   /* [cells + 1] */
-  uint32_t *order; /* [N] */
+  size_t *begin;   /* [cells + 1] index in `order` of the first vertex of each cell */
+  uint32_t *order; /* [N] vertices sorted by cell */
   const supine_mesh *mesh;
 } nearest_grid;
 
@@ -396,7 +399,7 @@ static inline void nearest_free(nearest_grid *grid) {
   free(grid->order);
 }
 
-/* Return the nearest vertex within about `size` mm; SIZE_MAX if there is none. */
+/* Return the nearest vertex in the cell of p and its neighbours; SIZE_MAX if they are empty. */
 static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   long cell[3];
   size_t found = SIZE_MAX;
@@ -425,7 +428,7 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   return found;
 }
 
-/* Compute the displacements of a breath [N, 3], mm. */
+/* Compute the displacements `moves` [N, 3] of a breath of `volume` mL, mm. */
 static inline supine_status breathe_at(const supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -443,7 +446,7 @@ static inline supine_status breathe_at(const supine_lungs *lungs, double reach, 
   return status;
 }
 
-/* Return the area-weighted RMS distance from a vertex over which a unit force on it spreads, mm. */
+/* Compute the area-weighted RMS distance over which a unit force on a vertex spreads, mm. */
 static inline supine_status spread_of(const supine_lungs *lungs, double reach, size_t vertex,
                                       double *spread) {
   const size_t n = lungs->mesh.vertex_count;
@@ -476,8 +479,8 @@ static inline supine_status spread_of(const supine_lungs *lungs, double reach, s
   return status;
 }
 
-/* Return the relative RMS difference of the displacements of two meshes of one lung, at the
- * vertices of `coarse` and the nearest ones of `fine`. */
+/* Return the RMS difference of the displacements of two meshes of a lung, relative to those of
+ * `fine`, at the vertices of `coarse` and the vertices of `fine` nearest to them. */
 static inline double drift_of(const supine_mesh *coarse, const double *coarse_moves,
                               const supine_mesh *fine, const double *fine_moves) {
   nearest_grid grid = nearest_create(fine, 5.0);

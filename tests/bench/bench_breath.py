@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare the size of a breath of 334 frames in each file format with that of uncompressed frames, each with points,
-displacements, their magnitudes and triangles, as version 0.1.0 wrote them.
+"""Measure the file size of a breath of 334 frames in each format, relative to uncompressed frames. An uncompressed
+frame has points, displacements, their magnitudes and triangles, as version 0.1.0 wrote them.
 
     bench_breath.py SUPINE [VERTICES]"""
 import os

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the errors of law and kriging at held-out points: predict the landmarks of five people,
- * from exhaled to inhaled and back, from ten observed ones. Print the RMS errors in mm and the
- * percentage of points within the 95 % band; then the time of the run-time library for a surface.
+/* Measure the errors of law and kriging at held-out points: for five people, predict the
+ * displacements of all landmarks from those of ten, from exhaled to inhaled and in the opposite
+ * direction. Print the RMS errors in mm and the percentage of points within the 95 % band, then the
+ * time that the run-time library needs for a surface.
  *
  *     bench_locate [FOLDER OF LANDMARKS]
  *
- * The law is evaluated in closed form, with the applied force. The prior of a person's scale is the
- * mean of the other four people's, +- 30 %. */
+ * The law is evaluated in closed form, with the applied force. The prior mean of a person's scale
+ * is the mean scale of the other four people; its standard deviation is 30 % of this mean. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -31,9 +32,10 @@ static const double spread = 0.3; /* prior standard deviation of the scale, rela
 
 typedef struct person {
   size_t count; /* number of landmarks, n */
-  /* [n, 3] positions before the motion, their displacements, and the law's at scale 1, mm */
+  /* [n, 3] positions before the motion, displacements, and displacements by the law at scale 1,
+   * mm */
   double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
-  double central[POINTS_MAX]; /* [n] squared distance from the middle of the box, in half sides */
+  double central[POINTS_MAX]; /* [n] squared distance from the centre of the box, in half sides */
   size_t lung[POINTS_MAX];
 } person;
 
@@ -44,7 +46,8 @@ static void need(supine_status status, const supine_error *error) {
   }
 }
 
-/* Evaluate the law of a supine lung at points, with coordinates in the box around them. */
+/* Compute the displacements of points in supine lungs by the law, and store them for the landmarks
+ * of the same index. The bounding box of the points stands for that of the lungs. */
 static void find_law(person *p, const double *points) {
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const double *c = model.direction.c;
@@ -120,9 +123,9 @@ static double best_scale(const person *p) {
   return lu / ll;
 }
 
-/* Evaluate the law at inhaled positions p, which displacements by the law take to the exhaled ones:
- * find p such that p - s F(p) d(p) = x, by iteration from x. */
-static void raise(person *p, double scale) {
+/* Evaluate the law at the inhaled position of each landmark. The law displaces the inhaled position
+ * p to the exhaled one x: solve p - scale * law(p) = x by iteration from x. */
+static void find_law_at_inhaled(person *p, double scale) {
   double full[3 * POINTS_MAX];
   for (int step = 0; step < 30; ++step) {
     for (size_t i = 0; i < 3 * p->count; ++i) {
@@ -153,7 +156,7 @@ typedef struct sums {
   double error;    /* squared errors, mm^2 */
   double stated;   /* variances stated by kriging, mm^2 */
   double points;   /* number of held-out points */
-  double held;     /* number of these within the 95 % band */
+  double held;     /* number of held-out points within the 95 % band */
   double left_out; /* number of observed points judged as outliers */
   double judged;   /* number of observed points */
 } sums;
@@ -235,8 +238,8 @@ static void study(const person *people, size_t number, double prior, bool centra
   gsl_rng_free(random);
 }
 
-/* Evaluate the law of all people, and set the prior of each person's scale to the mean of the other
- * four people's. */
+/* Evaluate the law for all people, and set the prior of each person's scale to the mean scale of
+ * the other four. */
 static void prepare(const char *folder, bool inhaling, person *people, double *prior) {
   static const char *const names[PEOPLE] = {"054", "055", "056", "094", "097"};
   for (int pass = 0; pass < (inhaling ? 2 : 1); ++pass) {
@@ -245,7 +248,7 @@ static void prepare(const char *folder, bool inhaling, person *people, double *p
       if (pass == 0) {
         load(folder, names[k], inhaling, &people[k]);
       } else {
-        raise(&people[k], prior[k]);
+        find_law_at_inhaled(&people[k], prior[k]);
       }
       total += best_scale(&people[k]);
     }
@@ -255,8 +258,8 @@ static void prepare(const char *folder, bool inhaling, person *people, double *p
   }
 }
 
-/* Print the time in ms from 20 observed points to 25,000 vertices with expected errors, on one
- * thread. */
+/* Print the time, ms, in which one thread computes 25,000 vertices and their expected errors from
+ * 20 observed points. */
 static void clock_library(void) {
   enum { VERTICES = 25000, MODES = 16, SEEN = 20, REPEATS = 30 };
   static const double resting[9] = {1700 * -3.5449077018110318};
@@ -316,9 +319,9 @@ int main(int argc, char **argv) {
   double prior[PEOPLE];
   const char *folder = argc > 1 ? argv[1] : SUPINE_TEST_DATA "/landmarks";
   (void)printf(
-      "law + kriging from %d observed landmarks, %d draws a person: at the others, the mean "
-      "over %d people\ndrawn    motion               error, mm  stated, mm  95 %% band "
-      "holds  points judged wrong\n",
+      "law + kriging from %d observed landmarks, %d draws per person; errors at the other "
+      "landmarks, mean over %d people\ndrawn    motion               error, mm  stated, mm  95 %% "
+      "band holds  points judged wrong\n",
       DRAWN, DRAWS, PEOPLE);
   for (int central = 0; central < 2; ++central) {
     double mean[4] = {0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measure the time of a frame of the exported page and of each pass: in turns, the fastest of each.
+// Measure the time of a frame of the exported page and of each pass: the fastest of several alternating runs.
 //
 //     node tests/bench/bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]
 //
@@ -34,7 +34,7 @@ const found = await page.evaluate(() => {
   const { picture, panes, state, frameScript } = window.supine;
   const { gl, basis } = picture;
   const pixel = new Uint8Array(4);
-  const done = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits
+  const done = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits for the GPU
   let tilt = 0;
   const weights = () => {
     tilt += 1;
@@ -48,8 +48,8 @@ const found = await page.evaluate(() => {
     turning: () => { weights(); picture.deform('now', state.moment); picture.draw(panes()); },
   };
   const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
-  const some = 20; // frames measured at once, as clocks of browsers have steps of 0.1 ms
-  for (let i = 0; i < 60; ++i) { // 1200 frames, so that the script is optimised as after some seconds of turning
+  const some = 20; // frames per measurement, as the clock of a browser has steps of 0.1 ms
+  for (let i = 0; i < 60; ++i) { // 1200 frames, so that the script is compiled and optimised
     const begin = performance.now();
     for (let j = 0; j < some; ++j) {
       tilt += 1;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Measure the precomputation of both lungs with the default options, from mesh files to basis file,
  * against the time that assimp alone takes to load the same files one after the other and join
- * identical vertices. Runs alternate. Print the least time of each, then the growth from 5 thousand
- * to 509 thousand vertices.
+ * identical vertices. Runs alternate. Print the least time of each, then how the time grows from
+ * 5,000 to 509,000 vertices.
  *
  *     bench_precompute [REPEATS] */
 #include <stdio.h>
@@ -54,7 +54,8 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Precompute a basis; return the time in s, and set that of each stage. Negative if it failed. */
+/* Precompute a basis, and set the time of each stage. Return the total time in s, negative on
+ * failure. */
 static double run_ours(pair *files, const char *out, double times[STAGES], size_t *vertices) {
   supine_lungs lungs = {0};
   supine_error error;
@@ -136,7 +137,7 @@ int main(int argc, char **argv) {
   }
   struct rusage usage;
   (void)getrusage(RUSAGE_SELF, &usage);
-  (void)printf("peak memory of this process, both programs in it: %.0f MB\n",
+  (void)printf("peak memory of this process, which runs supine and assimp: %.0f MB\n",
                (double)usage.ru_maxrss / 1024.0);
   (void)unlink(out);
   return EXIT_SUCCESS;

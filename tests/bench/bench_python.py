@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure how much longer a call from Python takes than the same call in C: in turns, the fastest of each.
+"""Measure how much longer a call from Python takes than the same call in C: the fastest of several alternating runs.
 
-    bench_python.py REFERENCE BASIS [TURNS]     REFERENCE: tests/python/reference.c; needs `import supine`"""
+    bench_python.py REFERENCE BASIS [TURNS]     REFERENCE: the program of tests/python/reference.c
+
+Needs the Python package."""
 import subprocess
 import sys
 import timeit
@@ -14,9 +16,9 @@ reference, path = sys.argv[1:3]
 lungs = supine.open(path)
 pose = lungs.pose("prone")
 points = np.empty((lungs.vertex_count, 3), np.float32)
-CALLS = 20000  # the same number as in REFERENCE
+CALLS = 20000  # as in tests/python/reference.c
 calls = {"deform into an array": lambda: lungs.deform(pose, points),
-         "deform into a new one": lambda: lungs.deform(pose)}
+         "deform into a new array": lambda: lungs.deform(pose)}
 fastest = dict.fromkeys(calls, float("inf"))
 in_c = float("inf")
 for _ in range(int(sys.argv[3]) if len(sys.argv) > 3 else 9):

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the evaluation against OpenBLAS and plain loops, in turns in one process.
+/* Compare the speed of the evaluation with OpenBLAS and plain loops, by alternating runs in one
+ * process.
  *
  *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES | BASIS]...
  *
  * A number makes a random basis of that many vertices, with 16 modes and 6 modes of normals. Each
- * entry is the fastest of nine runs. OpenBLAS 0.3.21 mistakes newer processors for old ones; the
- * variable names one that it knows. */
+ * entry is the fastest of nine runs. OpenBLAS 0.3.21 does not recognise newer processors;
+ * OPENBLAS_CORETYPE names one whose kernels it has. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -33,14 +34,14 @@ typedef struct bench {
   const supine_basis_info *info;
   supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis in each storage */
   supine_basis
-      *simd[SUPINE_SIMD_COUNT]; /* in INT16 for each instruction set; NULL: not available */
+      *simd[SUPINE_SIMD_COUNT]; /* 16-bit basis for each instruction set, NULL if not available */
   supine_pose pose;
-  float weights[SUPINE_MODES_MAX]; /* weights times the gain */
-  float *xyz, *normals;            /* [N, 3] */
-  float *amount;                   /* [N] sum over the modes */
+  float weights[SUPINE_MODES_MAX]; /* [K] weights of the modes, times the gain */
+  float *xyz, *normals;            /* [N, 3] positions, mm, and normals */
+  float *amount;                   /* [N] displacement along the direction, mm */
   float *columns;                  /* [K, N] coefficients, mode by mode */
-  int16_t *counts;                 /* [K, N] the same as 16-bit counts */
-  float units[SUPINE_MODES_MAX];   /* mm of one count, times the weight of its mode */
+  int16_t *counts;                 /* [K, N] coefficients as 16-bit counts */
+  float units[SUPINE_MODES_MAX];   /* [K] size of one count in mm, times the weight of the mode */
 } bench;
 
 typedef struct entry {
@@ -49,8 +50,8 @@ typedef struct entry {
   bench *work;
   const supine_basis *basis;
   size_t threads;
-  double bytes;   /* bytes read and written for each vertex */
-  double seconds; /* least time of all vertices so far, s */
+  double bytes;   /* memory traffic, bytes per vertex */
+  double seconds; /* least time for all vertices so far, s */
 } entry;
 
 static void run_deform(void *context, size_t begin, size_t end, size_t thread) {
@@ -100,7 +101,7 @@ static void run_sgemv(void *context, size_t begin, size_t end, size_t thread) {
   displace(e->work, begin, end);
 }
 
-/* Evaluate by the simplest loop, compiled with -march=native. */
+/* Evaluate by one plain loop, compiled with -march=native. */
 static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   const bench *work = ((const entry *)context)->work;
   const supine_basis_info *m = work->info;
@@ -276,13 +277,13 @@ static size_t add_entries(bench *work, entry *entries) {
   return count;
 }
 
-/* Measure all entries in turns, each turn beginning with another entry. */
+/* Measure all entries several times, each time beginning with another entry. */
 static void measure(entry *entries, size_t count, size_t vertices) {
   const size_t rounds = 1 + ENOUGH / vertices;
   for (size_t turn = 0; turn < REPEATS; ++turn) {
     for (size_t i = 0; i < count; ++i) {
       entry *e = &entries[(i + turn) % count];
-      supine_parallel_for(vertices, 64, e->threads, e->range, e); /* fills the caches */
+      supine_parallel_for(vertices, 64, e->threads, e->range, e); /* warm-up: fills the caches */
       const double begin = supine_clock_seconds();
       for (size_t r = 0; r < rounds; ++r) {
         supine_parallel_for(vertices, 64, e->threads, e->range, e);
@@ -315,10 +316,11 @@ static void print(const entry *entries, size_t count, size_t vertices) {
   const double own = find(entries, count, "supine", "int16", 1);
   const double exact32 = find(entries, count, "supine", "exact", 1);
   (void)printf(
-      "int16 is %.2f times as fast as sgemv and a displacing loop (%.2f by columns), %.2f "
-      "as one fused loop, %.2f as a planar loop of int16; float32 is %.2f times as fast as "
-      "a planar loop of float32; int16 is %.2f as its loads and stores; two threads gain "
-      "%.2f\n",
+      "int16: %.2f times as fast as sgemv and a loop that adds the displacement (%.2f with modes "
+      "as columns), %.2f times "
+      "as fast as one fused loop, %.2f times as fast as a planar loop of int16; float32: %.2f "
+      "times as fast as a planar loop of float32; int16: %.2f times as fast as its loads and "
+      "stores alone; two threads: %.2f times as fast as one\n",
       find(entries, count, "sgemv_displace", "float32", 1) / own,
       find(entries, count, "sgemv_columns", "float32", 1) / own,
       find(entries, count, "plain_native", "float32", 1) / own,
@@ -328,14 +330,14 @@ static void print(const entry *entries, size_t count, size_t vertices) {
       own / find(entries, count, "supine", "int16", 2));
   const double exact = find(entries, count, "exact_normals", "float32", 1);
   if (isfinite(exact)) {
-    (void)printf("normals are %.2f times as fast as exact ones; a lit frame takes %.2f of a frame "
-                 "and exact normals\n",
+    (void)printf("normals: %.2f times as fast as exact normals; a lit frame takes %.2f of the time "
+                 "of a frame with exact normals\n",
                  exact / find(entries, count, "normals", "int16", 1),
                  find(entries, count, "lit", "int16", 1) / (own + exact));
   }
 }
 
-/* Check that the loops that are compared give the same positions. */
+/* Check that all measured loops give the same positions. */
 static bool check_same(bench *work, entry *entries, size_t count) {
   const size_t n = work->info->vertex_count;
   float *expected = fixture_allocate(3 * n, sizeof *expected);
@@ -355,7 +357,7 @@ static bool check_same(bench *work, entry *entries, size_t count) {
         moved = fmax(moved, fabs((double)expected[k] - (double)work->info->vertices[k]));
       }
       if (apart > 1e-3 * moved) {
-        (void)fprintf(stderr, "%s %s and the plain loop end %g mm apart\n", entries[i].what,
+        (void)fprintf(stderr, "%s %s and the plain loop differ by %g mm\n", entries[i].what,
                       entries[i].how, apart);
         same = false;
       }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the time from a pose sent to the frame received, over loopback, between two processes:
+/* Measure the latency from sending a pose to receiving its frame, between two processes over
+ * loopback:
  *
  *     bench_stream SUPINE BASIS [SECONDS [WHAT...]]
  *
@@ -37,7 +38,8 @@ static int fail(const char *what) {
   return 1;
 }
 
-/* Start the server; return its port, or 0 on failure. The caller closes `lines`, its output. */
+/* Start the server; return its port, or 0 on failure. The caller closes `lines`, the server's
+ * output. */
 static int serve(const char *supine, const char *basis, const char *what, pid_t *server,
                  FILE **lines) {
   int ends[2];
@@ -62,7 +64,7 @@ static int serve(const char *supine, const char *basis, const char *what, pid_t 
   return port;
 }
 
-/* Read the resident memory of a process, KiB; -1 if it is unknown. */
+/* Return the resident memory of a process in KiB, -1 if it is unknown. */
 static long memory_of(pid_t process) {
   char path[64];
   char line[256];
@@ -91,18 +93,13 @@ static int dial(int port) {
   return s;
 }
 
-/* Write the message of a pose: the body turns about its long axis, twice a minute. */
+/* Write the message of the pose at `time` s, of a body that turns about its long axis twice a
+ * minute. */
 static void make_pose(double time, uint64_t stamp, unsigned char bytes[SUPINE_STREAM_HEADER + 48]) {
   const double angle = time * (2.0 * M_PI / 30.0);
-  float columns[12] = {(float)cos(angle),
-                       0,
-                       (float)-sin(angle), /* left */
-                       (float)-sin(angle),
-                       0,
-                       (float)-cos(angle), /* back */
-                       0,
-                       1,
-                       0}; /* head */
+  /* The columns of the rotation: the directions of left, back and head. */
+  float columns[12] = {
+      (float)cos(angle), 0, (float)-sin(angle), (float)-sin(angle), 0, (float)-cos(angle), 0, 1, 0};
   unsigned char *body = bytes + SUPINE_STREAM_HEADER;
   supine_stream_encode_floats(12, columns);
   memcpy(body, columns, sizeof columns);
@@ -120,12 +117,13 @@ static int compare(const void *a, const void *b) {
 }
 
 typedef struct tally {
-  double *sent;           /* [poses] time at which the pose of stamp i + 1 was sent, s */
-  double *latency;        /* [answered] time from pose sent to frame received, s */
+  double *sent;           /* [poses] time at which each pose was sent, s; the stamps begin at 1 */
+  double *latency;        /* [answered] time from sending a pose to receiving its frame, s */
   size_t poses, answered; /* number of poses sent, and of frames received */
   size_t old;             /* number of frames whose pose was no longer the newest */
   size_t oldest;          /* largest number of poses sent since the pose of a frame */
-  size_t got, wanted;     /* bytes received of the current message, and its size so far known */
+  /* Bytes received of the current message, and its size as far as it is known. */
+  size_t got, wanted;
   unsigned char head[SUPINE_STREAM_HEADER];
   supine_stream_header header;
 } tally;
@@ -213,7 +211,7 @@ static int measure(const char *supine, const char *basis, const char *what, doub
                t.answered, t.old, t.oldest, 1e3 * t.latency[t.answered / 2], 1e3 * within,
                1e3 * t.latency[t.answered == 0 ? 0 : t.answered - 1], before, after,
                t.answered > 0 && t.oldest <= 1 && within <= wanted ? "holds" : "misses");
-  while (lines != NULL && fgets(line, sizeof line, lines) != NULL) { /* the server's own report */
+  while (lines != NULL && fgets(line, sizeof line, lines) != NULL) {
     if (strstr(line, "pose received to") != NULL) {
       (void)printf("         %s", line);
     }

@@ -38,7 +38,8 @@ static FILE *begin_csv(const char *name, const char *header) {
   return file;
 }
 
-/* Close the CSV, and draw NAME.png with gnuplot commands, in which `csv` is the CSV's path. */
+/* Close the CSV file, and draw NAME.png by gnuplot commands, in which `csv` is the path of the
+ * file. */
 static void end_figure(FILE *csv, const char *name, const char *commands) {
   need(fclose(csv) == 0, "cannot write");
   FILE *gnuplot = popen("gnuplot 2>/dev/null", "w"); /* NOLINT(cert-env33-c) */
@@ -60,7 +61,7 @@ typedef struct curve {
   const char *method;
   size_t count;        /* number of displacements */
   const double *exact; /* [count] exact displacements */
-  double links;        /* link visits for each step or evaluation of the method */
+  double links;        /* link visits per step or evaluation of the method */
 } curve;
 
 static void add_point(const curve *c, double work, const double *found) {
@@ -79,7 +80,7 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Draw Fig. 7, convergence. The unit of work is a visit of a link from one of its ends. */
+/* Draw Fig. 7, convergence. Work is measured in link visits, one from each end of a link. */
 static void convergence(void) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -90,8 +91,10 @@ static void convergence(void) {
   double *found = calloc(n, sizeof *found);
   need(frame_solve(&f, NULL, force, exact) == SUPINE_OK, "no solution");
   FILE *csv = begin_csv("fig7_convergence", "method,link_visits,relative_rms_error");
-  curve c = {csv, "Pitcher/Catcher", n, exact,
-             2.0 * links / (double)(n + f.topology.edge_count)}; /* mean over the cliques */
+  curve c = {
+      csv, "Pitcher/Catcher", n, exact,
+      2.0 * links /
+          (double)(n + f.topology.edge_count)}; /* number of links of a node, mean over all nodes */
   for (int k = 1; k <= 13; ++k) {
     size_t steps = 0;
     need(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, pow(10.0, -k), found,
@@ -208,7 +211,7 @@ static bool load_lungs(int resolution, supine_lungs *lungs) {
   return good;
 }
 
-/* Draw the largest displacement against the volume ([Santhanam2008] III-C, IV-B). */
+/* Plot the largest displacement against the volume ([Santhanam2008] III-C, IV-B). */
 static void linearity(const supine_lungs *lungs) {
   const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   double cubic[4][3];
@@ -238,8 +241,9 @@ static void linearity(const supine_lungs *lungs) {
     }
     (void)fputc('\n', csv);
   }
-  (void)printf("displacement within %.2f %% of proportional to the volume up to 500 mL\n",
-               100.0 * bend);
+  (void)printf(
+      "displacement deviates by at most %.2f %% from proportional to the volume up to 500 mL\n",
+      100.0 * bend);
   end_figure(csv, "linearity",
              "set xlabel 'volume above rest, mL'\nset ylabel 'largest displacement, mm'\n"
              "plot for [i=2:5] csv using 1:i with lines");
@@ -249,7 +253,7 @@ static void regional_ventilation(const supine_lungs *lungs) {
   ventilation found[4];
   for (size_t p = 0; p < 4; ++p) {
     need(ventilation_measure(lungs, postures[p], 500.0, &found[p]) == SUPINE_OK, "no ventilation");
-    (void)printf("%-6s ventilation index rises by %.2f over the height, %.3f a cm\n",
+    (void)printf("%-6s ventilation index rises by %.2f over the height, %.3f per cm\n",
                  posture_names[p], found[p].slope, 10.0 * found[p].slope / found[p].height);
   }
   FILE *csv =
@@ -271,7 +275,7 @@ static void regional_ventilation(const supine_lungs *lungs) {
              "plot for [i=2:5] csv using i:1 with linespoints title columnheader(i)");
 }
 
-/* Draw the drift of displacements between resolutions, and print the spread of a unit force, for
+/* Plot how displacements change with mesh resolution, and print the spread of a unit force, for
  * several reaches in mm. */
 static void resolution(void) {
   static const double reaches[] = {0.0, 3.0, 5.0, 10.0, 20.0};
@@ -304,7 +308,7 @@ static void resolution(void) {
                              100.0 * drift_of(&lungs[1].mesh, moves[1], &lungs[2].mesh, moves[2]),
                              100.0 * drift_of(&lungs[0].mesh, moves[0], &lungs[2].mesh, moves[2])};
     (void)printf(
-        "reach %2.0f mm: displacements drift by %.2f %% from 5k to 20k, %.2f %% from 20k to "
+        "reach %2.0f mm: displacements change by %.2f %% from 5k to 20k, %.2f %% from 20k to "
         "250k, %.2f %% from 5k to 250k; a unit force spreads",
         reaches[k], drift[0], drift[1], drift[2]);
     for (int r = 0; r < 3; ++r) {

@@ -29,7 +29,7 @@ VOXELS = (512, 512, 248)
 
 
 def write_image(path, label):
-    """Write a NIfTI image around the synthetic lungs: 16-bit noise, or 8-bit labels."""
+    """Write a NIfTI image that contains the synthetic lungs: 8-bit labels if `label`, else 16-bit noise."""
     step, origin = (0.7, 0.7, 1.2), (-2.0 - 0.35 * 512, -173.0 - 0.35 * 512, -130.0 - 0.6 * 248)
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
@@ -37,9 +37,9 @@ def write_image(path, label):
     struct.pack_into("<hh", header, 70, 2 if label else 4, 8 if label else 16)
     struct.pack_into("<4f", header, 76, 1.0, *step)
     struct.pack_into("<2f", header, 108, 352.0, 1.0)
-    header[123] = 2  # mm
+    header[123] = 2  # unit: mm
     struct.pack_into("<hh", header, 252, 0, 1)
-    for axis in range(3):  # RAS
+    for axis in range(3):  # rows of the matrix from voxels to RAS
         sign = 1.0 if axis == 2 else -1.0
         row = [sign * step[axis] if k == axis else 0.0 for k in range(3)]
         struct.pack_into("<4f", header, 280 + 16 * axis, *row, sign * origin[axis])
@@ -78,14 +78,14 @@ def count_differences(first, second):
 
 
 def compare(name, programs, arguments, rounds, output=None):
-    """Run both programs in turn and print a row."""
+    """Run both programs in turn with these arguments, and print a row of the table."""
     best = [[float("inf"), float("inf"), 0.0] for _ in programs]
     for _ in range(rounds):
         for which, program in enumerate(programs):
             wall, cpu, memory = run([program] + arguments)
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
-            if output is not None:  # both versions write the same name, as files contain the command line
+            if output is not None:  # both write to one name, as files contain the command line
                 os.replace(output, f"{which}-{output}")
     differing = 0 if output is None else count_differences("0-" + output, "1-" + output)
     old, new = best
@@ -95,7 +95,7 @@ def compare(name, programs, arguments, rounds, output=None):
           f"{f'   outputs differ in {differing} bytes' if differing else ''}", flush=True)
 
 
-# Open a basis five times and print the least processor seconds: `info` would do more than open it.
+# Python program that opens a basis five times and prints the least processor seconds.
 OPEN = """
 import ctypes, sys, time
 library, basis = ctypes.CDLL(sys.argv[1]), ctypes.c_void_p()
@@ -111,7 +111,7 @@ print(least)
 
 
 def compare_numbers(name, commands, rounds, number):
-    """Run a command of each program in turn; print the least number that `number` reads from its output."""
+    """Run the commands in turn; print the least number that `number` reads from the output of each."""
     best = [float("inf"), float("inf")]
     for _ in range(rounds):
         for which, command in enumerate(commands):

@@ -5,10 +5,10 @@
     tests/evidence/evidence.py [--check] BUILD FOLDER[:AXES]...
 
 BUILD is the folder of the build; FOLDER holds pairs NAME_left.* and NAME_right.* of closed surfaces at full
-inflation; AXES, as RAS, goes to 'supine precompute --axes'. Every basis is made with default options. The columns
-show the spread over shapes, not the uncertainty of the model. Nothing in the model was fitted to these figures
-except the one number of the bend, which was chosen from quiet breaths of ten people. With --check, the exit code
-is 1 if a value is outside its range. The exit code is 77 if there is no pair.
+inflation; AXES, such as RAS, is passed to 'supine precompute --axes'. Every basis is made with default options.
+The columns show the spread over shapes, not the uncertainty of the model. Only the bend of the path between rest
+and full inflation, one number, was fitted to data of this kind: to quiet breaths of ten people. With --check, the
+exit code is 1 if a value is outside its range. The exit code is 77 if there is no pair.
 """
 import ctypes
 import glob
@@ -21,7 +21,7 @@ import tempfile
 import numpy as np
 
 POSTURES = ("supine", "prone", "left", "right", "upright", "inverted")
-FULL_DENSITY = 0.12  # g/mL: 0.86 L of tissue (Denison 1986) in the 7.2 L of a full lung of usual size
+FULL_DENSITY = 0.12  # g/mL at full inflation: 0.86 L of tissue (Denison 1986) in lungs of 7.2 L
 
 # Quantity, lower and upper end of its range (None: not checked), unit, published value.
 ROWS = (
@@ -29,8 +29,8 @@ ROWS = (
     ("thirds, prone", 1.1, 1.3, "", "1.0 to 1.4"),
     ("z share, supine", 0.58, 0.76, "", "0.63 (SD 0.11; Aliverti 2001, n 10)"),
     ("z share, prone", 0.53, 0.70, "", "0.535 (SD 0.13; Aliverti 2001)"),
-    ("lower lung of a breath, left side", 51, 56, "%", "57.6 (SD 7.2; Volk 2011, n 10): a miss"),
-    ("lower lung of a breath, right side", 57, 62, "%", "64.7 (SD 6.7; Volk 2011): a miss"),
+    ("lower lung of a breath, left side", 51, 56, "%", "57.6 (SD 7.2; Volk 2011, n 10): missed"),
+    ("lower lung of a breath, right side", 57, 62, "%", "64.7 (SD 6.7; Volk 2011): missed"),
     ("right lung at rest, left side", 21, 26, "%", "+25 (SD 11; Little 2021, n 10)"),
     ("left lung at rest, left side", -3, 1, "%", "0 (SD 44; Little 2021)"),
     ("left lung full, upright", 10, 12, "%", "+11.6 (Yamada 2020, n 32)"),
@@ -38,20 +38,20 @@ ROWS = (
     ("both lungs at rest, upright", 12, 18, "%", "about +15 (Yamada 2020, n 100)"),
     ("density, front third, prone", None, None, "g/mL", "+0.07 (Prisk 2007, n 6)"),
     ("density, back third, prone", None, None, "g/mL", "-0.11 (Prisk 2007)"),
-    ("move to prone at rest, mean", 6, 20, "mm", ""),
-    ("lower half over upper third of that", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
-    ("triangles turned over", 0, 0.03, "%", ""),
-    ("more of them than without bend", None, 2, "", ""),
+    ("mean displacement to prone, rest", 6, 20, "mm", ""),
+    ("the same, lower half / upper third", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
+    ("reversed triangles, at most", 0, 0.03, "%", ""),
+    ("reversed triangles added by the bend", None, 2, "", ""),
 )
 
 
 class Slab(ctypes.Structure):
-    """supine_slab"""
+    """Mirror supine_slab of supine/compare.h."""
     _fields_ = [("volume", ctypes.c_double), ("gain", ctypes.c_double)]
 
 
 def take_package(build, folder):
-    """Import the package for Python from the sources, with the build's library beside it."""
+    """Import the Python package from the sources, with the library of the build beside it."""
     source = pathlib.Path(__file__).resolve().parents[2] / "runtime" / "python" / "supine"
     package = folder / "supine"
     package.mkdir()
@@ -83,7 +83,7 @@ class Lungs:
         return np.cross(b - a, c - a) / 2
 
     def thirds(self, posture, before, after):
-        """Return volume and gain, mL, of each third of height, uppermost first, of both lungs together."""
+        """Return volume and gain, mL, of both lungs together in each third of their height, uppermost first."""
         slabs = (Slab * 6)()
         g = (ctypes.c_double * 3)(*self.gravity(posture))
         pointers = [ctypes.c_void_p(np.ascontiguousarray(x).ctypes.data) for x in (before, after)]
@@ -96,12 +96,12 @@ class Lungs:
         return int((np.einsum("ij,ij->i", self.area_vectors(xyz), self.reference) < 0).sum())
 
     def straight(self, posture, total):
-        """Return positions with equal gains on all axes, as without a bend, and the same volume of each lung."""
+        """Return positions as without a bend: equal gains on all axes at the same volume of each lung."""
         pose = self.basis.pose(f"{posture}:{total:.3f}mL")
         wanted = np.array(self.basis.volumes(pose))
         gains = self.basis.gains(pose)
         gains[:] = gains[:, :1]
-        for _ in range(40):  # Newton with a slope from a small step
+        for _ in range(40):  # Newton's method, with the slope from a difference quotient
             held = np.array(self.basis.volumes(pose))
             gains *= 1.0001
             slope = (np.array(self.basis.volumes(pose)) - held) / 1e-4
@@ -130,7 +130,7 @@ class Lungs:
             out[f"{side} lung full, upright"] = 100 * (self.at("upright:full")[1][lung] / full_ml[lung] - 1)
         out["both lungs at rest, upright"] = 100 * (rest["upright"][1].sum() / rest["supine"][1].sum() - 1)
         density = {}
-        for p in ("supine", "prone"):  # thirds of the resting lung from front to back
+        for p in ("supine", "prone"):  # density of each third of the resting lungs, from front to back
             volume, gain = self.thirds("supine", rest[p][0], full)
             density[p] = FULL_DENSITY * (volume + gain) / volume
         for name, third in (("front", 0), ("back", 2)):
@@ -138,8 +138,8 @@ class Lungs:
         move = np.linalg.norm(rest["prone"][0] - rest["supine"][0], axis=1)
         height = full[:, 2] - full[:, 2].min()
         height /= height.max()
-        out["move to prone at rest, mean"] = move.mean()
-        out["lower half over upper third of that"] = move[height < 1 / 2].mean() / move[height > 2 / 3].mean()
+        out["mean displacement to prone, rest"] = move.mean()
+        out["the same, lower half / upper third"] = move[height < 1 / 2].mean() / move[height > 2 / 3].mean()
         over, more = 0, 0
         for p in POSTURES:
             for share in (0.35, 0.5, 0.7, 0.9, 1.1):
@@ -147,13 +147,13 @@ class Lungs:
                 bent = self.turned_over(self.at(f"{p}:{total:.3f}mL")[0])
                 over = max(over, bent)
                 more = max(more, bent - self.turned_over(self.straight(p, total)))
-        out["triangles turned over"] = 100 * over / len(self.faces)
-        out["more of them than without bend"] = more
+        out["reversed triangles, at most"] = 100 * over / len(self.faces)
+        out["reversed triangles added by the bend"] = more
         return out
 
 
 def pairs(argument):
-    """Yield name, left file, right file and axes of each pair in FOLDER or FOLDER:AXES."""
+    """Yield name, left file, right file and axes of each pair in `argument`, which is FOLDER or FOLDER:AXES."""
     folder, _, axes = argument.partition(":")
     for left in sorted(glob.glob(os.path.join(folder, "*_left.*"))):
         right = left.replace("_left.", "_right.")
@@ -170,7 +170,7 @@ def main(arguments):
     build = pathlib.Path(words[0])
     found = [pair for word in words[1:] for pair in pairs(word)]
     if not found:
-        print("skipped: no pair NAME_left.*, NAME_right.* in " + ", ".join(words[1:]))
+        print("skipped: no pair NAME_left.* and NAME_right.* in " + ", ".join(words[1:]))
         return 77
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -190,7 +190,7 @@ def main(arguments):
         held = "shown" if high is None else f"{'' if low is None else low}..{high}"
         text = "".join("%16s" % (f"{v:.3g}" + ("!" if b else "")) for v, b in zip(values, bad))
         print("%-36s%s  %-14s %s" % (what + (f", {unit}" if unit else ""), text, held, published))
-    print(f"{misses} outside their range (!)")
+    print(f"values outside their range (marked !): {misses}")
     return 1 if check and misses else 0
 
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Deforms a basis file's lungs for one state, posture and volume:
+/* Deform the lungs of a basis file to one state, which is a posture and a volume:
  *
  *     example lungs.safetensors prone:rest+500 */
 #include <stdio.h>
@@ -14,17 +14,17 @@ int main(int argc, char **argv) {
   }
   supine_error error;
   supine_basis *basis;
-  supine_state state = {.gravity = {0, 1, 0}}; /* supine, unless the text says otherwise */
+  supine_state state = {.gravity = {0, 1, 0}}; /* supine, if argv[2] names no posture */
   supine_pose pose;
   if (supine_basis_open(argv[1], &basis, &error) != SUPINE_OK ||
       supine_state_parse(argv[2], &state, &error) != SUPINE_OK ||
-      supine_basis_pose(basis, &state, &pose, &error) != SUPINE_OK) { /* once a frame */
+      supine_basis_pose(basis, &state, &pose, &error) != SUPINE_OK) { /* once per frame */
     fprintf(stderr, "%s\n", error.message);
     return 2;
   }
   size_t count = supine_basis_get_info(basis)->vertex_count;
   float *xyz = malloc(count * 3 * sizeof *xyz);
-  supine_deform(basis, &pose, xyz); /* every vertex */
+  supine_deform(basis, &pose, xyz); /* all vertices */
   printf("%zu vertices; the first is at %g %g %g mm\n", count, xyz[0], xyz[1], xyz[2]);
   free(xyz);
   supine_basis_close(basis);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// axe-core reports nothing for the page and the report, in both themes; every control of the page has a
-// name, and its border a contrast of at least 3 to 1.
+// axe-core finds no violation in the page and the report, in both themes. Every control of the page has a name,
+// and its border has a contrast of at least 3 to 1.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { browser, open, openLungs } from './browser.mjs';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A headless Chromium that draws in software, and pages opened in it from disk.
+// Start a headless Chromium that draws in software, and open pages from disk in it.
 import { pathToFileURL } from 'node:url';
 import { evaluate, inOrder, load, matchPoints, skip } from './support.mjs';
 
@@ -13,7 +13,7 @@ export const browser = await chromium.launch({
     '--disable-sync', '--no-first-run'],
 });
 
-/** Open a page and collect its errors and requests. */
+/** Open a page, and collect its errors and its requests for other files. */
 export async function open(path, options = {}, hash = '') {
   const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
   page.setDefaultTimeout(60000);
@@ -27,8 +27,8 @@ export async function open(path, options = {}, hash = '') {
   return { page, complaints };
 }
 
-/** Open the page of a basis, wait for the first drawing and show all controls. By default the patient is
- * supine and still, as the positions in the picture used by tests require. */
+/** Open the page of a basis, wait until it is drawn, and show all controls. By default the patient is supine and
+ * does not breathe, as tests point at fixed places in the picture. */
 export async function openLungs(path, options, hash = '#posture=supine&depth=500&show=contours&room=0') {
   const opened = await open(path, options, hash);
   await opened.page.waitForFunction(() => window.supine?.panes().length > 0);
@@ -36,13 +36,15 @@ export async function openLungs(path, options, hash = '#posture=supine&depth=500
   return opened;
 }
 
-/** Evaluate [gravity, mL] pairs in C, as evaluate() of support.mjs, in the page's order of vertices. */
+/** Evaluate [gravity, mL] pairs in C as evaluate() of support.mjs does, but with vertices in the
+ * page's order. */
 export async function evaluateFor(page, basis, pairs) {
   const order = await orderOf(page, basis);
   return evaluate(basis, pairs).map(({ scale, xyz }) => ({ scale, xyz: inOrder(xyz, order) }));
 }
 
-/** Return the index in the basis of each vertex of the page, which orders vertices for compression. */
+/** Return, for each vertex of the page, its index in the basis: the page reorders vertices for
+ * compression. */
 export async function orderOf(page, basis) {
   const rest = await page.evaluate(() => Array.from(window.supine.positions([0, 1, 0], 0)));
   return matchPoints(rest, evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, 0.1);

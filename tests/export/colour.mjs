@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Colours of pages, pictures and reports: even perceptual steps, increasing lightness, and no clipping.
+// Colours of pages, pictures and reports: even perceptual steps, increasing lightness, and round ends of ranges.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -31,7 +31,7 @@ function oklab(bytes) {
 for (const name of ['displacement', 'difference']) {
   const bytes = Buffer.from(colours[name], 'hex');
   const lab = Array.from({ length: 256 }, (_, i) => oklab(bytes.subarray(3 * i, 3 * i + 3)));
-  const steps = []; // over 15 colours, so that rounding to bytes matters little
+  const steps = []; // distances of colours 15 apart, so that rounding to bytes matters little
   for (let i = 0; i + 15 < 256; i += 15) {
     steps.push(Math.hypot(...lab[i].map((x, j) => x - lab[i + 15][j])));
     assert.ok(lab[i + 15][0] > lab[i][0] + 0.01, `${name}: lightness does not rise at ${i}`);
@@ -41,7 +41,7 @@ for (const name of ['displacement', 'difference']) {
   assert.ok(ratio < 1.1, `${name}: steps differ by a factor of ${ratio}`);
 }
 
-// The report uses one of the two maps for its bars, and that of differences for the cells of its table.
+// Each bar of the report uses one of the two colour maps; its map of directions uses that of differences.
 supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
 const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
@@ -51,13 +51,13 @@ assert.equal(bars.length, 2);
 for (const stops of bars) {
   assert.equal(stops.length, 17);
   const off = Object.keys(colours).map((name) => Math.max(...stops.map((hex, i) => apart(hex, name, Math.round((255 * i) / 16)))));
-  assert.ok(Math.min(...off) <= 3, `a bar is ${off} off: ${stops}`);
+  assert.ok(Math.min(...off) <= 3, `colours of a bar differ by ${off}: ${stops}`);
 }
 const fills = [...new Set([...report.matchAll(/<path fill="(#[0-9a-f]{6})"/g)].map((found) => found[1]))];
 assert.ok(fills.length > 50, `the map has ${fills.length} colours`);
-for (const hex of fills) assert.ok(Array.from({ length: 256 }, (_, i) => i).some((i) => apart(hex, 'difference', i) <= 2), `${hex} is not of the map`);
+for (const hex of fills) assert.ok(Array.from({ length: 256 }, (_, i) => i).some((i) => apart(hex, 'difference', i) <= 2), `${hex} is not in the colour map`);
 
-// The cases of tests/test_render.c: page, pictures and reports follow the same rule.
+// Ranges end at the same round numbers as those of pictures and reports: the cases are from tests/test_render.c.
 for (const [value, step, end] of [[31.6, 5, 35], [18.7, 2, 20], [20, 5, 20], [0.043, 0.01, 0.05], [7.99, 1, 8], [8, 2, 8], [0, 0.2, 1]]) {
   assert.ok(Math.abs(tickStep(value) - step) < 1e-12 && Math.abs(rangeEnd(value) - end) < 1e-12, `${value}: ${tickStep(value)}, ${rangeEnd(value)}`);
 }

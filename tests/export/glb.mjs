@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// GLB files: Khronos' validator reports nothing, and three.js computes the positions of the C evaluator from
-// weights made of Y_lm(g) as the extras of the file describe.
+// GLB files: Khronos' validator reports nothing, and three.js gives the positions of the C evaluator, with morph
+// weights computed from Y_lm(g) as the extras of the file describe.
 import assert from 'node:assert/strict';
 import { readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
@@ -15,7 +15,7 @@ const { GLTFLoader } = await load('three/examples/jsm/loaders/GLTFLoader.js');
 const { MeshoptDecoder } = await load('three/examples/jsm/libs/meshopt_decoder.module.js');
 
 const PLAIN_MM = 0.001;
-const COUNTS_MM = 0.1; // base and targets are in counts of 0.045 mm
+const COUNTS_MM = 0.1; // positions and targets are rounded to 0.045 mm
 const BREATH = 1000; // mL
 
 /** Assert that the validator finds neither errors nor warnings. */
@@ -36,7 +36,8 @@ async function open(path) {
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
 const sum = (list) => list.reduce((total, x) => total + x, 0);
 
-/** Return the volume gained by a lung: f . (x, y, z, yz, xz, xy, xyz) of the gains, with f from its extras. */
+/** Return the volume form f [7] of a lung at mode weights v, from its extras. With gains x, y, z
+ * the lung gains f . (x, y, z, yz, xz, xy, xyz) mL. */
 function volumeForm({ linear, quadratic, cubic }, v) {
   const k = v.length;
   const form = new Float64Array(7);
@@ -52,14 +53,15 @@ function volumeForm({ linear, quadratic, cubic }, v) {
 
 const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
 
-/** Find the root of a monotonic function near `from`, by secants. */
+/** Find the root of a monotonic function near `from` by the secant method. */
 function root(f, from) {
   let [a, b] = [0.9 * from, from];
   for (let i = 0; i < 50 && f(b) !== f(a); ++i) [a, b] = [b, b - (f(b) * (b - a)) / (f(b) - f(a))];
   return b;
 }
 
-/** Find the gains [s, t] at which a lung gains mL beyond the reference; it gains `rest` at rest. */
+/** Find the gains [s, t] at which a lung gains `mL` beyond the reference. At rest it gains `rest`
+ * mL. */
 function gainsFor(form, bend, rest, mL) {
   const even = (volume) => root((s) => formAt(form, [s, s, s]) - volume, volume / (form[0] + form[1] + form[2]));
   if (bend.every((c) => c === 0)) return [even(mL), 0];
@@ -69,7 +71,8 @@ function gainsFor(form, bend, rest, mL) {
   return [r * q, bent(q)];
 }
 
-/** Return each lung's weights and s for a gravity and mL above rest, as the extras describe. */
+/** Return the morph weights and the gain s of each lung for a gravity and a volume in mL above
+ * rest, as the extras describe. */
 function weightsFor(extras, lungs, gravity, mL) {
   const [y, y2] = [harmonics(extras.band, gravity), harmonics(2, gravity)];
   const v = extras.modes.map((row) => extras.modeUnit * dot(row, y));
@@ -107,7 +110,7 @@ function morphed(mesh, { middle, millimetresPerUnit }) {
 
 const together = (meshes, extras) => Float64Array.from(meshes.flatMap((mesh) => [...morphed(mesh, extras)]));
 
-/** Return unit normals [N], weighted by the area of triangles. */
+/** Return the unit normal of each vertex, [N], from its triangles weighted by area. */
 function exactNormals(xyz, corners) {
   const sums = Array.from({ length: xyz.length / 3 }, () => new three.Vector3());
   const at = (v) => new three.Vector3().fromArray(xyz, 3 * v);
@@ -119,7 +122,8 @@ function exactNormals(xyz, corners) {
   return sums.map((n) => n.normalize());
 }
 
-/** Return the angles between the normals of a lung's surface and the morphed ones, degrees. */
+/** Return the angles in degrees between the morphed normals of a lung and those of its morphed
+ * surface. */
 function normalErrors(mesh, extras) {
   const { attributes, morphAttributes, index } = mesh.geometry;
   const [made, part] = [new three.Vector3(), new three.Vector3()];
@@ -133,7 +137,7 @@ function normalErrors(mesh, extras) {
 const mean = (list) => sum(list) / list.length;
 const at95 = (list) => list.sort((a, b) => a - b)[Math.floor(0.95 * list.length)];
 
-/** Check positions, volumes by each lung's weights, and normals in random states. */
+/** Check positions, gains and normals in random states. */
 async function check(basis, words, tolerance) {
   const path = join(folder, 'lungs.glb');
   supine('export', basis, '-o', path, '--breath', String(BREATH), ...words);
@@ -144,7 +148,7 @@ async function check(basis, words, tolerance) {
   const random = randomSource(77);
   const pairs = randomDirections(10, 20241).map((g, i) => [g, i % 2 ? BREATH * random() : BREATH]);
   const truth = evaluate(basis, [[[0, 1, 0], 0], ...pairs]);
-  // Weights as stored: supine at rest.
+  // The stored weights give supine at rest.
   const order = words.includes('--plain') ? truth[0].xyz.map((_, i) => i).slice(0, truth[0].xyz.length / 3) : matchPoints(together(lungs, extras), truth[0].xyz, tolerance);
   let worst = largestDistance(together(lungs, extras), inOrder(truth[0].xyz, [...order]));
   const rest = lungs.flatMap((lung) => normalErrors(lung, extras));
@@ -159,13 +163,14 @@ async function check(basis, words, tolerance) {
     if (mL === BREATH) angles.push(...lungs.flatMap((lung) => normalErrors(lung, extras)));
   });
   console.log(`${words.join(' ')}: ${lungs[0].morphTargetInfluences.length} targets, ${statSync(path).size} bytes, ${worst.toExponential(2)} mm, normals at ${BREATH} mL ${mean(angles).toFixed(2)} degrees mean, ${at95(angles).toFixed(2)} at the 95th percentile`);
-  assert.ok(largestDistance(truth[0].xyz, truth[1].xyz) > 100 * tolerance, 'nothing moved, so nothing was tested');
+  assert.ok(largestDistance(truth[0].xyz, truth[1].xyz) > 100 * tolerance, 'the lungs did not move, so nothing was tested');
   assert.ok(worst < tolerance, `${words.join(' ')}: ${worst} mm off`);
-  const least = words.includes('--plain') ? 1 : 1.25; // the others are rounded to bytes and thinned out
+  const least = words.includes('--plain') ? 1 : 1.25; // without --plain, normals are rounded to bytes and have fewer targets
   assert.ok(mean(angles) < least && at95(angles) < 3, 'normals are off');
 }
 
-/** Check the clips: one for each posture, with gravity downwards and the lungs where the library puts them. */
+/** Check that each clip turns gravity downwards, keeps the lungs above the table, and gives the
+ * positions of the library. */
 async function checkAnimations(basis) {
   const path = join(folder, 'animated.glb');
   supine('export', basis, '-o', path, '--animate');
@@ -173,7 +178,7 @@ async function checkAnimations(basis) {
   const { gltf, lungs, extras } = await open(path);
   const order = matchPoints(together(lungs, extras), evaluate(basis, [[[0, 1, 0], 0]])[0].xyz, COUNTS_MM);
   assert.deepEqual(gltf.animations.map((clip) => clip.name), ['turning', 'supine', 'left side', 'prone', 'right side']);
-  // At 1.5 s all clips are at the peak of a breath of 500 mL. The first is supine then, and prone at 13.5 s.
+  // All clips are at the peak of a breath of 500 mL at 1.5 s. Then the first clip is supine; at 13.5 s it is prone.
   for (const [clip, seconds, gravity] of [[0, 1.5, [0, 1, 0]], [0, 13.5, [0, -1, 0]], [1, 1.5, [0, 1, 0]], [2, 1.5, [1, 0, 0]], [3, 1.5, [0, -1, 0]], [4, 1.5, [-1, 0, 0]]]) {
     const mixer = new three.AnimationMixer(gltf.scene);
     mixer.clipAction(gltf.animations[clip]).play();
@@ -182,7 +187,7 @@ async function checkAnimations(basis) {
     const down = new three.Vector3(...gravity).transformDirection(lungs[0].matrixWorld);
     assert.ok(down.distanceTo(new three.Vector3(0, -1, 0)) < 1e-5, `${gltf.animations[clip].name}: gravity is not down`);
     const box = new three.Box3().setFromObject(gltf.scene.getObjectByName('patient'), true);
-    assert.ok(box.getCenter(new three.Vector3()).length() < 0.06, 'the lungs are not about the origin'); // smaller than at full
+    assert.ok(box.getCenter(new three.Vector3()).length() < 0.06, 'the lungs are not centred at the origin'); // resting lungs are smaller than full ones, so not exactly
     assert.ok(box.min.y > new three.Box3().setFromObject(gltf.scene.getObjectByName('table')).max.y, 'the lungs are not above the table');
     const off = largestDistance(together(lungs, extras), inOrder(evaluate(basis, [[gravity, 500]])[0].xyz, order));
     assert.ok(off < COUNTS_MM, `${gltf.animations[clip].name} at ${seconds} s: ${off} mm off`);
@@ -190,14 +195,15 @@ async function checkAnimations(basis) {
   }
 }
 
-/** Check colours: linear red follows the largest displacement in a lying posture. */
+/** Check colours: green, which rises along the colour map, follows the largest displacement in any
+ * lying posture. */
 async function checkColours(basis) {
   const path = join(folder, 'coloured.glb');
   supine('export', basis, '-o', path, '--plain');
   const { lungs } = await open(path);
   const [back, ...lying] = evaluate(basis, [[0, 1, 0], [1, 0, 0], [0, -1, 0], [-1, 0, 0]].map((g) => [g, 0])).map(({ xyz }) => xyz);
   const moves = Array.from({ length: back.length / 3 }, (_, i) => Math.max(...lying.map((xyz) => Math.hypot(...[0, 1, 2].map((k) => xyz[3 * i + k] - back[3 * i + k])))));
-  const green = lungs.flatMap((lung) => { const c = lung.geometry.attributes.color; return Array.from({ length: c.count }, (_, i) => c.getY(i)); }); // rises all the way
+  const green = lungs.flatMap((lung) => { const c = lung.geometry.attributes.color; return Array.from({ length: c.count }, (_, i) => c.getY(i)); });
   const order = moves.map((_, i) => i).sort((a, b) => moves[a] - moves[b]);
   const third = (from) => mean(order.slice(from, from + Math.floor(order.length / 3)).map((i) => green[i]));
   assert.ok(third(0) < third(Math.floor(order.length / 3)) && third(Math.floor(order.length / 3)) < third(2 * Math.floor(order.length / 3)));
@@ -216,7 +222,7 @@ for (const basis of [modes, paper, many]) {
 await checkAnimations(modes);
 await checkColours(modes);
 
-/* The file of the default phantom, as a demonstration would send it. */
+/* The animated file of the default phantom, which demonstrations use, has at most 500 kB. */
 const [demoMesh, demo, demoFile] = ['demo.ply', 'demo.safetensors', 'demo.glb'].map((name) => join(folder, name));
 supine('phantom', '-o', demoMesh);
 supine('precompute', demoMesh, '-o', demo);

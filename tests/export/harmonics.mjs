@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Real spherical harmonics from the closed form of the associated Legendre functions, independent of the
-// recurrence used by the program and the page.
+// Real spherical harmonics by the closed form of the associated Legendre functions. The program and the page use
+// a recurrence instead.
 
-/** d^m/dz^m P_l(z), as a sum of powers: coefficients exact up to l = 15 in doubles. */
+/** Return the m-th derivative of P_l at z, as a sum of powers whose coefficients are exact in
+ * double up to l = 15. */
 function legendreDerivative(l, m, z) {
   let sum = 0;
-  let term = 1; // (2l)! / (2^l l! l!) built up below
+  let term = 1; // becomes (2l)! / (2^l l! l!)
   for (let i = 1; i <= l; ++i) term *= (l + i) / (2 * i);
   for (let k = 0; 2 * k <= l; ++k) {
     const power = l - 2 * k;

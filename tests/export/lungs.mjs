@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A phantom, its basis with default options, and its page: made once for all tests of pages.
+// Make a phantom, its basis with default options, and its page, once for all tests of pages.
 import { join } from 'node:path';
 import { folder, supine } from './support.mjs';
 

@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { browser, evaluateFor, openLungs as open, picture, press } from './browser.mjs';
 import { folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
 
-const TOLERANCE_MM = 0.02; // of counts of 16 bits
+const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
 
 /** Compare positions read back from the GPU with the C evaluator. */
 async function checkPositions(page, basis, volume) {
@@ -17,13 +17,13 @@ async function checkPositions(page, basis, volume) {
   for (const [i, [g, mL]] of pairs.entries()) {
     const found = await page.evaluate(([gravity, depth]) => Array.from(window.supine.positions(gravity, depth)), [g, mL]);
     worst = Math.max(worst, largestDistance(found, truth[i].xyz));
-    assert.ok(largestDistance(found, rest) > 0.5, 'nothing moved, so nothing was tested');
+    assert.ok(largestDistance(found, rest) > 0.5, 'the lungs did not move, so nothing was tested');
   }
   assert.ok(worst < TOLERANCE_MM, `${worst} mm off`);
   console.log(`positions: ${worst.toExponential(2)} mm`);
 }
 
-/** Postures, drags, sliders and keys change what is seen. */
+/** Check that postures, drags, sliders and keys change the picture. */
 async function checkControls(page) {
   let before = await picture(page);
   const changes = async (what, act) => {
@@ -52,7 +52,7 @@ async function checkControls(page) {
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'upright');
   await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
   await changes('pinning', () => page.getByRole('button', { name: 'Use as the other posture' }).click());
-  await changes('another key', () => press(page, '3')); /* upright, the room turns nothing */
+  await changes('another key', () => press(page, '3')); /* leaves upright, in which the room would not turn */
   await changes('room', async () => {
     await page.locator('[name=frame][value=room]').check({ force: true });
     await page.waitForFunction(() => window.supine.state.roomBlend > 0.99);
@@ -68,7 +68,7 @@ async function checkControls(page) {
   });
 }
 
-/** The value under the pointer is the displacement there. */
+/** Check that the value at the pointer is within the range of displacements on the surface. */
 async function checkPointer(page) {
   const box = await page.locator('#picture').boundingBox();
   for (const [x, y] of [[0.36, 0.5], [0.4, 0.45], [0.62, 0.5], [0.3, 0.5]]) {

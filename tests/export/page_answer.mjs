@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The first view of the page: in left lateral decubitus at rest, cards and bars show the numbers of the
-// command, outlines enclose the lungs' volumes, and colours are on the bar; also in a small window, with
-// forced colours and without WebGL.
+// The page as it opens, lying on the left at rest: cards and bars show the numbers of `supine compare`, outlines
+// enclose the lungs' volumes, and colours of the surface match the colour bar. The page also works in a small
+// window, with forced colours and without WebGL.
 import assert from 'node:assert/strict';
 import { openLungs, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
@@ -11,7 +11,7 @@ const { page, complaints } = await openLungs(html, { viewport: { width: 1400, he
 assert.deepEqual(await page.evaluate(() => { const { state: s } = window.supine; return [document.getElementById('posture-name').value, s.depth, s.room, s.ghost]; }), ['left', 0, true, true]);
 assert.match(await page.locator('#finding em').first().textContent(), /^right lung gains \d+ mL \(\+\d+ %\)$/);
 
-/* Cards and bars against the command. */
+/* Cards and bars show the numbers that `supine compare` prints. */
 const json = JSON.parse(supine('compare', basis, '--postures', 'supine,prone,left,right,upright,supine+15', '--json').replace(/^[^{]*/, ''));
 const [rest] = json.postures;
 const cards = await page.evaluate(() => [...document.querySelectorAll('#postures small')].map((e) => e.textContent));
@@ -29,7 +29,7 @@ for (const [who, text, hidden] of bars) {
   assert.equal(hidden, false);
 }
 
-/* What axial outlines enclose, summed over slices, is what the lungs hold; coronal ones likewise. */
+/* The areas of all axial outlines sum to the volume of the lungs, and so do those of coronal outlines. */
 const [summed, held] = await page.evaluate(() => {
   const { basis: b, state, linesAcross, placesOf } = window.supine;
   const places = placesOf(b, state.moment);
@@ -46,21 +46,21 @@ const [summed, held] = await page.evaluate(() => {
 });
 for (const ml of summed) assert.ok(Math.abs(ml - held) < 0.001 * held, `outlines enclose ${summed} mL, lungs ${held}`);
 
-/* Dragging a picture's line, or its keys, move the other plane. */
+/* Dragging the line in one picture of a slice, or pressing its arrow keys, moves the other slice. */
 const slices = () => page.evaluate(() => [...window.supine.state.slices]);
 const before = await slices();
 const box = await page.locator('#outlines canvas').nth(1).boundingBox();
 await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
 await page.mouse.down();
-await page.mouse.move(box.x + box.width / 2 - 15, box.y + box.height / 2, { steps: 3 }); // on the left, feet are left
+await page.mouse.move(box.x + box.width / 2 - 15, box.y + box.height / 2, { steps: 3 }); // lying on the left, the feet are at the left of the picture
 await page.mouse.up();
 const after = await slices();
 assert.ok(after[0] < before[0] - 5 && after[1] === before[1], `${before} to ${after}`);
 await page.locator('#outlines canvas').first().press('ArrowUp');
 assert.ok(Math.abs((await slices())[1] - after[1]) > 1);
 
-/* Colours of the surface as found on the bar, beside the data: at most 3 % of the range at the median,
- * 8 % at the 90th percentile. Growth of area counts both ways. */
+/* The value of a pixel's colour on the bar differs from the data by at most 3 % of the range at the median and 8 %
+ * at the 90th percentile. The range of `expansion` is symmetric about 0. */
 for (const kind of ['displacement', 'expansion']) {
   await page.locator(`[name=kind][value=${kind}]`).check();
   await settled(page);
@@ -72,7 +72,7 @@ for (const kind of ['displacement', 'expansion']) {
     p.draw(panes());
     p.gl.readPixels(0, 0, width, height, p.gl.RGBA, p.gl.UNSIGNED_BYTE, pixels);
     const answer = p.picked.bind(p);
-    p.picked = () => undefined; // the page asks for no answer meanwhile
+    p.picked = () => undefined; // keeps the page itself from taking the answer
     const bar = b.colours[pane.map];
     const found = [];
     for (let i = 0; found.length < 500 && i < 20000; ++i) {
@@ -99,7 +99,7 @@ for (const kind of ['displacement', 'expansion']) {
 }
 assert.deepEqual(await page.evaluate(() => { const { begin, end } = window.supine.state.range; return [begin, document.getElementById('colours').classList.contains('beneath')]; }), [-await page.evaluate(() => window.supine.state.range.end), await page.evaluate(() => window.supine.state.range.beyond)]);
 
-/* Letters and digits are the picture's alone. */
+/* Keys of letters and digits act only where the picture has the focus. */
 await page.locator('#theme').focus();
 for (const key of ['2', 'g', 'c']) await page.keyboard.press(key);
 assert.deepEqual(await page.evaluate(() => { const { state: s } = window.supine; return [document.getElementById('posture-name').value, s.ghost, s.kind]; }), ['left', true, 'expansion']);
@@ -109,23 +109,24 @@ assert.equal(await page.locator('#posture-name').inputValue(), 'prone');
 assert.deepEqual(complaints, []);
 await page.close();
 
-/* A window of 320 x 256, as 400 % of 1280 x 1024: nothing is cut, the picture is 240 px wide. */
+/* In a window of 320 x 256 (1280 x 1024 at a zoom of 400 %) nothing is cut off, and the picture is at least 240 px
+ * wide. */
 const { page: small } = await openLungs(html, { viewport: { width: 320, height: 256 } }, '#posture=left&depth=900');
-assert.equal(await small.evaluate(() => window.supine.state.measured), 900); // colours reach as far as the link's breath
+assert.equal(await small.evaluate(() => window.supine.state.measured), 900); // the range of colours includes the breath in the link
 const { width, height, wide } = await small.evaluate(() => ({ ...document.getElementById('picture').getBoundingClientRect().toJSON(), wide: document.documentElement.scrollWidth }));
 assert.ok(width >= 240 && height >= 120 && wide <= 320, `${width} x ${height} in ${wide}`);
 const targets = await small.evaluate(() => [...document.querySelectorAll('button, select, summary, input')].filter((e) => e.checkVisibility()).map((e) => { const target = (e.type === 'checkbox' && e.labels.length ? e.labels[0] : e).getBoundingClientRect(); return [e.id || e.textContent, target.width, target.height]; }).filter(([, w, h]) => w < 24 || h < 24));
 assert.deepEqual(targets, []);
 await small.close();
 
-/* In forced colours the bar keeps its own, and what is pressed stands out. */
+/* With forced colours the bar keeps its gradient, and a pressed button has an outline. */
 const { page: forced } = await openLungs(html, { forcedColors: 'active' }, '');
 const [bar, pressed, other] = await forced.evaluate(() => [getComputedStyle(document.getElementById('colours')).backgroundImage, ...['true', 'false'].map((x) => getComputedStyle(document.querySelector(`[data-posture][aria-pressed=${x}]`)).outlineStyle)]);
 assert.match(bar, /gradient/);
 assert.ok(pressed === 'solid' && other === 'none');
 await forced.close();
 
-/* Without WebGL the numbers are the same, and the lungs are painted. */
+/* Without WebGL the numbers are the same, and the lungs are drawn on a 2-D canvas. */
 const { page: flat, complaints: said } = await openLungs(html, { init: () => {
   const { getContext } = HTMLCanvasElement.prototype;
   HTMLCanvasElement.prototype.getContext = function context(kind, ...rest) { return kind === 'webgl2' ? null : getContext.call(this, kind, ...rest); };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page by pointer, touch and keyboard: every key and button works, numbers can be typed, probes measure
-// what the program computes, the arrow of gravity is visible from all sides, motion has the right duration,
-// and a lost context is restored with camera, posture and pins.
+// The page by pointer, touch and keyboard: every key and button works, numbers can be typed, probes show what
+// the library computes, the arrow of gravity is visible from all sides, a breath has the right duration, and a
+// lost WebGL context is restored with camera, posture and probes.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,10 +9,11 @@ import { browser, evaluateFor, openLungs, orderOf, picture, settled, press } fro
 import { basis, html } from './lungs.mjs';
 import { folder, inOrder, supine } from './support.mjs';
 
-const PROBE_MM = 0.06; // of a distance written with one digit
+const PROBE_MM = 0.06; // probes show one decimal
 const state = (page, name) => page.evaluate((key) => window.supine.state[key], name);
 
-/** Keys have their documented effect, and a second press or the opposite key undoes it. */
+/** Check that keys have their documented effect, and that a second press or the opposite key undoes
+ * it. */
 async function checkKeys(page) {
   await page.locator('#picture').focus();
   const press = async (...keys) => { for (const key of keys) await page.keyboard.press(key); await settled(page); };
@@ -45,7 +46,7 @@ async function checkKeys(page) {
   assert.equal(await state(page, 'playing'), false);
 }
 
-/** Buttons of views, double click, full screen and saving the picture. */
+/** Check the buttons of views, the double click, full screen, and saving the picture. */
 async function checkButtons(page) {
   for (const [letter, azimuth, elevation] of [['A', 0, 0], ['P', Math.PI, 0], ['L', -Math.PI / 2, 0], ['R', Math.PI / 2, 0], ['H', 0, Math.PI / 2], ['F', 0, -Math.PI / 2]]) {
     await page.locator('#views button').filter({ hasText: letter }).click();
@@ -58,7 +59,7 @@ async function checkButtons(page) {
   await page.mouse.dblclick(box.x + box.width * 0.36, box.y + box.height * 0.5);
   await page.waitForFunction(() => window.supine.state.camera.pivot !== null);
   await settled(page);
-  const off = await page.evaluate(() => { // the pivot is in the middle of the picture
+  const off = await page.evaluate(() => { // distance of the pivot from the centre of the picture, mm
     const { toEye: m } = window.supine.panes()[0];
     const { pivot } = window.supine.state.camera;
     return [0, 1].map((i) => m[i] * pivot[0] + m[4 + i] * pivot[1] + m[8 + i] * pivot[2] + m[12 + i]);
@@ -76,7 +77,7 @@ async function checkButtons(page) {
   await page.waitForFunction(() => document.fullscreenElement === null);
 }
 
-/** Typed numbers are accepted and limited to their range; other text is not accepted. */
+/** Check that typed numbers are limited to their range, and that an empty field is not accepted. */
 async function checkTyped(page) {
   const type = async (id, text) => { await page.locator(id).fill(text); await page.keyboard.press('Enter'); await settled(page); };
   await type('#depth-number', '123');
@@ -101,7 +102,7 @@ async function checkTyped(page) {
   await page.evaluate(() => document.activeElement.blur());
 }
 
-/** Probes, and distances between them, show what the library computes. */
+/** Check the displacements of probes and the distances between them against the library. */
 async function checkProbes(page) {
   await press(page, '2');
   await settled(page);
@@ -131,7 +132,8 @@ async function checkProbes(page) {
   assert.ok(Math.abs(Number(before) - apart(at(rest, probes[0]), at(rest, probes[1]))) < PROBE_MM);
 }
 
-/** With probes, a moved camera and a reference, a lost context is restored pixel by pixel. */
+/** Check that after the loss of the WebGL context the picture is the same in every pixel, with
+ * probes, a turned camera and a reference posture. */
 async function checkLoss(page) {
   await press(page, '3');
   await page.evaluate(() => { document.getElementById('pin').click(); document.getElementById('beside').click(); });
@@ -143,13 +145,13 @@ async function checkLoss(page) {
   await page.waitForFunction(() => window.supine.picture === null);
   await page.evaluate(() => window.lose.restoreContext());
   await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  assert.ok((await picture(page)).equals(before), 'the picture is another after the loss of the context');
+  assert.ok((await picture(page)).equals(before), 'the picture differs after the loss of the context');
   assert.deepEqual(await facts(), told);
   await page.locator('#beside').uncheck();
   await page.locator('#probes-clear').click();
 }
 
-/** Count pixels with the hue of the arrow, lit or behind something transparent. */
+/** Count the pixels with the hue of the arrow, which may be shaded or behind transparent lungs. */
 const warmPixels = (page) => page.evaluate(() => {
   const { picture: p, panes } = window.supine;
   const pane = panes()[0];
@@ -165,10 +167,10 @@ const warmPixels = (page) => page.evaluate(() => {
   return count;
 });
 
-/** The arrow of gravity is visible from all sides. */
+/** Check that the arrow of gravity is visible from all sides. */
 async function checkArrow(page) {
   await page.evaluate(() => { window.supine.picture.drawGravity = () => {}; });
-  assert.equal(await warmPixels(page), 0, 'something else has the arrow\'s colour');
+  assert.equal(await warmPixels(page), 0, 'pixels outside the arrow have its colour');
   await page.evaluate(() => { delete window.supine.picture.drawGravity; });
   for (const posture of ['1', '2', '3', '5']) {
     for (const view of ['a', 'p', 'l', 'h']) {
@@ -181,7 +183,7 @@ async function checkArrow(page) {
   }
 }
 
-/** A direction written by the page is read by the program unchanged. */
+/** Check that the program reads a direction as the page writes it. */
 async function checkNotation(page) {
   const order = await orderOf(page, basis);
   for (const gravity of [[0.6, 0, -0.8], [0, 0.9659258, 0.2588190], [0, -0.9396926, 0.3420201], [0, 0, -1]]) {
@@ -195,7 +197,7 @@ async function checkNotation(page) {
   }
 }
 
-/** Touch: dragging with a finger rotates, two fingers zoom and pan, a tap keeps a probe. */
+/** Check touch: dragging with one finger rotates and keeps no probe, two fingers zoom and pan. */
 async function checkTouch() {
   const { page, complaints } = await openLungs(html, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const cdp = await page.context().newCDPSession(page);
@@ -208,7 +210,7 @@ async function checkTouch() {
   await touch('touchEnd', []);
   await settled(page);
   const dragged = await state(page, 'camera');
-  assert.ok(dragged.azimuth > before.azimuth + 0.3, 'a drag does not turn');
+  assert.ok(dragged.azimuth > before.azimuth + 0.3, 'a drag does not rotate the camera');
   assert.equal((await state(page, 'probes')).length, 0, 'a drag keeps a probe');
   const two = (gap, shift) => [[middle[0] - gap + shift, middle[1]], [middle[0] + gap + shift, middle[1]]];
   await touch('touchStart', two(30, 0));
@@ -218,20 +220,20 @@ async function checkTouch() {
   const pinched = await state(page, 'camera');
   assert.ok(pinched.zoom > 1.5 * dragged.zoom && pinched.pan[0] > dragged.pan[0], JSON.stringify(pinched));
   assert.equal(pinched.azimuth, dragged.azimuth);
-  /* The ball turns the patient by a finger too. */
+  /* Dragging the ball with one finger turns the patient. */
   const ball = await page.locator('#ball').boundingBox();
   const gravity = await page.evaluate(() => window.supine.state.gravity);
   await touch('touchStart', [[ball.x + 60, ball.y + 60]]);
   for (let i = 1; i <= 4; ++i) await touch('touchMove', [[ball.x + 60 + 6 * i, ball.y + 60]]);
   await touch('touchEnd', []);
   const after = await page.evaluate(() => window.supine.state.gravity);
-  assert.ok(Math.hypot(...after.map((x, i) => x - gravity[i])) > 0.1, 'the ball does not turn');
+  assert.ok(Math.hypot(...after.map((x, i) => x - gravity[i])) > 0.1, 'the ball does not turn the patient');
   assert.deepEqual(complaints, []);
   await page.close();
 }
 
-/** A change of posture is animated, except with reduced motion, and ends in the right posture. Slow frames do
- * not slow the breath: the steps of its state sum to the time of the frames. */
+/** Check that an animated change of posture ends in the right posture, and that slow frames do not slow the breath:
+ * its steps sum to the time of the frames. */
 async function checkMotion() {
   const { page, complaints } = await openLungs(html, { viewport: { width: 1000, height: 700 }, reducedMotion: 'no-preference' });
   const frames = await page.evaluate(() => new Promise((done) => {
@@ -251,13 +253,13 @@ async function checkMotion() {
     let [sum, begin, first, count] = [0, NaN, NaN, 0];
     s.advance = (seconds) => { sum += seconds; return advance(seconds); };
     document.getElementById('play').click();
-    const next = (now) => { // after the page's own frame, whose clock is the same
+    const next = (now) => { // called after the page's callback for the same frame, with the same time
       if (count === 2) [begin, sum, first] = [now, 0, s.phase];
       if (++count === 8) {
         done([sum, (now - begin) / 1000, [first, s.phase, s.rate]]);
         return;
       }
-      const until = performance.now() + 150; // at most 7 frames a second
+      const until = performance.now() + 150; // makes frames take 150 ms
       while (performance.now() < until);
       requestAnimationFrame(next);
     };
@@ -265,12 +267,13 @@ async function checkMotion() {
   }));
   assert.ok(clock > 0.7 && Math.abs(told - clock) < 1e-6, `${told} s of ${clock}`);
   const went = (phases[1] - phases[0] + 1) % 1;
-  assert.ok(Math.abs(went - ((clock * phases[2]) / 60) % 1) < 1e-6, `the breath went on by ${went}`);
+  assert.ok(Math.abs(went - ((clock * phases[2]) / 60) % 1) < 1e-6, `the breath advanced by ${went}`);
   assert.deepEqual(complaints, []);
   await page.close();
 }
 
-/** The value at the pointer is within the range that the library computes around it, for each quantity. */
+/** Check for each quantity that the value at the pointer is within the range of values around
+ * it. */
 async function checkKinds(page) {
   await press(page, '1');
   await press(page, 'n');
@@ -283,7 +286,7 @@ async function checkKinds(page) {
   });
   const point = (list, v) => list.slice(3 * v, 3 * v + 3);
   const apart = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
-  const lowest = Math.max(...Array.from({ length: now.length / 3 }, (_, v) => -now[3 * v + 1])); // prone: along -y
+  const lowest = Math.max(...Array.from({ length: now.length / 3 }, (_, v) => -now[3 * v + 1])); // prone, gravity is along -y
   const area = (list, t) => {
     const [a, b, c] = [0, 1, 2].map((i) => point(list, corners[t + i]));
     const [u, v] = [b.map((x, i) => x - a[i]), c.map((x, i) => x - a[i])];
@@ -318,7 +321,7 @@ async function checkKinds(page) {
   await page.mouse.move(5, 5);
 }
 
-/** Text over the lungs has its own background with enough contrast. */
+/** Check that text over the lungs has a background of its own with enough contrast. */
 async function checkLegible(page) {
   for (const theme of ['light', 'dark']) {
     await page.evaluate((name) => { if (document.documentElement.dataset.theme !== name) document.getElementById('theme').click(); }, theme);
@@ -333,7 +336,7 @@ async function checkLegible(page) {
         if (!ground) return [element.id || element.className, 0];
         const [r, g, b, alpha = 1] = channels(getComputedStyle(ground).backgroundColor);
         const ink = luminance(channels(getComputedStyle(element).color));
-        const ratios = [0, 255].map((behind) => { // the darkest and the lightest that lungs can be
+        const ratios = [0, 255].map((behind) => { // black and white lungs behind the background
           const paper = luminance([r, g, b].map((c) => alpha * c + (1 - alpha) * behind));
           return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
         });
@@ -346,14 +349,15 @@ async function checkLegible(page) {
   await page.evaluate(() => { if (document.documentElement.dataset.theme !== 'light') document.getElementById('theme').click(); });
 }
 
-/** Plain text first, details behind a button. */
+/** Check that the disclaimer is shown, that details are folded, and that reduced motion turns off
+ * the animation. */
 async function checkWords(page) {
   assert.match(await page.locator('#title > :last-child p').textContent(), /not for diagnosis/);
   const behind = await page.evaluate(() => [...document.querySelectorAll('dl#facts dd')].map((e) => [e.textContent, e.closest('details').open]));
   assert.ok(behind.some(([text]) => /modes of band/.test(text)) && behind.every(([, open]) => !open));
   const { page: still } = await openLungs(html, { viewport: { width: 1000, height: 700 } });
   await still.locator('[data-posture=prone]').click();
-  assert.equal(await still.evaluate(() => window.supine.state.turning), null, 'it moves where motion is not wanted');
+  assert.equal(await still.evaluate(() => window.supine.state.turning), null, 'it is animated in spite of reduced motion');
   await still.close();
 }
 

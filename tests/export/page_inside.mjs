@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Content inside the lungs, in the page: it is where `supine deform` puts it, shows name and displacement at
-// the pointer and in a table usable by keyboard, and can be hidden. Pictures are kept in page_inside/ beside
-// the test.
+// Content inside the lungs, on the page: it has the positions of `supine deform`, its name and displacement are
+// shown at the pointer and in a table usable by keyboard, and it can be hidden. Pictures are kept in the folder
+// page_inside of the working folder.
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -10,14 +10,14 @@ import { basis } from './lungs.mjs';
 import { folder, largestDistance, loadCommon, supine } from './support.mjs';
 
 const axe = loadCommon('axe-core').source;
-const TOLERANCE_MM = 0.02; // of counts of 16 bits
+const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
 const PRINTED_MM = 0.001;   // resolution of numbers in text files
 const WRITTEN_MM = 0.051;   // resolution of displacements in the table
 const NAMES = ['nodule <b>&amp;</data>', 'carina', 'upper lobe', 'lower lobe'];
 const PARTS = [...NAMES, 'tumour', 'metastasis'];
 const files = Object.fromEntries(['tumour.obj', 'metastasis.obj', 'points.csv', 'inside.safetensors', 'inside.html', 'many.html', 'moved.csv'].map((name) => [name, join(folder, name)]));
 
-/** Embed four named points and a mesh, an octahedron. */
+/* Embed four named points, a soft octahedron and a rigid one. */
 const at = [[-80, -120, -90], [60, -150, -110], [70, -160, -60], [-70, -90, -150]];
 writeFileSync(files['points.csv'], `name,x,y,z\n${at.map((p, i) => `${NAMES[i]},${p.join(',')}\n`).join('')}`);
 const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]].map((c) => c.map((x, i) => 14 * x + [80, -110, -130][i]));
@@ -27,7 +27,7 @@ writeFileSync(files['metastasis.obj'], `${corners.map((c) => `v ${c.map((x, i) =
 supine('embed', basis, files['points.csv'], files['tumour.obj'], files['metastasis.obj'], '--rigid', 'metastasis', '-o', files['inside.safetensors']);
 supine('export', basis, '--inside', files['inside.safetensors'], '-o', files['inside.html']);
 
-/** Return the positions that the program computes: {name: [positions]}. */
+/** Return the positions that `supine deform` computes, as {name: [positions]}. */
 function deformed(posture, volume) {
   supine('deform', files['inside.safetensors'], '--posture', posture, '--volume', volume, '-o', files['moved.csv']);
   const places = {};
@@ -38,7 +38,7 @@ function deformed(posture, volume) {
   return places;
 }
 
-/** Compare positions on the GPU with the program's, in several postures and volumes. */
+/** Compare the page's positions with those of `supine deform`, in several postures and volumes. */
 async function checkPositions(page) {
   let worst = 0;
   for (const [posture, gravity, volume] of [['supine', [0, 1, 0], 0], ['prone', [0, -1, 0], 320], ['left', [1, 0, 0], 700], ['0.6:0:-0.8', [0.6, 0, -0.8], 150]]) {
@@ -61,7 +61,7 @@ async function checkPositions(page) {
 const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
 const mean = (values) => values.reduce((sum, x) => sum + x, 0) / values.length;
 
-/** Displacements in the table are the differences of the program's positions. */
+/** Check that displacements in the table are differences of positions by `supine deform`. */
 async function checkTable(page) {
   const rest = deformed('supine', 'rest');
   await press(page, '2');
@@ -87,7 +87,7 @@ async function checkTable(page) {
   return rest;
 }
 
-/** Return the position of a part in the picture. */
+/** Return the place on the screen of the centre of a part. */
 const onPage = (page, name) => page.evaluate((wanted) => {
   const { basis: { inside }, insidePositions, state, panes } = window.supine;
   const xyz = insidePositions(state.gravity, state.depth);
@@ -109,8 +109,8 @@ async function pointed(page, [x, y]) {
   return page.locator('#pointed').isVisible().then((shown) => (shown ? page.locator('#pointed').textContent() : ''));
 }
 
-/** Name and displacement are shown at the pointer through transparent lungs, but not through opaque ones or if
- * hidden. */
+/** Check that the name and displacement of the part at the pointer are shown through transparent lungs, but not
+ * through opaque lungs or if content is hidden. */
 async function checkPointer(page, rest) {
   const depth = await page.evaluate(() => window.supine.state.depth);
   const now = deformed('prone', `rest+${depth}`);
@@ -130,28 +130,29 @@ async function checkPointer(page, rest) {
   await page.locator('#inside').check();
 }
 
-/** Showing, hiding and pinning names by keyboard and pointer; a link restores them. */
+/** Check that names can be shown, hidden and kept by keyboard and pointer, and that a link restores
+ * them. */
 async function checkControls(page) {
   await page.mouse.move(5, 5);
   const before = await picture(page);
   await page.locator('#inside').uncheck();
   const without = await picture(page);
-  assert.ok(!without.equals(before), 'nothing was shown');
+  assert.ok(!without.equals(before), 'hiding content does not change the picture');
   await page.locator('#inside').check();
-  assert.ok((await picture(page)).equals(before), 'it is another after it was hidden');
+  assert.ok((await picture(page)).equals(before), 'the picture differs after content was hidden and shown');
   for (const kind of ['expansion', 'height']) {
     await page.locator(`[name=kind][value=${kind}]`).check();
     assert.ok(!(await picture(page)).equals(before));
   }
   await page.locator('[name=kind][value=displacement]').check();
-  /* By keyboard alone: from the check box to the first name, kept by Enter. */
-  await page.mouse.move(5, 5); // off the rows, which show their names as well
+  /* The keyboard alone reaches each name from the check box; Enter keeps it. */
+  await page.mouse.move(5, 5); // off the rows: a row under the pointer shows its name
   await page.locator('#inside').focus();
   const reached = [];
   for (let i = 0; i < PARTS.length; ++i) {
     await page.keyboard.press('Tab');
     reached.push(await page.evaluate(() => document.activeElement.getAttribute('aria-label')));
-    await page.waitForFunction((label) => { // its name is in the picture, and no other
+    await page.waitForFunction((label) => { // the picture shows the name of the focused row only
       const shown = [...document.querySelectorAll('.name:not([hidden])')].map((e) => e.textContent);
       return shown.length === 1 && label.startsWith(shown[0].replace(/ moved [\d.]+ mm$/, ''));
     }, reached.at(-1));
@@ -171,7 +172,7 @@ async function checkControls(page) {
   await again.close();
 }
 
-/** A lost context is restored with the content. */
+/** Check that the picture is the same after the loss of the WebGL context. */
 async function checkLoss(page) {
   await page.mouse.move(5, 5);
   const before = await picture(page);
@@ -179,7 +180,7 @@ async function checkLoss(page) {
   await page.waitForFunction(() => window.supine.picture === null);
   await page.evaluate(() => window.lose.restoreContext());
   await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  assert.ok((await picture(page)).equals(before), 'the picture is another after the loss of the context');
+  assert.ok((await picture(page)).equals(before), 'the picture differs after the loss of the context');
 }
 
 async function checkSizes() {
@@ -203,7 +204,7 @@ async function checkSizes() {
   }
 }
 
-/** Many names can be searched; a list too long to show is shortened with a note. */
+/** Check that many names can be searched, and that a list of more than 200 is cut with a note. */
 async function checkMany() {
   const count = 230;
   writeFileSync(files['points.csv'], `name,x,y,z\n${Array.from({ length: count }, (_, i) => `node ${i},${60 + (i % 10)},${-150 + (i % 7)},${-110 + (i % 13)}\n`).join('')}`);

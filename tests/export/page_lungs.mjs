@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page of lungs at full inflation: volumes count from rest in each posture, normals are those of the
-// surface, a single right lung is labelled as such, and a headset is offered if there is one.
+// The page of lungs scanned at full inflation: volumes are relative to rest in each posture, normals are perpendicular
+// to the surface, a single right lung is named as such, and a headset can be used if there is one.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -8,12 +8,12 @@ import { browser, evaluateFor, openLungs, orderOf, picture, settled, press } fro
 import { basis, html } from './lungs.mjs';
 import { folder, inOrder, largestDistance, randomDirections, supine } from './support.mjs';
 
-const TOLERANCE_MM = 0.02; // of counts of 16 bits
-const PRINTED_MM = 0.001; // of a text file's numbers
+const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
+const PRINTED_MM = 0.001; // resolution of numbers in text files
 
 const both = (page, gravity, depth) => page.evaluate(([g, mL]) => [Array.from(window.supine.positions(g, mL)), Array.from(window.supine.normals(g, mL))], [gravity, depth]);
 
-/** The volume of the breath counts from the posture's rest in page, library and program. */
+/** Check that page, library and program measure the volume of the breath from rest in the posture. */
 async function checkRest(page) {
   for (const gravity of [...randomDirections(4, 31), [1, 0, 0]]) {
     const [found] = await both(page, gravity, 320);
@@ -55,7 +55,8 @@ async function checkNormals(page) {
   assert.ok(mean < 0.1 && p999 < 1, `mean ${mean}, 99.9th percentile ${p999}`);
 }
 
-/** A single lung is named by its position, with letters around it. */
+/** Check that a single right lung is named by its position, and that the letters L and R are on its
+ * left and right. */
 async function checkRight(page) {
   const { xyz, corners } = await page.evaluate(() => {
     const { basis: b } = window.supine;
@@ -82,7 +83,7 @@ async function checkRight(page) {
       const { surface } = window.supine.basis;
       const m = window.supine.panes()[0].toEye;
       const seen = (v) => m[0] * surface[3 * v] + m[4] * surface[3 * v + 1] + m[8] * surface[3 * v + 2] + m[12];
-      let [leftmost, rightmost] = [0, 0]; // of the body
+      let [leftmost, rightmost] = [0, 0]; // vertices at the patient's left and right
       for (let v = 0; v < surface.length / 3; ++v) {
         if (surface[3 * v] > surface[3 * leftmost]) leftmost = v;
         if (surface[3 * v] < surface[3 * rightmost]) rightmost = v;
@@ -97,7 +98,7 @@ async function checkRight(page) {
   await alone.close();
 }
 
-/** A simulated headset: two eyes on the halves of the canvas. */
+/** Simulate a headset whose two eyes see the halves of the canvas. */
 function pretendHeadset() {
   const eye = (shift) => ({
     projectionMatrix: new Float32Array([1.2, 0, 0, 0, 0, 1.2, 0, 0, 0, 0, -1.01, -1, 0, 0, -0.1, 0]),
@@ -133,7 +134,7 @@ function pretendHeadset() {
 async function checkHeadset() {
   const { page: plain, complaints } = await openLungs(html, { viewport: { width: 760, height: 480 } });
   await plain.evaluate(() => new Promise((done) => { setTimeout(done, 0); }));
-  assert.ok(await plain.locator('#vr').isHidden(), 'offered where there is none');
+  assert.ok(await plain.locator('#vr').isHidden(), 'a headset is offered where there is none');
   await plain.close();
   const context = await browser.newContext({ viewport: { width: 760, height: 480 }, reducedMotion: 'reduce' });
   await context.addInitScript(pretendHeadset);
@@ -147,7 +148,7 @@ async function checkHeadset() {
   const before = await picture(page);
   await page.locator('#vr').click();
   await page.waitForFunction(() => window.eyes >= 6);
-  /* Both eyes see the lungs, the right one a little further to the left. */
+  /* Both eyes see the lungs; the right eye sees them a little further to the left. */
   const seen = await page.evaluate(() => new Promise((done) => {
     const { gl, draw } = window.supine.picture;
     window.supine.picture.draw = function drawn(panes, framebuffer) {
@@ -167,7 +168,7 @@ async function checkHeadset() {
   assert.ok(seen[0].middle > seen[1].middle + 0.01, JSON.stringify(seen));
   await page.locator('#vr').click();
   await page.waitForFunction(() => document.getElementById('vr').textContent === 'Enter VR');
-  assert.ok((await picture(page)).equals(before), 'the page is another after the headset');
+  assert.ok((await picture(page)).equals(before), 'the picture differs after leaving the headset');
   assert.deepEqual(complaints, []);
   await context.close();
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The displacements of a nodule and of the surface are the same in `compare`, `deform` and the page, from
-// supine at rest and from a state given by --from; the page's sentence is right in every posture. Checked
-// with one gain for all lungs (version 2) and with one for each.
+// `compare`, `deform` and the page state the same displacements of a nodule and of the surface, measured from supine
+// at rest or from the state of --from. The sentences of the page are true in any direction of gravity.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,13 +8,13 @@ import { evaluateFor, openLungs, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
 import { folder, randomDirections, supine } from './support.mjs';
 
-const AGREE_MM = 0.051; // half of a tenth, as the page writes, and of a thousandth
+const AGREE_MM = 0.051; // half a unit of the page's one decimal, and half a unit of the program's third
 const [points, inside, html, moved, vtp] = ['nodule.csv', 'nodule.safetensors', 'numbers.html', 'nodules.csv', 'surface.vtp'].map((name) => join(folder, name));
 writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\n');
 supine('embed', basis, points, '-o', inside);
 
-/** Return the program's numbers for a posture at rest: the nodule by `compare` and `deform`, the surface by
- * `compare` (mean, largest) and `deform` (largest). */
+/** Return the program's displacements for a posture at rest: of the nodule by `compare` and `deform`, of the surface
+ * by `compare` (mean, largest) and `deform` (largest). */
 function told(posture, from) {
   const pair = JSON.parse(supine('compare', inside, '--postures', `supine,${posture}`, '--json'))[0];
   const report = JSON.parse(supine('compare', basis, '--postures', posture, '--json', '--from', from).replace(/^[^{]*/, ''));
@@ -25,7 +24,7 @@ function told(posture, from) {
   return { pair: pair.mm, nodule: Number(row[columns.indexOf('moved_mm')]), mean: report.postures[0].displacement_mm.mean, max: report.postures[0].displacement_mm.max, largest: Number(largest[1]), name: largest[2], reported: report.displacement_from, held: report.postures[0].volume_ml, error: report.postures[0].expected_error_mm };
 }
 
-/** Return the numbers of the page. */
+/** Return the numbers and texts of the page for a posture at rest. */
 async function shown(page, posture) {
   await page.evaluate((text) => { location.hash = `posture=${text}&depth=0`; }, posture);
   await page.waitForFunction((text) => document.getElementById('posture-name').value === text, posture);
@@ -50,12 +49,12 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
     assert.match(seen.table, new RegExp(`Displacement from ${name.replace('+', '\\+')}`));
     const [, mean, largest] = /moves ([\d.]+) mm on average and ([\d.]+) mm at most, .* from (.*)\.$/.exec(seen.displacement).map(Number);
     assert.ok(seen.displacement.endsWith(` from ${name}.`));
-    near(seen.nodule, program.nodule, `${posture} from ${name}: the nodule on the page and by deform`);
-    if (from === 'supine:rest') near(program.pair, program.nodule, `${posture}: the nodule by compare and deform`);
-    near(mean, program.mean, `${posture} from ${name}: the mean on the page and by compare`);
-    near(largest, program.max, `${posture} from ${name}: the largest on the page and by compare`);
-    near(program.largest, program.max, `${posture} from ${name}: the largest by deform and compare`);
-    if (from === 'supine:rest') near(Number(/^Expected error ([\d.]+) mm \(RMS\)/.exec(seen.error)[1]), program.error, `${posture}: the expected error on the page and by compare`);
+    near(seen.nodule, program.nodule, `${posture} from ${name}: displacement of the nodule, page and deform`);
+    if (from === 'supine:rest') near(program.pair, program.nodule, `${posture}: displacement of the nodule, compare and deform`);
+    near(mean, program.mean, `${posture} from ${name}: mean displacement, page and compare`);
+    near(largest, program.max, `${posture} from ${name}: largest displacement, page and compare`);
+    near(program.largest, program.max, `${posture} from ${name}: largest displacement, deform and compare`);
+    if (from === 'supine:rest') near(Number(/^Expected error ([\d.]+) mm \(RMS\)/.exec(seen.error)[1]), program.error, `${posture}: expected error, page and compare`);
     else assert.equal(seen.error, '');
     seen.lungs.forEach((lung, i) => assert.ok(Math.abs(seen.held[i] - program.held[lung.replace(' lung', '')]) < 0.01, `${lung}: ${seen.held[i]}`));
     if (posture === 'left') assert.match(seen.finding, /^On the left side the (left|right) lung /);
@@ -64,7 +63,7 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
   await page.close();
 }
 
-/* The sentences against positions of the library, in postures and any direction. */
+/* Volumes and displacements in the sentences of the page equal those computed from positions by the library. */
 supine('export', basis, '-o', html);
 const { page, complaints } = await openLungs(html);
 const directions = [[0, -1, 0], [1, 0, 0], [-1, 0, 0], [0, 0, -1], [0, 0, 1], ...randomDirections(20, 41)].map((g) => g.map((x) => Number(x.toFixed(2))));
@@ -94,11 +93,11 @@ for (const [i, g] of directions.entries()) {
   lungs.forEach((lung, j) => {
     const ml = enclosed(places[i + 1], j) - before[j];
     const [, words, percent] = new RegExp(`the ${lung} (.*?) \\((\\S+) %\\)`).exec(finding);
-    assert.ok(Math.abs(Number(percent.replace('\u2212', '-')) - (100 * ml) / before[j]) < 0.6, `${finding} and not ${ml} mL`);
-    if (!words.startsWith('keeps')) assert.ok(Math.abs((words.startsWith('loses') ? -1 : 1) * parseInt(words.split(' ')[1], 10) - ml) < 1, `${finding} and not ${ml} mL`);
+    assert.ok(Math.abs(Number(percent.replace('\u2212', '-')) - (100 * ml) / before[j]) < 0.6, `${finding}; the surface gains ${ml} mL`);
+    if (!words.startsWith('keeps')) assert.ok(Math.abs((words.startsWith('loses') ? -1 : 1) * parseInt(words.split(' ')[1], 10) - ml) < 1, `${finding}; the surface gains ${ml} mL`);
   });
   const far = Math.max(...Array.from({ length: places[0].length / 3 }, (_, v) => Math.hypot(...[0, 1, 2].map((k) => places[i + 1][3 * v + k] - places[0][3 * v + k]))));
-  assert.ok(Math.abs(Number(/and ([\d.]+) mm at most/.exec(displacement)[1]) - far) < 0.1, `${displacement} and not ${far}`);
+  assert.ok(Math.abs(Number(/and ([\d.]+) mm at most/.exec(displacement)[1]) - far) < 0.1, `${displacement}; the largest is ${far} mm`);
 }
 assert.deepEqual(complaints, []);
 await page.close();

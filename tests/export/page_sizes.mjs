@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page at four sizes in two themes: nothing is cut off, and a tap keeps a probe. Pictures are kept in
-// page_sizes/ beside the test.
+// The page at four sizes in two themes: nothing is cut off, letters do not overlap, and a tap keeps a probe.
+// Pictures are kept in the folder page_sizes of the working folder.
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,7 +9,7 @@ import { html } from './lungs.mjs';
 
 mkdirSync('page_sizes', { recursive: true });
 
-/** Letters do not overlap panels, the arrow of gravity or each other. */
+/** Check that letters do not overlap panels, the arrow of gravity or each other. */
 async function checkLetters(page, what) {
   const { letters, plates, arrow } = await page.evaluate(() => {
     const middle = (box) => [box.x + box.width / 2, box.y + box.height / 2];
@@ -45,7 +45,7 @@ for (const [width, height] of sizes) {
     const touch = Math.min(width, height) < 400;
     const { page: sized, complaints: said } = await openLungs(html, { viewport: { width, height }, colorScheme, hasTouch: touch }, '#posture=left');
     assert.ok(await sized.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
-    if (touch) { // a tap keeps a probe and says what is there; dragging turns
+    if (touch) { // a tap keeps a probe and does not turn the camera
       const box = await sized.locator('#picture').boundingBox();
       const azimuth = await sized.evaluate(() => window.supine.state.camera.azimuth);
       await sized.touchscreen.tap(box.x + box.width * 0.48, box.y + box.height * 0.36);

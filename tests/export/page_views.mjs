@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions of the page: views, pan, zoom, postures, probes, cut, links, a lost context.
+// Views, pan, zoom, postures, display options, probes, links and a lost WebGL context on the page.
 import assert from 'node:assert/strict';
 import { browser, openLungs, picture, settled, press } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 
-/** Return the visible letters and their positions. */
+/** Return the visible letters with their positions on the screen. */
 const letters = (page) => page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.letter:not([hidden])')].map((e) => {
   const box = e.getBoundingClientRect();
   return [e.textContent, [box.x + box.width / 2, box.y + box.height / 2]];
 })));
 
-/** In each view the letters are at the body's axes. */
+/** Check that in each view the letters are on the right sides. */
 async function checkViews(page) {
   const expected = { a: ['R', 'L', 'H', 'F'], p: ['L', 'R', 'H', 'F'], l: ['A', 'P', 'H', 'F'], r: ['P', 'A', 'H', 'F'], f: ['R', 'L', 'A', 'P'], h: ['R', 'L', 'P', 'A'] };
   for (const [key, [left, right, top, bottom]] of Object.entries(expected)) {
@@ -22,7 +22,7 @@ async function checkViews(page) {
   }
   await press(page, 'a');
   await settled(page);
-  /* The left lung's vertices are where L is. */
+  /* The vertices of the left lung are on the patient's left. */
   const [left, middle] = await page.evaluate(() => {
     const { basis } = window.supine;
     const mean = (lung) => { let sum = 0; for (let v = basis.lungBegin[lung]; v < basis.lungBegin[lung + 1]; ++v) sum += basis.surface[3 * v]; return sum / (basis.lungBegin[lung + 1] - basis.lungBegin[lung]); };
@@ -32,7 +32,7 @@ async function checkViews(page) {
   assert.ok(left > middle);
 }
 
-/** Zooming keeps the point under the pointer; panning moves it with the pointer. */
+/** Check that panning follows the pointer and that zooming is centred at it. */
 async function checkCamera(page) {
   const box = await page.locator('#picture').boundingBox();
   const [x, y] = [box.x + box.width * 0.6, box.y + box.height * 0.4];
@@ -53,11 +53,11 @@ async function checkCamera(page) {
   await page.mouse.wheel(0, -400);
   await settled(page);
   const pan = await page.evaluate(() => window.supine.state.camera.pan);
-  assert.ok(pan[0] < -1 && pan[1] < -1, `zooming to the upper right moves the lungs to the lower left: ${pan}`);
+  assert.ok(pan[0] < -1 && pan[1] < -1, `zooming in at the upper right does not move the lungs to the lower left: ${pan}`);
   await press(page, '0');
 }
 
-/** Postures are written in the syntax of the program. */
+/** Check that the page writes postures in the syntax of the program. */
 async function checkPostures(page) {
   const texts = await page.evaluate(() => {
     const { postureText, postureFrom, gravityOf } = window.supine;
@@ -79,9 +79,9 @@ async function checkPostures(page) {
   await page.locator('#posture-name').blur();
 }
 
-/** Each display option changes the picture, and can be undone. */
+/** Check that each display option changes the picture and can be undone. */
 async function checkShown(page) {
-  await page.mouse.move(750, 6); // off the picture, so that nothing is pointed at
+  await page.mouse.move(750, 6); // off the lungs, so that no value is shown
   for (const [name, act, undo] of [
     ['a faded lung', () => page.locator('[name=lung-0][value="0.35"]').check(), () => page.locator('[name=lung-0][value="1"]').check()],
     ['a hidden lung', () => page.locator('[name=lung-1][value="0"]').check(), () => page.locator('[name=lung-1][value="1"]').check()],
@@ -100,7 +100,7 @@ async function checkShown(page) {
   }
 }
 
-/** Probes move with the tissue and measure distances; a link restores them. */
+/** Check that probes move with the tissue and measure distances, and that a link restores them. */
 async function checkProbes(page) {
   const box = await page.locator('#picture').boundingBox();
   for (const [x, y] of [[0.38, 0.5], [0.62, 0.55]]) {
@@ -124,7 +124,7 @@ async function checkProbes(page) {
   await page.locator('#probes-clear').click();
 }
 
-/** A lost context is restored with the same picture. */
+/** Check that the picture is the same after the loss of the WebGL context. */
 async function checkLoss(page) {
   await press(page, '3');
   await page.mouse.move(5, 5);
@@ -133,12 +133,12 @@ async function checkLoss(page) {
   await page.waitForFunction(() => window.supine.picture === null);
   await page.evaluate(() => window.lose.restoreContext());
   await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  assert.ok((await picture(page)).equals(before), 'the picture is another after the loss of the context');
+  assert.ok((await picture(page)).equals(before), 'the picture differs after the loss of the context');
 }
 
-/** An idle page draws nothing; a moving frame needs little script time. */
+/** Check that an idle page draws nothing, and that a changed page is drawn. */
 async function checkFrames(page) {
-  const [drawn, median] = await page.evaluate(async () => {
+  const [drawn, touched] = await page.evaluate(async () => {
     const { picture: p, touch } = window.supine;
     let count = 0;
     const draw = p.draw.bind(p);
@@ -154,7 +154,7 @@ async function checkFrames(page) {
     return [idle, count];
   });
   assert.equal(drawn, 0, 'drawn while idle');
-  assert.ok(median >= 1);
+  assert.ok(touched >= 1);
 }
 
 const { page, complaints } = await openLungs(html, { viewport: { width: 760, height: 480 } });
@@ -167,7 +167,7 @@ await checkFrames(page);
 await checkLoss(page);
 const bytes = await page.evaluate(async () => Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer()).slice(0, 8)));
 assert.deepEqual(bytes, [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
-/* The reference is the posture that is gone to, not one on the way. */
+/* During a turn, the button `pin` takes the posture at its end as the reference. */
 const goal = await page.evaluate(() => {
   const { state, postureText, gravityOf, postureFrom } = window.supine;
   state.settle(postureFrom('prone').q, 0, 0.7);

@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* positions BASIS X,Y,Z,ML...: write what the run-time library computes for each gravity and volume
- * above rest (above the scan if the basis has no rest volume) to standard output: the gain of the
- * first lung (float64) and the positions (float32, [N, 3]). For the basis of an open surface, give
- * a gain in place of the volume. */
+/* Compute positions by the run-time library:
+ *
+ *     positions BASIS X,Y,Z,ML...
+ *
+ * For each argument, a direction of gravity and a volume in mL above rest (above the scan if the
+ * basis has no rest volume), write to standard output the gain of the first lung (float64) and the
+ * positions (float32, [N, 3]). For an open surface, give a gain in place of the volume. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -43,7 +46,7 @@ int main(int argc, char **argv) {
       at += *at == ',' ? 1 : 0;
     }
     if (xyz == NULL || *at != '\0' || !write_positions(basis, v, v[3], xyz)) {
-      (void)fprintf(stderr, "positions: '%s' cannot be done\n", argv[i]);
+      (void)fprintf(stderr, "positions: '%s' is not X,Y,Z,ML or is out of reach\n", argv[i]);
       goto cleanup;
     }
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The printed report: on A4 and Letter every heading and number is inside the sheet, with page numbers and
-// provenance, and its letters are on the right sides of the lungs.
+// The printed report: on A4 and Letter every heading and number is inside the sheet, pages are numbered, the
+// provenance is complete, and the letters of pictures are on the right sides of the lungs.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
@@ -29,7 +29,7 @@ const cards = await page.evaluate(() => [...document.querySelectorAll('section')
   first: section.innerText.split('\n').map((line) => line.trim()).filter(Boolean)[1].split(/\s+/)[0],
 })));
 assert.deepEqual(cards.map(({ heading }) => heading).slice(0, 3), ['Changes from supine at rest', 'Outlines by slice', 'Ventilation by height']);
-/* Whatever is a picture is held together where sheets end. */
+/* Pictures and rows of tables are not split between sheets. */
 await page.emulateMedia({ media: 'print' });
 const parted = await page.evaluate(() => [...document.querySelectorAll('tr, figure, .scale, .whole')].filter((e) => getComputedStyle(e).breakInside !== 'avoid').length);
 assert.equal(parted, 0);
@@ -38,7 +38,7 @@ await page.emulateMedia({ media: null });
 const json = JSON.parse(supine('compare', basis, '--postures', postures.join(','), '--volume', 'rest+120', '--json').replace(/^[^{]*/, ''));
 assert.equal(json.displacement_from, 'supine at rest');
 
-/* The first table holds volumes, their changes from supine at rest, and displacements. */
+/* The first table has volumes, their changes from supine at rest in %, and displacements. */
 const supineRest = JSON.parse(supine('compare', basis, '--postures', 'supine', '--json').replace(/^[^{]*/, '')).postures[0].volume_ml;
 const summary = await page.evaluate(() => [...document.querySelectorAll('.summary tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
 assert.deepEqual(summary.map(([name]) => name), postures.map((name) => ({ left: 'left side', right: 'right side' })[name] ?? name));
@@ -75,24 +75,24 @@ for (const format of ['A4', 'Letter']) {
   assert.ok(text.includes(`page ${sheets.length} of ${sheets.length}`));
   for (const word of ['error_rms_percent', 'made_by', 'comparelungs.safetensors', 'notfordiagnosis', 'lawdeep', 'scannedfull', 'checksumxxh64:']) assert.ok(packed.includes(word), `no ${word}`);
   const bySheet = text.split('\f').map((sheet) => sheet.replace(/\s+/g, ''));
-  for (const { heading, first } of cards) { // a card's beginning stays with its heading
+  for (const { heading, first } of cards) { // each heading is on one sheet with the beginning of its section
     assert.ok(bySheet.some((sheet) => { const at = sheet.indexOf(heading.replace(/\s+/g, '')); return at >= 0 && sheet.indexOf(first, at + heading.replace(/\s+/g, '').length) >= 0; }), `${format}: '${heading}' is parted from '${first}'`);
   }
   assert.match(text, /\d{4}-\d\d-\d\d/);
   console.log(`${format}: ${sheets.length} sheets`);
 }
 
-/* Directions are named by the nearest posture, and are as far from it as they say. */
+/* Each direction is described by the nearest posture and the angle from it. */
 const named = { supine: [0, 1, 0], prone: [0, -1, 0], left: [1, 0, 0], right: [-1, 0, 0], upright: [0, 0, -1], inverted: [0, 0, 1] };
 const directions = [...(await page.evaluate(() => document.body.innerText)).matchAll(/(\d+)° from (\w+) \(([-\d.]+):([-\d.]+):([-\d.]+)\)/g)];
-assert.ok(directions.length >= 1, 'no direction is told');
+assert.ok(directions.length >= 1, 'the report states no direction');
 for (const [words, degrees, name, ...numbers] of directions) {
   const far = (axis) => (Math.acos(axis.reduce((sum, x, i) => sum + x * numbers[i], 0) / Math.hypot(...numbers)) * 180) / Math.PI;
   assert.equal(name, Object.keys(named).reduce((best, other) => (far(named[other]) < far(named[best]) ? other : best)), words);
-  assert.ok(Math.abs(far(named[name]) - degrees) < 1.2, words); // of rounded numbers
+  assert.ok(Math.abs(far(named[name]) - degrees) < 1.2, words); // degree and components are rounded
 }
 
-/* Outlines enclose what their titles say, and the reference's is nearly that of supine. */
+/* The areas of outlines differ from that of the reference by the stated percentages. */
 const outlines = await page.evaluate(() => [...document.querySelectorAll('.pairs figure')].map((figure) => ({
   title: figure.querySelector('figcaption').textContent,
   paths: [...figure.querySelectorAll('path')].map((path) => [path.querySelector('title')?.textContent ?? path.getAttribute('class'), path.getAttribute('d')]),
@@ -110,7 +110,7 @@ for (const { title, paths } of outlines) {
   }
 }
 
-/* Each picture has four letters, and gravity and lungs are turned as the patient lies. */
+/* Each picture has four letters; the arrow of gravity and the picture are turned as the patient lies. */
 const shots = await page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.shot')].map((shot) => [shot.querySelector('img').alt, {
   ends: Object.fromEntries([...shot.querySelectorAll('.end')].map((end) => [end.classList[1], end.textContent])),
   gravity: shot.querySelector('.gravity').innerHTML,
@@ -122,9 +122,9 @@ for (const [alt, { ends, gravity }] of Object.entries(shots)) {
   assert.ok(/<g|<circle/.test(gravity), alt);
 }
 const along = (name) => Number(/rotate\(([-\d.]+)\)/.exec(shots[`${name}, from the front`].gravity)?.[1]);
-assert.equal(Math.abs(along('left side')), 0); // lying on the left: to the right of the picture
+assert.equal(Math.abs(along('left side')), 0); // lying on the left, gravity points to the right of the picture
 assert.equal(Math.abs(along('right side')), 180);
-assert.equal(along('upright'), 90); // down
-assert.deepEqual(['left side', 'right side'].map((name) => shots[`${name}, from the front`].turn), [90, 270]); // gravity is down then
+assert.equal(along('upright'), 90); // upright, gravity points down
+assert.deepEqual(['left side', 'right side'].map((name) => shots[`${name}, from the front`].turn), [90, 270]); // after this turn, gravity points down
 assert.deepEqual(complaints, []);
 assert.ok(!readFileSync(html, 'utf8').includes('0.000 %'));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Helpers for tests of exported files. SUPINE and POSITIONS name the two programs, MODULES the folder of npm's
-// packages. A test that cannot run ends with 77, which CTest reports as skipped.
+// Helpers for tests of exported files. The environment variables SUPINE and POSITIONS name the programs `supine` and
+// export_positions, MODULES the folder of node_modules. A test that cannot run exits with 77, which CTest reports as
+// skipped.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
@@ -35,11 +36,11 @@ export function supine(...words) {
   return execFileSync(process.env.SUPINE, words, { encoding: 'utf8' });
 }
 
-/** A folder that is removed when the test ends. */
+/** Temporary folder, removed when the test ends. */
 export const folder = mkdtempSync(join(tmpdir(), 'supine-export-'));
 process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
 
-/** Return a generator of numbers from 0 to 1 (mulberry32). */
+/** Return a generator of uniform random numbers in [0, 1) (mulberry32). */
 export function randomSource(seed) {
   let state = seed >>> 0;
   return () => {
@@ -50,7 +51,7 @@ export function randomSource(seed) {
   };
 }
 
-/** Return directions over the whole sphere. */
+/** Return random unit vectors, uniform on the sphere. */
 export function randomDirections(count, seed) {
   const random = randomSource(seed);
   return Array.from({ length: count }, () => {
@@ -61,7 +62,8 @@ export function randomDirections(count, seed) {
   });
 }
 
-/** Evaluate [gravity, mL] pairs in C: {scale, xyz} for each. */
+/** Evaluate [gravity, mL] pairs in C: return {scale, xyz} for each, the gain of the first lung and
+ * the positions, mm. */
 export function evaluate(basis, pairs) {
   const bytes = execFileSync(
     process.env.POSITIONS, [basis, ...pairs.map(([g, volume]) => [...g, volume].join(','))],
@@ -73,8 +75,8 @@ export function evaluate(basis, pairs) {
   });
 }
 
-/** For each of `points`, [N, 3], the index of the point of `others` within `tolerance` mm: a
- * permutation. Points are sorted into cells of 1 mm; a search visits the 27 cells around one. */
+/** Return, for each point of `points` [N, 3], the index of the point of `others` within `tolerance` mm; assert that the
+ * indices are a permutation. Points are sorted into cells of 1 mm; a search visits a cell and its 26 neighbours. */
 export function matchPoints(points, others, tolerance) {
   const cells = new Map();
   const cellOf = (xyz, i, shift = [0, 0, 0]) => shift.map((s, k) => Math.floor(xyz[3 * i + k]) + s).join();
@@ -88,10 +90,10 @@ export function matchPoints(points, others, tolerance) {
   return found;
 }
 
-/** Permute points [N, 3]. */
+/** Return the points [N, 3] permuted by `order`. */
 export const inOrder = (points, order) => Float64Array.from(order.flatMap((i) => [...points.subarray(3 * i, 3 * i + 3)]));
 
-/** Return the largest distance between two arrays of points. */
+/** Return the largest distance between points of equal index. */
 export function largestDistance(a, b) {
   assert.equal(a.length, b.length);
   let largest = 0;

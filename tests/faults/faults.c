@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Preload this library to make the n-th allocation of a program fail, or its n-th call that makes a
- * file. Calls count if they come from the program's own code or from the libraries in FAULT_ALSO.
+/* Preload this library to make one allocation of a program fail, or one call that opens, reads,
+ * writes, links or renames a file. Only calls by the program's own code and by the libraries in
+ * FAULT_ALSO are counted.
  *
  *     FAULT_KIND    "memory" or "file"
  *     FAULT_NTH     number of the call that fails, from 0; unset: none
- *     FAULT_ALSO    parts of names of libraries whose calls count as well: gsl,jansson
- *     FAULT_REPORT  file for three numbers at the end: calls seen, calls failed, and blocks that
- * the program's own code allocated and did not free */
+ *     FAULT_ALSO    parts of the names of further libraries, separated by commas: gsl,jansson
+ *     FAULT_REPORT  file to write at the end: number of calls, of failed calls, and of blocks that
+ *                   the counted code allocated and nobody freed */
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
@@ -35,13 +36,13 @@ static long seen, failed;
 static pid_t process;
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
-/* Blocks that the program's own code allocated and has not freed: an open hash table, in which 1
- * marks a freed entry. */
+/* Addresses of blocks that the counted code allocated and that are not freed: a hash table with
+ * open addressing, in which 1 marks a freed entry. */
 static uintptr_t blocks[BLOCKS];
 static long live;
 
-/* The functions of the C library, looked up once. dlsym allocates; it gets its memory from `few`,
- * which is never freed. */
+/* Functions of the C library, looked up once by dlsym. The allocations of dlsym itself are taken
+ * from `few` and never freed. */
 static void *(*next_malloc)(size_t);
 static void *(*next_calloc)(size_t, size_t);
 static void *(*next_realloc)(void *, size_t);
@@ -188,7 +189,7 @@ void *malloc(size_t size) {
 void *calloc(size_t count, size_t size) {
   find_memory();
   if (next_calloc == NULL) {
-    return few_take(count * size); /* static: zero */
+    return few_take(count * size); /* static memory is zero */
   }
   return fails(MEMORY, CALLER, ENOMEM) ? NULL : taken(next_calloc(count, size), CALLER);
 }

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run whole commands with each allocation, and each call that makes a file, failing in turn.
+"""Run whole commands with each allocation, and each call on files, failing in turn.
 
     faults.py PROGRAM LIBFAULTS [EACH] [WORD]
-    faults.py PROGRAM            each command once, without faults: for a program built with a sanitizer
+    faults.py PROGRAM            run each command once without faults, for a program built with a sanitizer
 
-The n-th call fails in the n-th run, for every n; with EACH above 0, only about EACH calls spread over
-each command (CTest: 1; the default, 0: all). WORD selects the commands that contain it.
+The n-th call fails in the n-th run. By default, every call of a command fails once; with EACH above 0, about
+EACH calls spread over the command (CTest uses 1). WORD selects the commands that contain it.
 
 Each run must end within a minute and without a signal: with the complete outputs, or with an exit code
 above 0 and a message that gives the reason. A run that fails must leave no file, and no block of memory
@@ -88,22 +88,22 @@ REASONS = {
     "file": "memory|No space left|Too many open files|Input/output error|Resource temporarily|"
             "Cannot allocate|short|truncated|changed",
 }
-# Libraries whose allocations fail as well. Those of drivers, fonts and the web server are left out.
+# Libraries whose allocations fail as well; drivers, fonts and the web server are left out.
 ALSO = {"memory": "gsl,jansson", "file": ""}
-LIMIT = 60  # s
+LIMIT = 60  # time limit of a command, s
 
 
 class Trial:
     def __init__(self, program, library, folder):
         self.program, self.folder = program, folder
-        self.library = library and shutil.copy(library, folder / "libfaults.so")  # LD_PRELOAD parts names at spaces
+        self.library = library and shutil.copy(library, folder / "libfaults.so")  # LD_PRELOAD splits paths at spaces
         self.out = folder / "out"
         self.report = folder / "report"
         self.environment = {"SUPINE_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ,
                             "LIBGL_ALWAYS_SOFTWARE": "1", "FAULT_REPORT": str(self.report)}
 
     def run(self, arguments, kind=None, nth=None):
-        """Return exit code, output on both streams, calls seen, calls failed, and blocks not freed."""
+        """Return exit code, stdout, stderr, and the numbers of calls, of failed calls and of blocks not freed."""
         shutil.rmtree(self.out, ignore_errors=True)
         self.out.mkdir()
         self.report.unlink(missing_ok=True)
@@ -118,7 +118,7 @@ class Trial:
                                   timeout=LIMIT if kind else None, check=False)
         except subprocess.TimeoutExpired:
             return None, b"", "", (0, 0, 0)
-        said = re.sub(rb"[0-9.]+ ms", b"# ms", done.stdout)  # how long it took is no part of it
+        said = re.sub(rb"[0-9.]+ ms", b"# ms", done.stdout)  # times differ from run to run
         seen = tuple(map(int, self.report.read_text().split())) if self.report.exists() else None
         return done.returncode, said, done.stderr.decode(errors="replace"), seen
 
@@ -133,43 +133,44 @@ def same_files(folder, kept):
 
 
 def what_is_wrong(trial, kind, kept, whole, result):
-    """Return why a run is wrong, or ''."""
+    """Return what is wrong with a run, or ''."""
     code, said, words, seen = result
     if code is None:
-        return "ran on"
+        return f"did not end within {LIMIT} s"
     if code < 0:
         return f"signal {-code}"
     if seen is None:
-        return "no report: it did not exit in order"
+        return "no report: it did not exit normally"
     if code == 0:
         if not same_files(trial.out, kept):
-            return "said success with other outputs"
+            return "reported success, but its files differ"
         if whole[1] is not None and said != whole[1]:
-            return "said success and something else"
+            return "reported success, but its output differs"
     else:
         if not re.search(REASONS[kind], words):
             return f"exit code {code} without the reason: {words.strip()!r}"
         if trial.left() or list(trial.out.iterdir()):
-            return "left " + ", ".join(p.name for p in trial.out.iterdir())
-    ended = "supine: out of memory\n" in words  # the program itself, with all that it held
+            return "left files: " + ", ".join(p.name for p in trial.out.iterdir())
+    # After this message the program exits at once, without freeing its memory.
+    ended = "supine: out of memory\n" in words
     if not ended and seen[2] > whole[3][2]:
-        return f"{seen[2] - whole[3][2]} blocks were not given back (exit code {code})"
+        return f"{seen[2] - whole[3][2]} blocks were not freed (exit code {code})"
     return ""
 
 
 def faultless(trial, arguments):
-    """Run without faults for each kind; the output is None if it differs from run to run."""
+    """Return the result of a run without faults for each kind; its output is None if it differs between runs."""
     runs = {kind: trial.run(arguments, kind) for kind in REASONS}
     same = len({run[1] for run in runs.values()}) == 1
     return {kind: (run[0], run[1] if same else None, *run[2:]) for kind, run in runs.items()}
 
 
 def samples(folder):
-    """Write the inputs that no command makes."""
+    """Write the input files that no command of BEFORE makes."""
     (folder / "points.csv").write_text("name,x,y,z\ncarina,60,-180,-60\nnodule,-80,-120,-90\n")
     (folder / "samples.csv").write_text("pressure_cmH2O,volume_mL\n" + "".join(
         f"{p},{3000 / (1 + 2.718281828 ** ((8 - p) / 5)):.3f}\n" for p in range(-10, 36, 2)))
-    vertices, made = 84, random.Random(5)  # as many as those of lungs.ply
+    vertices, made = 84, random.Random(5)  # lungs.ply has 84 vertices
     shapes = {"gravity": [3, 3], "displacement": [3, vertices, 3]}
     values = [0, 1, 0, 0, -1, 0, 1, 0, 0] + [made.uniform(-9, 9) for _ in range(9 * vertices)]
     header = json.dumps({name: {"dtype": "F64", "shape": shapes[name], "data_offsets": at} for name, at in
@@ -200,7 +201,7 @@ def main():
     word = sys.argv[4] if len(sys.argv) > 4 else ""
     faults = dict.fromkeys(REASONS, 0)
     wrong = []
-    shared = "/dev/shm"  # where waiting for the disk takes no time
+    shared = "/dev/shm"  # a folder in memory, as a disk would be slow
     with tempfile.TemporaryDirectory(dir=shared if os.access(shared, os.W_OK) else None) as name:
         trial = Trial(program, library, Path(name))
         samples(trial.folder)
@@ -237,13 +238,13 @@ def main():
                         print("WRONG " + wrong[-1], flush=True)
                 faults[kind] += tried
                 print(f"{kind:6} {tried:5} of {count:5} failed, {found} wrong: {line}", flush=True)
-    tried = [f"{count} {kind} faults" for kind, count in faults.items()] if library else ["each once, no faults"]
+    tried = [f"{count} {kind} faults" for kind, count in faults.items()] if library else ["each command once, without faults"]
     print(f"{', '.join(tried)}: {len(wrong)} wrong")
     sys.exit(1 if wrong else 0)
 
 
 def hash_of(text):
-    """Return the seed of a command's sample: the same in every run, but different for each command."""
+    """Return a number that selects the first failing call: the same in every run, different for each command."""
     return sum(text.encode())
 
 

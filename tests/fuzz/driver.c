@@ -5,9 +5,9 @@
  *     fuzz_X -seeds FOLDER                     write the seeds
  *     fuzz_X -runs N [-seed S] [-dict FILE]    run N mutations of the seeds
  *
- * Print the number of inputs, the slowest time and the largest memory. End with 1 if an input took
- * more than 0.5 s of processor time (5 s with a sanitizer) or 2 GB. An input that crashes is left
- * in the working folder. */
+ * Print the number of inputs, the longest time and the peak memory. Exit with 1 if an input took
+ * more than 0.5 s of processor time (5 s with a sanitizer) or the process more than 2 GB. An input
+ * that crashes is saved as crash-input in the working folder. */
 #include <fcntl.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -41,7 +41,7 @@ static size_t seed_count;
 static uint64_t state;
 static double slowest;
 
-/* The current input, for the crash handler. */
+/* Current input, which the crash handler saves. */
 static const uint8_t *current;
 static size_t current_size;
 
@@ -54,13 +54,13 @@ static void keep_crasher(int number) {
   static const char name[] = "crash-input";
   const int file = open(name, O_WRONLY | O_CREAT | O_TRUNC, 0644);
   if (file >= 0 && write(file, current, current_size) >= 0) {
-    (void)!write(2, "kept as crash-input\n", 20);
+    (void)!write(2, "saved: crash-input\n", 19);
   }
   (void)signal(number, SIG_DFL);
   (void)raise(number);
 }
 
-/* Read a dictionary: one name="word" or "word" a line, with escapes \\ \" and \xHH. */
+/* Read a dictionary with a line name="word" or "word" for each word, and the escapes \\ \" \xHH. */
 static void read_dictionary(const char *path) {
   char line[512];
   FILE *file = fopen(path, "r");
@@ -93,8 +93,8 @@ static size_t put_word(uint8_t *bytes, size_t size, size_t place, const uint8_t 
   return size;
 }
 
-/* Apply one mutation: change a bit, byte, word or number in text; delete, double or splice a piece.
- */
+/* Apply one random mutation: change a bit or byte; delete or repeat a piece; put in a number, a
+ * piece of a seed or a word; or truncate. */
 static size_t change(uint8_t *bytes, size_t size) {
   static const char *const numbers[] = {"-1",    "0",   "4294967296",
                                         "1e999", "nan", "99999999999999999999"};
@@ -135,14 +135,15 @@ static size_t change(uint8_t *bytes, size_t size) {
   }
 }
 
-/* Processor time, which does not depend on the load of the machine. */
+/* Return the processor time of the process, s: it does not depend on the load of the machine. */
 static double seconds(void) {
   struct timespec now;
   (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Copy into a block of exactly this size, so that a sanitizer sees every read past its end. */
+/* Run one input from a block of exactly its size, so that a sanitizer sees every read past its
+ * end. */
 static void run(const uint8_t *bytes, size_t size) {
   uint8_t *copy = malloc(size + (size == 0));
   supine_fuzz_expect(copy != NULL, "memory for an input");
@@ -194,7 +195,7 @@ int main(int argc, char **argv) {
          (seeds[seed_count] = supine_fuzz_seed(seed_count, &seed_size[seed_count])) != NULL) {
     ++seed_count;
   }
-  supine_fuzz_expect(seed_count > 0, "no seeds");
+  supine_fuzz_expect(seed_count > 0, "at least one seed");
   state = 20080312;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Inputs as files, and expectations. */
+/* Helpers of all fuzzers: inputs as files, and assertions. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 
 void supine_fuzz_expect(int sound, const char *words) {
   if (!sound) {
-    (void)fprintf(stderr, "not sound: %s\n", words);
+    (void)fprintf(stderr, "expected: %s\n", words);
     abort();
   }
 }
@@ -28,17 +28,18 @@ const char *supine_fuzz_file(const uint8_t *bytes, size_t size, const char *endi
   (void)snprintf(path, sizeof path, "%s/supine-fuzz-%ld%s", folder, (long)getpid(), ending);
   FILE *file = fopen(path, "wb");
   supine_fuzz_expect(file != NULL && fwrite(bytes, 1, size, file) == size && fclose(file) == 0,
-                     "a file for the input");
+                     "a file with the bytes of the input");
   return path;
 }
 
 uint8_t *supine_fuzz_take(const char *path, size_t *size) {
   FILE *file = fopen(path, "rb");
-  supine_fuzz_expect(file != NULL && fseek(file, 0, SEEK_END) == 0, "the seed's file");
+  supine_fuzz_expect(file != NULL && fseek(file, 0, SEEK_END) == 0, "the file of a seed to open");
   *size = (size_t)ftell(file);
   rewind(file);
   uint8_t *bytes = malloc(*size + 1);
-  supine_fuzz_expect(bytes != NULL && fread(bytes, 1, *size, file) == *size, "the seed's bytes");
+  supine_fuzz_expect(bytes != NULL && fread(bytes, 1, *size, file) == *size,
+                     "the bytes of a seed to be read");
   (void)fclose(file);
   (void)unlink(path);
   return bytes;

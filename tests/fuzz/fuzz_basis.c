@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz basis files and their JSON headers: unchanged, and with the checksum corrected so that the
- * code behind the check is reached. A file that opens is evaluated. */
+/* Fuzz basis files, each twice: as it is, and with a corrected checksum, which the code behind the
+ * check needs. A basis that opens is evaluated. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 
 #include "tests/poses.h"
 
-/* Largest number of values to evaluate for an input: a small file may declare many modes. */
+/* Largest number of vertices to evaluate, as a small file may declare many. */
 enum { VERTICES_MOST = 4096 };
 
 static void evaluate(const supine_basis *basis) {
@@ -25,10 +25,11 @@ static void evaluate(const supine_basis *basis) {
   double scales[SUPINE_LUNGS_MAX];
   double scale = 1.0;
   supine_fuzz_expect(info->mode_count <= SUPINE_MODES_MAX && info->lung_count <= SUPINE_LUNGS_MAX,
-                     "sizes within bounds");
-  supine_fuzz_expect(supine_basis_weights(basis, gravity, weights) == SUPINE_OK, "weights");
+                     "numbers of modes and lungs within their limits");
+  supine_fuzz_expect(supine_basis_weights(basis, gravity, weights) == SUPINE_OK,
+                     "weights for a direction of gravity");
   for (size_t k = 0; k < info->mode_count; ++k) {
-    supine_fuzz_expect(isfinite(weights[k]), "a finite weight");
+    supine_fuzz_expect(isfinite(weights[k]), "finite weights");
   }
   if (info->has_volume && posed_scale(basis, weights, 500.0, &scale, NULL) == SUPINE_OK) {
     supine_fuzz_expect(isfinite(scale), "a finite scale");
@@ -39,7 +40,7 @@ static void evaluate(const supine_basis *basis) {
   const size_t count = info->vertex_count < VERTICES_MOST ? info->vertex_count : VERTICES_MOST;
   supine_deform_range(basis, POSED(basis, weights, scales), 0, count, xyz);
   for (size_t i = 0; i < 3 * count; ++i) {
-    supine_fuzz_expect(!isnan(xyz[i]), "a position that is a number");
+    supine_fuzz_expect(!isnan(xyz[i]), "positions without NaN");
   }
 }
 
@@ -47,16 +48,17 @@ static void open_and_evaluate(const uint8_t *bytes, size_t size) {
   supine_basis *basis = NULL;
   supine_error error = {0};
   const supine_status status = supine_basis_open_memory(bytes, size, &basis, &error);
-  supine_fuzz_expect((status == SUPINE_OK) == (basis != NULL), "a basis or an error");
+  supine_fuzz_expect((status == SUPINE_OK) == (basis != NULL),
+                     "either a basis or an error, not both");
   supine_fuzz_expect(status == SUPINE_OK || (error.status == status && error.message[0] != '\0'),
-                     "a message");
+                     "an error with its status and a message");
   if (basis != NULL) {
     evaluate(basis);
   }
   supine_basis_close(basis);
 }
 
-/* Replace the stated checksum by the right one; return false if none is stated. */
+/* Replace the stated checksum by the right one; return false if the file states none. */
 static bool state_checksum(uint8_t *bytes, size_t size) {
   supine_safetensors *file = NULL;
   if (supine_safetensors_open_memory(bytes, size, "input", &file, NULL) != SUPINE_OK) {

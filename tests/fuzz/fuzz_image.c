@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz images and label maps of the format FUZZ_ENDING. Small ones are also converted to lungs. */
+/* Fuzz images of the format FUZZ_ENDING. Small images are also taken as label maps and converted to
+ * lungs. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -11,16 +12,17 @@
 
 #include "fuzz.h"
 
-enum { SMALL = 1 << 15 }; /* voxels; larger inputs are too slow for a fuzzer */
+enum { SMALL = 1 << 15 }; /* voxels; the conversion of larger images takes too long */
 
 static void expect_words(supine_status status, const supine_error *error) {
   supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
                                              strchr(error->message, '\n') == NULL),
-                     "a message of one line");
+                     "an error with its status and a message of one line");
 }
 
 static void expect_lungs(const char *path) {
-  const supine_labels_options options = {.edge = 12.0}; /* few triangles make it 20 times as fast */
+  /* Large triangles make the conversion 20 times as fast. */
+  const supine_labels_options options = {.edge = 12.0};
   supine_mesh surfaces[2] = {0};
   supine_labels_report report = {0};
   supine_error error = {0};
@@ -29,7 +31,7 @@ static void expect_lungs(const char *path) {
   expect_words(status, &error);
   for (size_t lung = 0; lung < 2; ++lung) {
     for (size_t i = 0; i < 3 * surfaces[lung].vertex_count; ++i) {
-      supine_fuzz_expect(isfinite(surfaces[lung].vertices[i]), "a vertex");
+      supine_fuzz_expect(isfinite(surfaces[lung].vertices[i]), "finite coordinates of each vertex");
     }
     supine_mesh_free(&surfaces[lung]);
   }
@@ -45,9 +47,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
     const size_t count = image.size[0] * image.size[1] * image.size[2];
     double sum = 0.0;
     for (size_t i = 0; i < count * image.channels; ++i) {
-      sum += supine_image_get(&image, i); /* read every voxel */
+      sum += supine_image_get(&image, i);
     }
-    supine_fuzz_expect(count > 0 && (sum == sum || sum != sum), "voxels");
+    supine_fuzz_expect(count > 0 && (sum == sum || sum != sum), "an image of at least one voxel");
     if (count <= SMALL) {
       expect_lungs(path);
     }
@@ -57,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   return 0;
 }
 
-/* Two boxes with labels 1 and 2, in a map of one of several voxel types. */
+/* Make a map of two boxes with labels 1 and 2; `index` selects the voxel type. */
 uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   static const supine_image_voxel voxels[] = {SUPINE_VOXEL_U8, SUPINE_VOXEL_I16, SUPINE_VOXEL_F32};
   enum { SEEDS = sizeof voxels / sizeof *voxels, X = 16, Y = 9, Z = 10 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz surfaces of the format FUZZ_ENDING. A mesh that loads must be valid, and the same when
- * loaded again. */
+/* Fuzz surfaces of the format FUZZ_ENDING. A mesh that loads must be valid; the message about a
+ * refused file must name it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,12 +12,15 @@
 
 static void expect_whole(const supine_mesh *mesh) {
   supine_topology topology = {0};
-  supine_fuzz_expect(mesh->triangle_count > 0 && mesh->vertex_count >= 3, "an empty mesh");
+  supine_fuzz_expect(mesh->triangle_count > 0 && mesh->vertex_count >= 3,
+                     "a mesh of at least one triangle");
   for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
-    supine_fuzz_expect(isfinite(mesh->vertices[i]), "a coordinate");
+    supine_fuzz_expect(isfinite(mesh->vertices[i]), "finite coordinates");
   }
-  supine_fuzz_expect(supine_mesh_topology_create(mesh, &topology) == SUPINE_OK, "topology");
-  supine_fuzz_expect(!topology.closed || topology.genus >= -1, "genus");
+  supine_fuzz_expect(supine_mesh_topology_create(mesh, &topology) == SUPINE_OK,
+                     "the topology of a loaded mesh");
+  supine_fuzz_expect(!topology.closed || topology.genus >= -1,
+                     "a genus of at least -1 of a closed surface");
   supine_mesh_topology_free(&topology);
 }
 
@@ -31,21 +34,22 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   } else {
     supine_fuzz_expect(error.status == status && strstr(error.message, path) != NULL &&
                            strchr(error.message, '\n') == NULL && mesh.vertices == NULL,
-                       "a message of one line that names the file");
+                       "no mesh, and a message of one line that names the file");
   }
   supine_mesh_free(&mesh);
   (void)unlink(path);
   return 0;
 }
 
-/* A tetrahedron as supine_mesh_save writes it. */
+/* Return the bytes of a tetrahedron as supine_mesh_save writes it. */
 static uint8_t *saved(size_t *size) {
   double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
   uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
   const supine_mesh mesh = {4, vertices, 4, triangles};
   const supine_mesh_save_options options = {.from = vertices};
   const char *path = supine_fuzz_file((const uint8_t *)"", 0, FUZZ_ENDING);
-  supine_fuzz_expect(supine_mesh_save(path, &mesh, &options, NULL) == SUPINE_OK, "saving a seed");
+  supine_fuzz_expect(supine_mesh_save(path, &mesh, &options, NULL) == SUPINE_OK,
+                     "a seed to be saved");
   return supine_fuzz_take(path, size);
 }
 

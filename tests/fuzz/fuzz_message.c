@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz OpenIGTLink messages, with body size and checksum corrected so that the code behind the
- * checks is reached, and tables of recorded poses. */
+/* Fuzz OpenIGTLink messages, whose body size and checksum are corrected so that the code behind
+ * these checks is reached, and tables of recorded poses. */
 #include <endian.h>
 #include <math.h>
 #include <stdbool.h>
@@ -18,7 +18,7 @@ static void read_message(const uint8_t *bytes, size_t size, bool mend) {
   supine_stream_message message = {0};
   supine_error error = {0};
   if (supine_stream_header_read(bytes, &header, &error) != SUPINE_OK) {
-    supine_fuzz_expect(error.message[0] != '\0', "a message");
+    supine_fuzz_expect(error.message[0] != '\0', "an error message");
     return;
   }
   const size_t left = size - SUPINE_STREAM_HEADER;
@@ -32,14 +32,15 @@ static void read_message(const uint8_t *bytes, size_t size, bool mend) {
   }
   const supine_status status =
       supine_stream_message_read(&header, bytes + SUPINE_STREAM_HEADER, NULL, &message, &error);
-  supine_fuzz_expect(status == SUPINE_OK || error.message[0] != '\0', "a message");
-  supine_fuzz_expect(memchr(message.text, '\0', sizeof message.text) != NULL, "an end of the text");
+  supine_fuzz_expect(status == SUPINE_OK || error.message[0] != '\0', "an error message");
+  supine_fuzz_expect(memchr(message.text, '\0', sizeof message.text) != NULL,
+                     "a text that ends with NUL");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   if (size >= SUPINE_STREAM_HEADER) {
-    uint8_t *copy = malloc(size); /* so that a sanitizer sees reads past its end */
-    supine_fuzz_expect(copy != NULL, "memory");
+    uint8_t *copy = malloc(size); /* an exact copy, so that a sanitizer sees reads past its end */
+    supine_fuzz_expect(copy != NULL, "memory for a copy of the input");
     memcpy(copy, bytes, size);
     read_message(copy, size, false);
     read_message(copy, size, true);
@@ -51,11 +52,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   if (supine_stream_poses_load(path, &poses, &error) == SUPINE_OK) {
     for (size_t i = 0; i < poses.count; ++i) {
       const double *g = poses.pose[i].gravity;
-      supine_fuzz_expect(fabs(g[0] * g[0] + g[1] * g[1] + g[2] * g[2] - 1.0) < 1e-6, "a direction");
+      supine_fuzz_expect(fabs(g[0] * g[0] + g[1] * g[1] + g[2] * g[2] - 1.0) < 1e-6,
+                         "a direction of unit length");
     }
     supine_stream_poses_free(&poses);
   } else {
-    supine_fuzz_expect(error.message[0] != '\0', "a message");
+    supine_fuzz_expect(error.message[0] != '\0', "an error message");
   }
   (void)unlink(path);
   return 0;
@@ -79,7 +81,8 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   supine_fuzz_expect(bytes != NULL, "memory for a seed");
   uint8_t *body = bytes + SUPINE_STREAM_HEADER;
   for (size_t i = 0; i < BODY; i += 4) {
-    const uint32_t word = htobe32(UINT32_C(0x3F800000) >> (i % 12)); /* 1.0F and smaller */
+    /* Bits of 1.0F and of smaller floats. */
+    const uint32_t word = htobe32(UINT32_C(0x3F800000) >> (i % 12));
     memcpy(body + i, &word, sizeof word);
   }
   header.crc = supine_stream_crc64(0, body, BODY);

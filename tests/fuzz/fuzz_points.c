@@ -15,18 +15,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   supine_error error = {0};
   const supine_status status = supine_mesh_points_read(path, NULL, &points, &error);
   if (status == SUPINE_OK) {
-    supine_fuzz_expect(points.count > 0, "points");
+    supine_fuzz_expect(points.count > 0, "at least one point");
     for (size_t i = 0; i < points.count; ++i) {
       supine_fuzz_expect(isfinite(points.at[3 * i] + points.at[3 * i + 1] + points.at[3 * i + 2]) ||
                              fabs(points.at[3 * i]) > 1e300,
-                         "a point");
+                         "finite coordinates of each point");
       supine_fuzz_expect(points.names[i] != NULL && strchr(points.names[i], '\n') == NULL,
-                         "a name of one line");
+                         "a name of one line for each point");
     }
   } else {
     supine_fuzz_expect(error.status == status && strstr(error.message, path) != NULL &&
                            points.names == NULL,
-                       "a message that names the file");
+                       "no points, and a message that names the file");
   }
   supine_mesh_points_free(&points);
   (void)unlink(path);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz tables of numbers with each reader in turn: expandability by vertex, samples of pressure
- * and volume, and fitted curves. */
+/* Fuzz tables of numbers with three readers: expandability by vertex, samples of pressure and
+ * volume, and fitted curves. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,7 @@ enum { VERTICES = 3 };
 static void expect_words(supine_status status, const supine_error *error) {
   supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
                                              strchr(error->message, '\n') == NULL),
-                     "a message of one line");
+                     "an error with its status and a message of one line");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
@@ -26,7 +26,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   supine_status status = supine_tissue_expandability_load(path, VERTICES, a, &error);
   expect_words(status, &error);
   for (size_t i = 0; status == SUPINE_OK && i < VERTICES; ++i) {
-    supine_fuzz_expect(a[i] > 0.0 && isfinite(a[i]), "an expandability");
+    supine_fuzz_expect(a[i] > 0.0 && isfinite(a[i]), "a positive finite expandability");
   }
   supine_pv pv;
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
@@ -35,7 +35,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   status = supine_breath_load(path, &pv, &error);
   expect_words(status, &error);
   for (int limb = 0; status == SUPINE_OK && limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    supine_fuzz_expect(supine_breath_curve_check(&pv.limb[limb], NULL) == SUPINE_OK, "a curve");
+    supine_fuzz_expect(supine_breath_curve_check(&pv.limb[limb], NULL) == SUPINE_OK,
+                       "a valid curve for each limb");
   }
   (void)unlink(path);
   return 0;

@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Fuzz every reader without libFuzzer, and count the inputs:
+# Fuzz every reader without libFuzzer, and print the number of inputs:
 #
-#     tests/fuzz/many.sh BUILD [RUNS [SEED]]      110000 inputs for most readers by default
+#     tests/fuzz/many.sh BUILD [RUNS [SEED]]      110000 runs by default
 #
-# Messages are quick and get five times as many; readers that start a process (OBJ, STL) get a 200th. Exit with 1 if an
-# input crashed a reader, or took more than 0.5 s or 2 GB.
+# Each reader gets RUNS inputs, but messages, which are quick, five times as many, and OBJ and STL, which are read in
+# a process of their own, a 200th. Exit with 1 if an input crashed a reader, or took more than 0.5 s or 2 GB.
 set -u
 build=$1
 runs=${2:-110000}
@@ -19,10 +19,10 @@ for reader in ply:mesh:200 stl:mesh:1 vtp:mesh:200 text:text:200 basis:basis:200
   dictionary=${reader#*:}
   count=$((runs * ${dictionary#*:} / 200))
   said=$("$build/tests/fuzz/fuzz_$name" -runs $count -seed "$seed" -dict "$source/${dictionary%:*}.dict" 2>&1) ||
-    { failed=1; echo "FOUND SOMETHING in $name: $(echo "$said" | tail -2)"; }
+    { failed=1; echo "FAILED $name: $(echo "$said" | tail -2)"; }
   said=$(echo "$said" | grep 'inputs, slowest')
   echo "$name: $said"
   all=$((all + ${said%% *}))
 done
-echo "$all inputs in all"
+echo "$all inputs in total"
 exit $failed

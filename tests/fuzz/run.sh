@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Fuzz every reader with libFuzzer for a given time.
 #
-#     tests/fuzz/run.sh [SECONDS A READER] [FOLDER]       3600 and build/fuzz by default
+#     tests/fuzz/run.sh [SECONDS] [FOLDER]       3600 s per reader and build/fuzz by default
 #
 # Needs clang and its runtime (libclang-rt-14-dev in Debian 12). Failing inputs are left in FOLDER as
 # crash-*, slow-unit-* or oom-*; inputs that reach new code are kept in FOLDER/corpus for the next run.
@@ -27,9 +27,9 @@ for reader in $readers; do
   "tests/fuzz/fuzz_$reader" -seeds "corpus/$reader" > /dev/null
   if "tests/fuzz/libfuzzer_$reader" -dict="$source/tests/fuzz/$dictionary.dict" -max_total_time="$seconds" \
     -timeout=10 -rss_limit_mb=2048 -max_len=16384 -print_final_stats=1 "corpus/$reader" > "$reader.log" 2>&1; then
-    verdict="nothing found"
+    verdict="no failure"
   else
-    verdict="FOUND SOMETHING: see $folder/$reader.log"
+    verdict="FAILED: see $folder/$reader.log"
     failed=1
   fi
   echo "$reader: $(sed -n 's/^stat::number_of_executed_units: *//p' "$reader.log") inputs, $verdict"

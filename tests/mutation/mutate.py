@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mutation testing: change the code in one place, build it, and expect that a test fails.
+"""Mutation testing: change the code in one place, build it, and check that a test fails.
 
-    mutate.py named [PATTERN]          mutants of named.txt whose title matches the pattern
-    mutate.py random [COUNT] [SEED]    a random COUNT (100) of mutants of the folders in FOLDERS
+    mutate.py named [PATTERN]          mutants of named.txt whose title matches the pattern (default: all)
+    mutate.py random [COUNT] [SEED]    COUNT (default 100) random mutants of the code in FOLDERS
 
-Works on a copy of the last commit, in build/mutation. A mutant is killed if a test fails or exceeds its
-time; one that does not compile does not count. A random mutant is run against the tests that reach its
-line, quick ones first, until one fails or they took ENOUGH seconds. An instrumented build, in which each
-test runs once alone, shows which tests these are; the result is kept for other seeds of the same commit.
-Tests that fail there, take longer than SLOW or build the project again are left out, so the number of
-survivors is an upper bound. Set further options of CMake in SUPINE_CMAKE_OPTIONS: -DSUPINE_LUNGS=FOLDER.
+The mutants are made in a copy of the last commit, in build/mutation. A mutant is killed if a test fails or exceeds
+its time limit; a mutant that does not compile does not count. For a random mutant, the tests that reach its line
+are run, quick ones first, until one fails or they have taken ENOUGH seconds. An instrumented build, in which each
+test runs once alone, shows which tests reach a line; the result is kept for other seeds of the same commit. Tests
+that fail in that build, take longer than SLOW or are listed in LEFT_OUT are not used, so the number of survivors is
+an upper bound. Set CMake options such as -DSUPINE_LUNGS=FOLDER in the environment variable SUPINE_CMAKE_OPTIONS.
 """
 import json
 import os
@@ -32,10 +32,10 @@ BUILD = FOLDER / "build"
 COMMIT = subprocess.run(["git", "-C", str(SOURCE), "rev-parse", "HEAD"], check=True, text=True,
                         stdout=subprocess.PIPE).stdout.strip()
 FOLDERS = ("sh", "mesh", "precompute", "runtime", "program")
-QUICK, SLOW = 2.0, 320.0  # s, instrumented: about three times that of an optimised build
-ENOUGH = 240.0  # s, all tests of one mutant
-JOBS = str(len(os.sched_getaffinity(0)))  # processors available
-LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"  # read the sources, build the project again, or accept any input
+QUICK, SLOW = 2.0, 320.0  # time of a test in the instrumented build, s: about three times that of an optimised build
+ENOUGH = 240.0  # largest total time of the tests of one mutant, s
+JOBS = str(len(os.sched_getaffinity(0)))  # number of processors available
+LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"  # tests that read the sources, rebuild the project, or accept any input
 
 
 def run(*command, cwd=BUILD, **environment):
@@ -67,14 +67,14 @@ def build(folder=BUILD):
 
 
 def failed_tests(names):
-    """Return the tests that fail or exceed their time, at most a few."""
+    """Return the tests that fail or exceed their time limit; ctest stops at the first."""
     _, said = run("ctest", "-R", f"^({'|'.join(names)})$", "-j", JOBS, "--stop-on-failure") if names else (0, "")
     return re.findall(r"Test +#\d+: (\S+) \.*\*\*\*(?!Skipped)", said)
 
 
 def tries(path, changed, groups):
-    """Return the test that fails with the change, '' if none does, None if it does not compile. A group
-    is a list of names of tests."""
+    """Run groups of tests, each a list of names, with the changed text of a file. Return the first test that fails,
+    '' if none does, None if the change does not compile."""
     file = COPY / path
     before = file.read_text()
     file.write_text(changed)
@@ -99,11 +99,11 @@ def named(word):
     survived = 0
     failed = failed_tests(sorted({m["~"] for m in mutants}))
     if failed:
-        sys.exit(f"without a mutant fails {failed}")
+        sys.exit(f"tests fail without a mutant: {failed}")
     for m in mutants:
         text = (COPY / m["@"]).read_text()
         if text.count(m["-"]) != 1:
-            print(f"STALE     {m['#']}: {m['@']} has {text.count(m['-'])} times: {m['-']}")
+            print(f"STALE     {m['#']}: not once but {text.count(m['-'])} times in {m['@']}: {m['-']}")
             survived += 1
             continue
         line = text[:text.index(m["-"])].count("\n") + 1
@@ -115,7 +115,7 @@ def named(word):
     return survived == 0
 
 
-OPERATORS = [  # pattern, and its possible replacements
+OPERATORS = [  # pattern, and the replacements to choose from
     (r" < ", [" <= ", " > "]), (r" > ", [" >= ", " < "]), (r" <= ", [" < "]), (r" >= ", [" > "]),
     (r" == ", [" != "]), (r" != ", [" == "]), (r" && ", [" || "]), (r" \|\| ", [" && "]),
     (r" \+ ", [" - "]), (r" - ", [" + "]), (r" \* (?=[\w(])", [" / "]), (r" / ", [" * "]),
@@ -147,7 +147,7 @@ def places():
 def random_ones(count, seed):
     chosen = random.Random(seed)
     took, reached = measured()
-    for file in BUILD.rglob("CTestTestfile.cmake"):  # shorten the time of mutants that do not end
+    for file in BUILD.rglob("CTestTestfile.cmake"):  # shorter time limits, for mutants that never end
         file.write_text(re.sub(r'(set_tests_properties\(\[=\[(\S+)\]=\].* TIMEOUT )"\d+"',
                                lambda m: f'{m[1]}"{20 + took.get(m[2], 0):.0f}"', file.read_text()))
     every = places()
@@ -161,7 +161,7 @@ def random_ones(count, seed):
         line = lines[number]
         lines[number] = line[:match.start()] + match.expand(chosen.choice(instead)) + line[match.end():]
         path = str(file.relative_to(COPY))
-        # Tests for a line that gcov does not count: those that reach the file; for a file without code: all.
+        # For a line that gcov does not count, use the tests that reach the file; for a file not counted, all tests.
         tests = reached.get((path, number + 1), reached.get((path, 0), sorted(took, key=took.get)))
         used = list(accumulate(took[t] for t in tests))
         tests = [t for t, so_far in zip(tests, used) if so_far <= ENOUGH] or tests[:1]
@@ -178,7 +178,7 @@ def random_ones(count, seed):
 
 
 def measured():
-    """Return the seconds of each test, and for each (file, line) the tests that reach it; line 0 is the file."""
+    """Return the time of each test, s, and for each (file, line) the tests that reach it; line 0 is the whole file."""
     covered = FOLDER / "covered"
     configure(covered, "-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_C_FLAGS_DEBUG=-Og", "-DSUPINE_COVERAGE=ON")
     if not build(covered):
@@ -202,8 +202,8 @@ def measured():
 
 
 def lines_reached(name, covered, kept):
-    """Return the seconds of a test of the instrumented build (infinite if it fails), the countable places
-    (file, line) and those that it reached, with line 0 for the file; read them from `kept` if they are there."""
+    """Run a test of the instrumented build, unless `kept` has its result. Return its time in s (infinite if it
+    fails), the (file, line) that can be reached, and those that it reached, with line 0 for the whole file."""
     kept, counts = kept / f"{name}.json", FOLDER / "counts" / name
     if kept.exists():
         return json.loads(kept.read_text())
@@ -212,7 +212,7 @@ def lines_reached(name, covered, kept):
     _, said = run("ctest", "-R", f"^{name}$", cwd=covered, GCOV_PREFIX=str(counts))
     passed = re.search(r"(?:Passed|\*Skipped) +([\d.]+) sec", said)
     files = [str(file) for file in counts.rglob("*.gcda")] if passed else []
-    for file in files:  # gcov looks for the notes beside the counts
+    for file in files:  # gcov looks for .gcno files beside the .gcda files
         notes = file.removesuffix("gcda") + "gcno"
         os.symlink(notes.removeprefix(str(counts)), notes)
     counted, found = set(), set()

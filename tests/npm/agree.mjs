@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Evaluate each basis in several states by the package, in node or a browser, and compare with plain C.
+// Evaluate each basis in several states by the JavaScript package, in node or a browser, and compare with plain C.
 import assert from 'node:assert/strict';
 import { bases, native } from './made.mjs';
 import { largestDistance } from '../export/support.mjs';
@@ -17,7 +17,8 @@ async function check(basis, states, ask) {
   }
 }
 
-/** Run in node and in a browser: return the results of an open basis as arrays. */
+/** Return the results of an open basis in each state. This function runs in node or in a
+ * browser. */
 export function pose(lungs, states) {
   return states.map((state) => {
     lungs.pose(state).deformLit();
@@ -25,8 +26,8 @@ export function pose(lungs, states) {
   });
 }
 
-/** Compare each basis in its last states; `ask(basis, states)` returns the results of `pose`. */
+/** Compare each basis in its last `most` states. `ask(basis, states)` returns the results of `pose` in these states. */
 export async function checkAll(ask, most = Infinity) {
   for (const [basis, states] of bases) await check(basis, states.slice(-most), ask);
-  console.log(`${bases.length} bases as in C`);
+  console.log(`${bases.length} bases give the same results as in C`);
 }

@@ -7,7 +7,7 @@ import { checkAll, pose } from './agree.mjs';
 import { browser, settled } from '../export/browser.mjs';
 import { folder } from '../export/support.mjs';
 
-/** Serve a page of a folder within this process, without a network. */
+/** Open a page of the folder; requests are answered by this process, without a network. */
 const origin = 'http://lungs.test/';
 const kinds = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
 async function visit(path) {
@@ -34,7 +34,7 @@ await checkAll((basis, states) => page.evaluate(async ([file, states, code]) => 
 }, [`/${basename(basis)}`, states, pose.toString()]), 2);
 await page.close();
 
-/** Take a picture; return its pixels as grey values. */
+/** Take a screenshot; return the red values of its pixels. */
 async function look(page) {
   await settled(page);
   const shot = (await page.screenshot()).toString('base64');
@@ -47,7 +47,7 @@ async function look(page) {
   }, shot);
 }
 
-/** Check that two pictures of an example differ, and each is filled to a good part. */
+/** Check that an example draws lungs, and that `change` changes its picture. */
 async function check(name, change) {
   if (!existsSync(join(process.env.MODULES, 'node_modules', name))) {
     console.log(`${name} is not installed: its example is not tried`);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Reference for the JavaScript package, in plain C (SUPINE_SIMD_PORTABLE).
+/* Compute reference results for the JavaScript package, in portable C (SUPINE_SIMD_PORTABLE).
  *
  *     native BASIS STATE OUT    write as float64 the volume of each lung; then as float32 the
  *                               positions, the normals of supine_deform_lit (of supine_normals if

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Make the package for JavaScript, or skip if its tools are missing: package.sh CMAKE BUILD_FOLDER TARBALL
+# Make the JavaScript package, or exit with 77 (skipped) if a tool is missing: package.sh CMAKE BUILD_FOLDER TARBALL
 set -eu
 cmake=$1 build=$2 tarball=$3
 rm -f "$tarball"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test the Python package; test_python.py runs this in the environment into which the wheel was installed.
+"""Test the Python package. test_python.py runs this program in the environment into which it installed the wheel.
 
     inside.py REFERENCE BASIS"""
 import ctypes
@@ -33,7 +33,7 @@ lungs = supine.open(path)
 n, k = lungs.vertex_count, lungs.mode_count
 assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", "right"]
 
-# Arrays are views without copies, and keep the basis open.
+# Arrays are read-only views of the basis, not copies, and keep it open.
 for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
                             (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
                             (lungs.modes, (k, (lungs.band + 1) ** 2), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
@@ -52,7 +52,7 @@ kept, first = supine.open(path).vertices, lungs.vertices.copy()
 gc.collect()
 assert (kept == first).all()
 
-# Results have the same bits as in C: from a file, from memory, in ranges.
+# Results have the same bits as in C, for a basis from a file or from memory, and in ranges of vertices.
 STATE = "prone:rest+321.5"
 pose, supine_rest = lungs.pose(STATE), lungs.pose("supine")
 assert abs(lungs.volumes(pose).sum() - lungs.volumes(lungs.pose("prone:rest")).sum() - 321.5) < 1e-6
@@ -60,7 +60,7 @@ assert lungs.weights(pose).shape == (k,) and lungs.gains(pose).shape == (2, 3)
 out = path + ".raw"
 subprocess.run([reference, path, STATE, out], check=True)
 raw = np.fromfile(out, np.float32).reshape(5, n, 3)
-assert np.ptp(raw[0] - lungs.vertices) > 1.0  # mm
+assert np.ptp(raw[0] - lungs.vertices) > 1.0  # displacements vary by more than 1 mm
 with open(path, "rb") as file:
     in_memory = supine.open(file.read())
 for basis in (lungs, in_memory):
@@ -76,22 +76,22 @@ assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(pose)
 assert bytes(lungs.pose((0, -2, 0), "rest+321.5")) == bytes(pose) == bytes(lungs.pose(STATE, out=supine.Pose()))
 assert (lungs.deform(supine.Pose().fill(0.0)) == lungs.deform(lungs.pose("full"))).all()
 
-# Directions.
+# Directions of gravity by name, tilt and quaternion.
 assert tuple(supine.gravity("HFP")) == (0.0, -1.0, 0.0) and "prone" in supine.postures()
 assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))
 assert np.allclose(supine.gravity_of_quaternion((1, 0, 0, 0)), supine.gravity("upright"))
 
-# A breath.
+# Volume of a breath over time.
 times = np.array([[0, 5 / 3], [5, 2]])
 volumes = supine.breath(times)
 assert volumes.shape == (2, 2) and np.allclose(volumes[:, 0], 0, atol=1e-9) and abs(volumes[0, 1] - 500) < 1e-9
 assert np.allclose(supine.breath([0.5, 3], course="flow", inhale=0.5, tidal=100), [20, 80])
-straight = [[0, 30, 0, 3000, 0, 0, 0, 0, 0]] * 2  # mL are 100 times cmH2O
+straight = [[0, 30, 0, 3000, 0, 0, 0, 0, 0]] * 2  # a straight line: 100 mL per cmH2O
 assert np.allclose(supine.breath([5 / 6], pv=straight, course="ramp"), 250) and supine.breath(5 / 6).shape == ()
 refused(supine.ArgumentError, "tidal volume", supine.breath, [0], tidal=9000)
 refused(ValueError, "pv must be 18 numbers", supine.breath, [0], pv=straight[0])
 
-# Errors of the C library are exceptions of Supine and of Python.
+# An error of the C library raises an exception of Supine that is also one of Python.
 with open(path, "rb") as file:
     whole = file.read()
 with open(path + ".cut", "wb") as file:
@@ -108,7 +108,7 @@ refused(supine.ArgumentError, "gravity", lungs.pose, (0, 0, float("nan")))
 refused(supine.NumericalError, "volume", lungs.pose, "rest-1e6")
 refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, pose)
 assert issubclass(supine.NumericalError, supine.Error) and issubclass(supine.Error, Exception)
-# Errors that the package itself raises.
+# Exceptions that the package itself raises.
 refused(ValueError, "float32", lungs.deform, pose, np.empty((n, 3)))
 refused(ValueError, "float32", lungs.deform, pose, np.empty((n - 1, 3), np.float32))
 refused(ValueError, "contiguous", lungs.deform, pose, np.empty((n, 6), np.float32)[:, ::2])
@@ -123,7 +123,7 @@ try:
 except ValueError:
     pass
 
-# Observed points: a wrong one is named, a rotation is found, bad ones are refused.
+# Lungs from observed points: a wrong point is reported, a rotation is found, invalid points are refused.
 seen = list(range(0, n, n // 20))
 truth = lungs.deform(lungs.pose("left:rest+300"))
 turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
@@ -144,8 +144,8 @@ refused(supine.ArgumentError, "give a vertex below", lungs.locate, [n], [(0, 0, 
 refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=True)
 refused(ValueError, "positions", lungs.locate, [0, 1], truth[:1])
 
-# The interpreter's lock is released while vertices are visited: with a switch interval that never ends
-# a waiting thread gets the lock only if a call releases it. `repr` does not.
+# Calls that visit vertices release the interpreter's lock. The switch interval is so long that a waiting thread gets
+# the lock only if a call releases it, which `repr` does not.
 def lets_others_run(call, *arguments, tries=None):
     gate, ran = threading.Lock(), []
 
@@ -157,7 +157,7 @@ def lets_others_run(call, *arguments, tries=None):
     waiting = threading.Thread(target=wait)
     waiting.start()
     gate.release()
-    count, until = 0, time.monotonic() + 60  # s, on the busiest machine
+    count, until = 0, time.monotonic() + 60  # s, enough on a busy machine
     while not ran and (count < tries if tries else time.monotonic() < until):
         call(*arguments)
         count += 1
@@ -167,15 +167,15 @@ def lets_others_run(call, *arguments, tries=None):
 
 
 sys.setswitchinterval(1000)
-assert not lets_others_run(repr, lungs, tries=2000), "the test proves nothing"
+assert not lets_others_run(repr, lungs, tries=2000), "repr released the lock, so nothing is tested"
 points = np.empty((n, 3), np.float32)
 for call, *arguments in ((lungs.deform, pose, points), (lungs.displace, pose, points),
                          (lungs.deform_lit, pose, points, points.copy()), (lungs.normals, raw[0], points),
                          (lungs.deform_batch, [pose] * 100), (supine.open, path)):
-    assert lets_others_run(call, *arguments), f"{call} keeps the lock"
+    assert lets_others_run(call, *arguments), f"{call} does not release the lock"
 sys.setswitchinterval(0.005)
 
-# Images are unchanged in the scan's own state, and as written by the program in others; one basis, many states.
+# Images: unchanged in the state of the scan, warped in other states, several states in one call, refused input.
 grid = supine.open("grid.safetensors")
 low, high = lungs.vertices.min(0) - 20, lungs.vertices.max(0) + 20
 size = ((high - low) / [6, 7, 8]).astype(int)
@@ -200,7 +200,7 @@ refused(ValueError, "[z, y, x]", grid.warp, image[0], "prone:rest", **frame)
 refused(ValueError, "uint8", grid.warp, image.astype(np.int64), "prone:rest", **frame)
 refused(supine.ArgumentError, "needs a reference", grid.warp, image, "500", **frame)
 
-# Bases made from arrays are the program's own, bit for bit; `path` was made with --band 3.
+# A basis made from arrays has the same bits as one made by the program: `path` was made with --band 3.
 parts = []
 made = supine.precompute(lungs.vertices, lungs.triangles, band=3, progress=parts.append)
 for name in ("vertices", "triangles", "coefficients", "modes", "volume_cubic"):
@@ -214,7 +214,7 @@ apart = supine.precompute((lungs.vertices[right], halves[1]), (lungs.vertices[le
                           held_out=60, resting={"supine": "2600mL"}, output=path + ".made")
 assert apart.vertex_count == n and supine.open(path + ".made").metadata["resting_known"]
 assert "--held-out 60" in apart.metadata["made_by"]
-assert supine.precompute(lungs.vertices, lungs.faces, band=3, modes=2).mode_count == 2  # faces as VTK has them
+assert supine.precompute(lungs.vertices, lungs.faces, band=3, modes=2).mode_count == 2  # faces in VTK's layout
 with warnings.catch_warnings(record=True) as warned:
     warnings.simplefilter("always")
     supine.precompute(1.4 * lungs.vertices, lungs.triangles, band=3)
@@ -240,7 +240,8 @@ try:
 except KeyboardInterrupt:
     assert not os.path.exists(path + ".stopped")
 
-# Inside: of a file and of memory, points by name or not, a mesh; a point on the surface moves with it.
+# Content: in a basis from a file or from arrays, points with or without names, a mesh, a grid. A point on the surface
+# moves with it.
 place = lungs.vertices[7].astype(float)
 for basis in (lungs, made):
     inside = supine.embed(basis, {"on, the surface": place, "other": (-80, -120, -90)})
@@ -256,4 +257,4 @@ program, os.environ["PATH"] = shutil.which("supine"), ""
 refused(supine.UnsupportedError, "neither on PATH nor beside", supine.precompute, lungs.vertices, lungs.triangles)
 os.symlink(program, os.path.join(os.path.dirname(supine.__file__), "supine"))
 assert supine.embed(made, place).vertex_count == 1
-print("all as in C")
+print("results equal those in C")

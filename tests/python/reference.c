@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Reference for the Python package.
+/* Compute reference results for the Python package.
  *
  *     reference BASIS STATE OUT    write as float32 the positions and normals of supine_deform_lit,
  *                                  exact normals, and positions of a batch of this state and supine

@@ -11,16 +11,16 @@ static class TestLink
     static void Expect(bool holds, string what)
     {
         if (holds) return;
-        Console.Error.WriteLine("not so: " + what);
+        Console.Error.WriteLine("failed: " + what);
         Environment.Exit(1);
     }
 
     static float Far(float[] a, float[] b)
     {
-        Expect(a.Length == b.Length, "as many numbers");
+        Expect(a.Length == b.Length, "equal numbers of values");
         float most = 0;
         for (int i = 0; i < a.Length; ++i) most = Math.Max(most, Math.Abs(a[i] - b[i]));
-        Expect(!float.IsNaN(most), "finite numbers");
+        Expect(!float.IsNaN(most), "values are numbers");
         return most;
     }
 
@@ -46,22 +46,22 @@ static class TestLink
             ulong stamp;
             float[] frame = link.TakeNewest(out stamp);
             if (frame != null && stamp == wanted) return frame;
-            Expect(link.Failure == null, "the link holds: " + link.Failure);
+            Expect(link.Failure == null, "the connection is open: " + link.Failure);
             Thread.Sleep(1);
         }
-        Expect(false, "an answer comes");
+        Expect(false, "an answer arrives");
         return null;
     }
 
     static int Main(string[] words)
     {
-        // Rows of matrices whose columns are the directions of left, back and head in a room whose z is up.
+        // Rotation matrices, by rows; the columns are the directions of left, back and head in a room whose z is up.
         float[][] rotations = {
             new float[] { 1, 0, 0, 0, 0, 1, 0, -1, 0 },
             new float[] { -1, 0, 0, 0, 0, 1, 0, 1, 0 },
             new float[] { 0, -1, 0, 0, 0, 1, -1, 0, 0 },
             new float[] { 0, 1, 0, 0, 0, 1, 1, 0, 0 } };
-        // The same as rotations of a standing object in Unity: supine and prone about x, then lateral about z.
+        // The same postures as rotations of a standing object in Unity: supine and prone about x, left and right about z.
         const float h = 0.70710678f;
         Quaternion[] turns = { new Quaternion(-h, 0, 0, h), new Quaternion(h, 0, 0, h),
                                new Quaternion(0, 0, h, h), new Quaternion(0, 0, -h, h) };
@@ -78,19 +78,19 @@ static class TestLink
                 float[] turned = Answer(link, (ulong)(90 + i));
                 link.SendPose("Patient", rotations[i], (ulong)(100 + i));
                 float[] frame = Answer(link, (ulong)(100 + i));
-                Expect(Far(turned, frame) < 1e-4f, "an object turned to a posture has its weights");
+                Expect(Far(turned, frame) < 1e-4f, "an object rotated to a posture gets the weights of the posture");
                 Expect(Far(frame, basis.Frame(postures[i] + ":rest+400")) < 1e-4f, "weights and gains of the posture");
                 basis.Deform(frame, xyz);
                 Expect(Far(xyz, rest) > 1, "the lung moves");
-                Expect(i == 0 || Far(xyz, before) > 0.5f, "another posture, another shape");
+                Expect(i == 0 || Far(xyz, before) > 0.5f, "shapes differ between postures");
                 xyz.CopyTo(before, 0);
             }
             link.SetVolume("full");
             link.SendPose("Patient", rotations[0], 200);
             basis.Deform(Answer(link, 200), xyz);
-            Expect(Far(xyz, rest) < 0.02f, "full, the lung is the file's, as stored");
+            Expect(Far(xyz, rest) < 0.02f, "at full inflation the surface is that of the file");
             Expect(basis.Triangles().Length == 3 * basis.TriangleCount, "triangles");
-            Expect(Volume(rest, basis.Triangles()) > 0, "faces outwards in right-handed axes");
+            Expect(Volume(rest, basis.Triangles()) > 0, "triangles face outwards in right-handed axes");
             for (int i = 0; i < rest.Length; i += 3)
             {
                 Vector3 p = LungBehaviour.ToUnity(rest[i], rest[i + 1], rest[i + 2]);
@@ -98,7 +98,7 @@ static class TestLink
                 xyz[i + 1] = p.y;
                 xyz[i + 2] = p.z;
             }
-            Expect(Volume(xyz, LungBehaviour.ToUnity(basis.Triangles())) > 0, "clockwise seen from outside in left-handed axes");
+            Expect(Volume(xyz, LungBehaviour.ToUnity(basis.Triangles())) > 0, "triangles are clockwise from outside in left-handed axes");
         }
         return 0;
     }

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of a server share: wait for an answer over OpenIGTLink, and compare faces."""
+"""Helpers for tests of a server: wait for an answer over OpenIGTLink, and compare triangles."""
 import time
 
 
 def answer(link, stamp, send):
-    """Return the frame that answers the message with that stamp, which `send` sends."""
+    """Call `send`, which sends a message with this stamp; return the frame that answers the message."""
     send()
     end = time.monotonic() + 20
     while time.monotonic() < end:
@@ -17,7 +17,7 @@ def answer(link, stamp, send):
 
 
 def faces(corners):
-    """Return triangles sorted, each from its lowest corner, so that two lists of them compare."""
+    """Return the triangles sorted, each beginning with its lowest corner, so that lists of them can be compared."""
     found = []
     for i in range(0, len(corners), 3):
         low = min(range(3), key=lambda j: corners[i + j])

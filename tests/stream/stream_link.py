@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test the Python client of the samples with a real server: stream_link.py SAMPLES PORT BASIS
+"""Test the sample client in Python with a real server: stream_link.py SAMPLES PORT BASIS
 
-It shares no code with the server: it follows the descriptions of the protocol and of the file."""
+The client shares no code with the server: it was written from the descriptions of the protocol and the file."""
 import sys
 
 sys.path.insert(0, sys.argv[1])
@@ -9,11 +9,11 @@ from answers import answer, faces  # noqa: E402
 from supine_link import Basis, Link, array, corners, crc64, instruments, quaternion, string, unpack  # noqa: E402
 
 port, basis = int(sys.argv[2]), Basis(sys.argv[3])
-MM = 5e-3  # packed storage of the run-time library: at most this far from the file's numbers
+MM = 5e-3  # largest error of the library's packed storage, mm
 
-assert crc64(b"123456789") == 0x6C40DF5F0B497347  # the published check value of CRC-64/ECMA-182
+assert crc64(b"123456789") == 0x6C40DF5F0B497347  # published check value of CRC-64/ECMA-182
 
-SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # rows; columns: left, back, head in a room, z up
+SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # rotation by rows; columns: left, back and head in a room whose z is up
 LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]
 
 
@@ -37,15 +37,15 @@ for version in (1, 2):
         kind, device, _, content = answer(link, stamp, send)
         assert (kind, device) == ("NDARRAY", "SUPINE")
         frames[stamp] = unpack(kind, content)
-        assert len(frames[stamp]) == basis.modes + 6  # gains of two lungs along three axes
-    # All routes give the same posture; different postures differ.
+        assert len(frames[stamp]) == basis.modes + 6  # weights, then gains of two lungs along three axes
+    # All message types give the same weights for a posture; weights of different postures differ.
     assert far(frames[101], frames[103]) < 1e-5 and far(frames[101], frames[105]) < 1e-5
     assert far(frames[102], frames[104]) < 1e-5 and far(frames[102], frames[106]) < 1e-5
     assert far(frames[101], frames[102]) > 0.05
-    # Surfaces equal those computed from the file and the weights.
-    link.check = False  # 650 kB a frame are too many for plain Python
+    # Surfaces sent by the server equal those computed from the file and the weights.
+    link.check = False  # checking 650 kB per frame takes too long in plain Python
     link.ask_for("points")
-    _, (points, strips) = link.newest(10.0)  # the last frame again, with the triangles
+    _, (points, strips) = link.newest(10.0)  # the answer to the request: the last frame, with triangles
     assert faces(list(corners(strips))) == faces(basis.triangles)
     for stamp, pose in ((201, SUPINE), (202, LEFT)):
         kind, _, _, content = answer(link, stamp, lambda: link.send_pose(pose, stamp=stamp))
@@ -53,9 +53,9 @@ for version in (1, 2):
         assert not strips
         assert far(points, basis.deform(frames[stamp - 100])) < MM
         assert far(points, basis.vertices) > 1.0
-    link.set_volume("full")  # what the file itself shows, but for upright
+    link.set_volume("full")  # full inflation is the surface of the file, except upright
     kind, _, _, content = answer(link, 203, lambda: link.send_pose(LEFT, stamp=203))
     assert far(unpack(kind, content)[0], basis.vertices) < MM
     link.send("STRING", "VOLUME", string("rest+400"))
     link.close()
-print("as the protocol's text says, headers of both versions")
+print("messages of both versions equal the description of the protocol")

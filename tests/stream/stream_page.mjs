@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The live page with two viewers in headless Chromium: they show the posture of the tracker's last pose, then
-// of the tilt of one viewer. stream_page.mjs PAGE PORT
+// The live page with two viewers in headless Chromium: both show the posture of the tracker's last pose, then that
+// of the tilt sensor of one viewer. stream_page.mjs PAGE PORT
 import assert from 'node:assert/strict';
 import { createConnection } from 'node:net';
 import { load, skip } from '../export/support.mjs';
@@ -10,7 +10,7 @@ if (!site) skip('no page is served: the program was built without libwebsockets'
 const { chromium } = await load('playwright-core/index.mjs');
 if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
 
-/** Compute the CRC-64 of ECMA-182 bit by bit. */
+/** Return the CRC-64 of ECMA-182, computed bit by bit. */
 function crc64(bytes) {
   let crc = 0n;
   for (const byte of bytes) {
@@ -20,7 +20,8 @@ function crc64(bytes) {
   return crc;
 }
 
-/** Make a TRANSFORM: directions of left, back and head in a room whose z is up. */
+/** Return a TRANSFORM message from the directions of left, back and head in a room whose z is
+ * up. */
 function transform(left, back, head) {
   const body = Buffer.alloc(48);
   [...left, ...back, ...head].forEach((x, i) => body.writeFloatBE(x, 4 * i));
@@ -43,7 +44,7 @@ const browser = await chromium.launch({
 });
 const complaints = [];
 const context = await browser.newContext({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce' });
-context.setDefaultTimeout(120000); // for what hangs, on a machine as busy as may be
+context.setDefaultTimeout(120000); // ms, long enough on a busy machine
 
 async function view() {
   const page = await context.newPage();
@@ -58,7 +59,7 @@ const viewers = [await view(), await view()];
 const ages = () => Promise.all(viewers.map((page) => page.evaluate(() => window.supineLive.age())));
 assert.deepEqual(await ages(), ['no tracker yet', 'no tracker yet']);
 
-/** Wait until every viewer shows this gravity and the volume of the server. */
+/** Wait until every viewer shows this direction of gravity and the server's volume. */
 async function expectGravity(wanted, what) {
   for (const page of viewers) {
     await page.waitForFunction((g) => {
@@ -86,18 +87,18 @@ for (const [name, left, back, head, gravity] of lies) {
   }
 }
 for (const text of await ages()) assert.match(text, /^pose \d\.\d s old$/);
-await viewers[1].waitForFunction(() => /^pose (1[.]5|[2-9]).* s old$/.test(window.supineLive.age())); // it grows old
-viewers.push(await view()); // who comes late is told the same
+await viewers[1].waitForFunction(() => /^pose (1[.]5|[2-9]).* s old$/.test(window.supineLive.age())); // the age grows
+viewers.push(await view()); // a later viewer gets the age of the pose, too
 assert.match(await viewers[2].evaluate(() => window.supineLive.age()), /^pose (1\.[5-9]|[2-9]\.\d|\d\d+) s old$/);
 await viewers.pop().close();
-// A fast tracker: the last of many poses is shown.
+// After many poses in a short time, the last is shown.
 for (let i = 0; i <= 400; ++i) {
   const a = (i / 400) * 2.1;
   tracker.write(transform([Math.cos(a), 0, Math.sin(a)], [Math.sin(a), 0, -Math.cos(a)], [0, 1, 0]));
 }
 await expectGravity([-Math.sin(2.1), Math.cos(2.1), 0], 'the last of many');
 
-// A phone on the breastbone, by its sensor: screen up, on its left edge, upright.
+// The tilt sensor of a phone on the breastbone gives the posture.
 const phone = await context.newCDPSession(viewers[0]);
 assert.ok(await viewers[0].getByRole('button', { name: /tilt/ }).isVisible());
 await viewers[0].getByRole('button', { name: /tilt/ }).click();
@@ -107,13 +108,13 @@ for (const [name, beta, gamma, gravity] of [
   await phone.send('DeviceOrientation.setDeviceOrientationOverride', { alpha: 30, beta, gamma });
   await expectGravity(gravity, name);
 }
-// The page is served on 127.0.0.1 only: another address of the loopback is refused.
+// The page is served on 127.0.0.1 only: a connection to another address of this machine is refused.
 const elsewhere = await new Promise((done) => {
   const socket = createConnection(Number(new URL(site).port), '127.0.0.2');
   socket.on('connect', () => done('let in')).on('error', (error) => done(error.code));
 });
 assert.equal(elsewhere, 'ECONNREFUSED');
-// Another page may not open the socket.
+// A page from another origin may not open the socket.
 const stranger = await context.newPage();
 await stranger.goto('data:text/html,<title>elsewhere</title>');
 const opened = await stranger.evaluate((place) => new Promise((done) => {
@@ -121,7 +122,7 @@ const opened = await stranger.evaluate((place) => new Promise((done) => {
   socket.onopen = () => done(true);
   socket.onerror = () => done(false);
 }), site.replace('http', 'ws'));
-assert.equal(opened, false, 'a page from elsewhere is let in');
+assert.equal(opened, false, 'a page from another origin opened the socket');
 assert.deepEqual(complaints, []);
 tracker.destroy();
 await browser.close();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A peer that uses the public library of the protocol: stream_peer PORT BASIS
-// Send each posture packed by that library, and compare the frames, unpacked and checked by it, with the run-time
-// library.
+// Test a server with the public OpenIGTLink library: stream_peer PORT BASIS
+// Send each posture as a message packed by that library. Unpack the frames by it, with their checksums, and compare
+// them with results of the run-time library.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,7 +24,7 @@
 
 static void expect(bool holds, const char *what) {
   if (!holds) {
-    std::fprintf(stderr, "stream_peer: not so: %s\n", what);
+    std::fprintf(stderr, "stream_peer: failed: %s\n", what);
     std::exit(1);
   }
 }
@@ -39,13 +39,13 @@ template <class Message> static void send(Message &message, const char *device) 
   expect(peer->Send(message->GetPackPointer(), message->GetPackSize()) != 0, "a message is sent");
 }
 
-// Receive the next message of a type that answers the last pose.
+// Receive the next message of this type that has the stamp of the last message sent.
 template <class Pointer> static void receive(Pointer message, const char *type) {
   for (int i = 0; i < 10000; ++i) {
     igtl::MessageHeader::Pointer header = igtl::MessageHeader::New();
     header->InitPack();
     expect(peer->Receive(header->GetPackPointer(), header->GetPackSize()) == header->GetPackSize(),
-           "a header comes");
+           "a header arrives");
     header->Unpack();
     unsigned int seconds = 0;
     unsigned int fraction = 0;
@@ -54,17 +54,17 @@ template <class Pointer> static void receive(Pointer message, const char *type) 
       peer->Skip(header->GetBodySizeToRead(), 0);
       continue;
     }
-    expect(fraction == 0x80000000u, "the pose's own time stamp");
+    expect(fraction == 0x80000000u, "the time stamp of the pose");
     expect(std::strcmp(header->GetDeviceName(), "SUPINE") == 0, "the device's name");
     message->SetMessageHeader(header);
     message->AllocatePack();
     expect(peer->Receive(message->GetPackBodyPointer(), message->GetPackBodySize()) ==
                message->GetPackBodySize(),
-           "a body comes");
+           "a body arrives");
     expect((message->Unpack(1) & igtl::MessageHeader::UNPACK_BODY) != 0, "the checksum is right");
     return;
   }
-  expect(false, "the answer comes");
+  expect(false, "the answer arrives");
 }
 
 static supine_pose pose_of(const supine_basis *basis, const double gravity[3], double above) {
@@ -96,7 +96,7 @@ static void expect_weights(const supine_basis *basis, const supine_pose &pose) {
 
 typedef std::array<uint32_t, 3> Triangle;
 
-// Rotate the corners of a triangle so that the lowest comes first; orientation is kept.
+// Return a triangle with its corners rotated so that the lowest comes first; orientation is kept.
 static Triangle face(uint32_t a, uint32_t b, uint32_t c) {
   Triangle t = {a, b, c};
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
@@ -115,7 +115,7 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   for (unsigned i = 0; i < info->vertex_count; ++i) {
     float point[3];
     message->GetPoints()->GetPoint(i, point);
-    for (int k = 0; k < 3; ++k) { // the same numbers on the same machine
+    for (int k = 0; k < 3; ++k) { // the server uses the same library on the same machine
       expect(std::fabs(point[k] - xyz[3 * i + k]) < 1e-3f, "positions");
       moved = std::fmax(moved, std::fabs(point[k] - supine_basis_vertices(basis)[3 * i + k]));
     }
@@ -126,7 +126,7 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   for (unsigned i = 0; i < message->GetTriangleStrips()->GetNumberOfCells(); ++i) {
     std::vector<igtlUint32> strip(message->GetTriangleStrips()->GetCellSize(i));
     message->GetTriangleStrips()->GetCell(i, strip.data());
-    for (size_t j = 0; j + 2 < strip.size(); ++j) { // every other one has the opposite orientation
+    for (size_t j = 0; j + 2 < strip.size(); ++j) { // every other triangle of a strip has the opposite orientation
       if (strip[j] != strip[j + 1] && strip[j + 1] != strip[j + 2] && strip[j] != strip[j + 2]) {
         received.push_back(face(strip[j], strip[j + 1 + j % 2], strip[j + 2 - j % 2]));
       }
@@ -138,10 +138,10 @@ static void expect_surface(const supine_basis *basis, const supine_pose &pose) {
   }
   std::sort(received.begin(), received.end());
   std::sort(wanted.begin(), wanted.end());
-  expect(received == wanted, "every triangle once, as it faces");
+  expect(received == wanted, "every triangle once, with its orientation");
 }
 
-// Directions of left, back and head in a room whose z is up.
+// A posture, with the directions of the patient's left, back and head in a room whose z is up.
 struct Lie {
   const char *posture;
   float left[3], back[3], head[3];
@@ -171,7 +171,7 @@ static void say(const char *device, const char *text) {
 }
 
 int main(int count, char **word) {
-  expect(count == 3, "PORT BASIS");
+  expect(count == 3, "usage: stream_peer PORT BASIS");
   supine_basis *basis = nullptr;
   supine_error error;
   expect(supine_basis_open(word[2], &basis, &error) == SUPINE_OK, error.message);
@@ -194,7 +194,7 @@ int main(int count, char **word) {
   send(position, "Patient");
   expect_weights(basis, pose_of(basis, supine, 400.0));
   igtl::QuaternionTrackingDataMessage::Pointer tracked = igtl::QuaternionTrackingDataMessage::New();
-  for (int i = 0; i < 2; ++i) { // the probe, then the patient: prone
+  for (int i = 0; i < 2; ++i) { // a probe, which is ignored, then the patient, prone
     igtl::QuaternionTrackingDataElement::Pointer element =
         igtl::QuaternionTrackingDataElement::New();
     element->SetName(i == 0 ? "Probe" : "Patient");
@@ -206,7 +206,7 @@ int main(int count, char **word) {
   send(tracked, "Tracker");
   const double prone[3] = {0, -1, 0};
   expect_weights(basis, pose_of(basis, prone, 400.0));
-  // Other volumes; a bare number is refused and changes nothing.
+  // A message sets the volume; a number without a reference is refused and changes nothing.
   for (const char *text : {"rest+500", "500"}) {
     say("VOLUME", text);
     send_transform(lies[1]);

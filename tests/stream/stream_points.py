@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Send observed points, and receive located lungs with their error: stream_points.py SUPINE SAMPLES
+"""Send observed points, and receive the located lungs with their expected error: stream_points.py SUPINE SAMPLES
 
-The true motion is the law, shifted. Points are sent as one TRANSFORM for each sensor, then as POINT."""
+The observed points are moved by the law and shifted. They are sent as one TRANSFORM per sensor, then as one POINT."""
 import csv
 import os
 import re
@@ -16,7 +16,7 @@ from answers import answer  # noqa: E402
 from supine_link import Link, transform, unpack  # noqa: E402
 
 SHIFT = (12.0, -7.0, 20.0)
-LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]  # lying on the left side
+LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]  # rotation of a body on its left side, by rows
 TURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 
@@ -25,7 +25,7 @@ def run(*words):
 
 
 def positions(path):
-    """Read the vertices of a PLY with positions, displacement and expected error."""
+    """Return the positions of the vertices of a binary PLY file."""
     with open(path, "rb") as file:
         data = file.read()
     begin = data.index(b"end_header\n") + 11
@@ -35,7 +35,7 @@ def positions(path):
 
 
 def point(name, place):
-    """Return an element of a POINT message."""
+    """Return the bytes of one point of a POINT message."""
     return struct.pack(">64s32s4B3ff20s", name.encode(), b"sensors", 255, 0, 0, 255, *place, 1.0, b"")
 
 
@@ -79,15 +79,15 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
             link = Link("127.0.0.1", port, version=version, check=True)
             link.send_pose(LEFT, stamp=5)
             names = list(seen)
-            for name in names[:-1]:  # whichever way a sensor is turned
+            for name in names[:-1]:  # the rotation of a sensor is ignored
                 link.send("TRANSFORM", name, transform(TURNED, seen[name]), 6)
             last = names[-1]
             check(answer(link, 7, lambda: link.send("TRANSFORM", last, transform(TURNED, seen[last]), 7)),
                   truth, len(truth))
-            wrong = dict(seen, p3=[v + 30 for v in seen["p3"]])  # does not fit: left out
+            wrong = dict(seen, p3=[v + 30 for v in seen["p3"]])  # a wrong point, which the server must leave out
             body = b"".join(point(n, p) for n, p in wrong.items()) + point("stranger", (0, 0, 0))
             check(answer(link, 8, lambda: link.send("POINT", "Tracker", body, 8)), truth, len(truth))
-            link.send("POINT", "Tracker", body[:-1], 9)  # cut: dropped
+            link.send("POINT", "Tracker", body[:-1], 9)  # a truncated message, which the server must drop
             link.close()
     finally:
         server.terminate()

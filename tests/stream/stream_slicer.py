@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test the Slicer sample without Slicer, with a real server started with the sample's options:
+"""Test the sample for 3D Slicer, without Slicer, with a real server started with the options of the sample:
 
     stream_slicer.py SAMPLES PORT BASIS"""
 import sys
@@ -16,24 +16,24 @@ surface = Surface("127.0.0.1", port)
 weights = Link("127.0.0.1", port)
 weights.ask_for("weights")
 
-# Matrices of Slicer (RAS) for turns about the patient's head axis, and the direction of gravity.
+# Matrices of Slicer (RAS, 4 x 4 by rows) for rotations about the patient's long axis, and gravity in the patient (LPS).
 TURNS = {
     "supine": ([1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, 1, 0)),
     "prone": ([-1, 0, 0, 5, 0, -1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (0, -1, 0)),
-    # on the left side: right (x) points to the ceiling (+y), front (y) to the room's -x
+    # on the left side, the patient's right (x) points to the ceiling (+y) and the front (y) to -x of the room
     "left": ([0, -1, 0, 5, 1, 0, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1], (1, 0, 0)),
 }
 
 
 def settle(read):
-    """Return the last message, after half a second without another."""
+    """Read messages until none arrives for half a second; return the last one."""
     last, end = None, time.monotonic() + 10
     quiet = time.monotonic()
     while time.monotonic() < end and time.monotonic() - quiet < 0.5:
         found = read()
         if found is not None:
             last, quiet = found, time.monotonic()
-    assert last is not None, "nothing comes"
+    assert last is not None, "no message arrived"
     return last
 
 
@@ -43,11 +43,11 @@ for name, (matrix, gravity) in TURNS.items():
     _, points = settle(lambda: surface.newest(0.05))
     _, frame = settle(lambda: weights.newest(0.05))
     wanted = basis.deform(frame)
-    for i in range(0, len(wanted), 3):  # LPS to RAS: the first two are the other way round
+    for i in range(0, len(wanted), 3):  # LPS to RAS: x and y change their sign
         assert abs(points[i] + wanted[i]) < 5e-3 and abs(points[i + 1] + wanted[i + 1]) < 5e-3
         assert abs(points[i + 2] - wanted[i + 2]) < 5e-3
     seen[name] = frame
-    # The same direction as given by a tilt sensor in the patient's axes (RAS).
+    # A tilt sensor in the patient's axes (RAS) gives the same direction.
     weights.send("NDARRAY", "Patient", array((-gravity[0], -gravity[1], gravity[2])))
     _, same = settle(lambda: weights.newest(0.05))
     assert max(abs(a - b) for a, b in zip(same, frame)) < 1e-5, name
@@ -59,7 +59,7 @@ try:
     import numpy  # noqa: F401
     import vtk
 except ImportError:
-    print("without VTK: the model is not tested")
+    print("VTK is not installed: the model is not tested")
 else:
     from slicer_lung import show_points
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Postures from trackers' matrices and quaternions, refused poses, and smoothing. */
+/* Directions of gravity from trackers' matrices and quaternions, refused poses, and smoothing. */
 #include "program/stream/gravity.h"
 #include "tests/test.h"
 #include <supine/posture.h>
 
-/* a few roundings of 32-bit numbers */
+/* allows a few roundings of 32-bit floats */
 static const double tolerance = 1e-6;
 
 static void expect_gravity(const double gravity[3], const char *posture) {
@@ -15,30 +15,30 @@ static void expect_gravity(const double gravity[3], const char *posture) {
   }
 }
 
-/* Expected directions, written by hand. The room: z up, y from the foot end to the head end of a
- * bed, x to the right of someone who stands at the foot end and looks towards the head end. */
-
-/* Directions of the body's left, back and head in that room: the columns of a tracker's matrix. */
+/* A posture, and the directions of the body's left, back and head in a room: the columns of a
+ * tracker's matrix. In the room z is up, y points from the foot end to the head end of a bed, and x
+ * to the right of someone who stands at the foot end and looks towards the head end. */
 typedef struct placement {
   const char *posture;
   double left[3], back[3], head[3];
 } placement;
 
 static const placement placements[] = {
-    /* Head at the head end (y). Face up: seen from the feet, the patient's left is on the right. */
+    /* Head at the head end, face up: seen from the feet, the patient's left is on the right. */
     {"supine", {1, 0, 0}, {0, 0, -1}, {0, 1, 0}},
-    /* Face down: left is on the left. */
+    /* Head at the head end, face down: seen from the feet, the patient's left is on the left. */
     {"prone", {-1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
-    /* On the left side: left points down, and the back to the left as seen from the feet. */
+    /* On the left side: the patient's left points down, and the back to the left as seen from the
+     * feet. */
     {"left", {0, 0, -1}, {-1, 0, 0}, {0, 1, 0}},
-    /* On the right side: left points up, the back to the right. */
+    /* On the right side: the patient's left points up, and the back to the right. */
     {"right", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}},
-    /* Feet at the head end: the same postures, turned about the vertical. */
+    /* Head at the foot end: the same postures, turned about the vertical. */
     {"supine", {-1, 0, 0}, {0, 0, -1}, {0, -1, 0}},
     {"prone", {1, 0, 0}, {0, 0, 1}, {0, -1, 0}},
     {"left", {0, 0, -1}, {1, 0, 0}, {0, -1, 0}},
     {"right", {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}},
-    /* Across the bed, on the back. */
+    /* On the back across the bed. */
     {"supine", {0, 1, 0}, {0, 0, -1}, {-1, 0, 0}},
     {"upright", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
     {"inverted", {1, 0, 0}, {0, -1, 0}, {0, 0, -1}},
@@ -72,25 +72,27 @@ TEST(test_gravity_tracker_matrices_give_postures) {
     double r[9];
     double gravity[3];
     matrix_of(&placements[i], r);
-    assert_true(fabs(determinant(r) - 1.0) < tolerance); /* the table itself */
+    assert_true(fabs(determinant(r) - 1.0) < tolerance); /* checks the table */
     assert_int_equal(take(r, gravity), SUPINE_STREAM_EXACT);
     expect_gravity(gravity, placements[i].posture);
   }
 }
 
-/* A quaternion of each posture, with either sign. */
+/* A quaternion and its negative give the same posture. */
 TEST(test_gravity_tracker_quaternions_give_postures) {
   static const struct {
     const char *posture;
-    double q[4]; /* W, X, Y, Z, by hand: a turn about a unit axis, cos and sin of half of it */
+    double q[4]; /* w, x, y, z: the cosine of half the angle, and its sine times the unit axis */
   } turns[] = {
       {"upright", {1, 0, 0, 0}},
-      {"supine", {0.7071067811865476, -0.7071067811865476, 0, 0}}, /* upright, laid back about x */
-      {"prone", {0.7071067811865476, 0.7071067811865476, 0, 0}},   /* laid forward */
-      {"left", {0.7071067811865476, 0, 0.7071067811865476, 0}},    /* about y: head towards x */
+      /* Upright, rotated backwards about x. */
+      {"supine", {0.7071067811865476, -0.7071067811865476, 0, 0}},
+      {"prone", {0.7071067811865476, 0.7071067811865476, 0, 0}}, /* rotated forwards about x */
+      /* rotated sideways about y, the head towards x */
+      {"left", {0.7071067811865476, 0, 0.7071067811865476, 0}},
       {"right", {0.7071067811865476, 0, -0.7071067811865476, 0}},
       {"inverted", {0, 1, 0, 0}},
-      {"supine", {0.5, -0.5, -0.5, 0.5}}, /* laid back, then turned about the vertical */
+      {"supine", {0.5, -0.5, -0.5, 0.5}}, /* rotated backwards, then about the vertical */
   };
   const supine_stream_setup setup = supine_stream_setup_default();
   for (size_t i = 0; i < sizeof turns / sizeof *turns; ++i) {
@@ -108,20 +110,21 @@ TEST(test_gravity_tracker_quaternions_give_postures) {
   }
 }
 
-/* The world of the tracker has y up; the axes of the marker are right, front, head. */
+/* The setup takes a world whose y is up and a marker whose axes are right, front and head. */
 TEST(test_gravity_setup_rotates_world_and_marker) {
   supine_stream_setup setup = {.down = {0, -1, 0}};
   const double half_turn[4] = {0, 0, 0, 1};
   supine_stream_rotation(half_turn, setup.body);
-  /* Lying on the back: the marker's front points up, along the world's y; its head along x; its
-   * right along z: x cross y. */
+  /* On the back: the front (y of the marker) points up, along the world's y, and the head (z) along
+   * the world's x, so right (x) is along the world's z. */
   const double r[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
   double gravity[3];
   const char *why = NULL;
   assert_true(fabs(determinant(r) - 1.0) < tolerance);
   assert_int_equal(supine_stream_gravity_rotation(&setup, r, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "supine");
-  const double down[3] = {3, 0, 0}; /* a tilt sensor with the same axes: its right falls */
+  /* A tilt sensor with the axes of the marker measures that right is down. */
+  const double down[3] = {3, 0, 0};
   assert_int_equal(supine_stream_gravity_down(&setup, down, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "right");
 }
@@ -139,9 +142,9 @@ TEST(test_gravity_invalid_rotations_refused) {
     double m[9];
     double gravity[3];
     matrix_of(&placements[i], r);
-    scaled(r, 1.0001, 0.9999, 1.0, m); /* a tracker's rounding */
+    scaled(r, 1.0001, 0.9999, 1.0, m); /* rounding of a tracker */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_EXACT);
-    scaled(r, 25.4, 25.4, 25.4, m); /* inches */
+    scaled(r, 25.4, 25.4, 25.4, m); /* a matrix scaled to inches */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REPAIRED);
     expect_gravity(gravity, placements[i].posture);
     scaled(r, 1.0, 1.0, 1.05, m);
@@ -150,7 +153,7 @@ TEST(test_gravity_invalid_rotations_refused) {
     const double kept[3] = {gravity[0], gravity[1], gravity[2]};
     scaled(r, 1.0, 1.0, 1.5, m);
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
-    scaled(r, 1.0, 1.0, -1.0, m); /* a mirror */
+    scaled(r, 1.0, 1.0, -1.0, m); /* a reflection */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
     scaled(r, -1.0, -1.0, -1.0, m);
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REFUSED);
@@ -188,17 +191,17 @@ TEST(test_gravity_invalid_quaternions_and_vectors_refused) {
   expect_gravity(gravity, "supine");
 }
 
-/* The smoothed direction follows a steady turn with the stated delay. */
+/* The smoothed direction follows a steady turn with a lag of `seconds`. */
 TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
   const double seconds = 0.2;
   const double step = 1e-3;
   const double speed = 0.5; /* rad/s */
   double smooth[3] = {0, 1, 0};
-  for (int i = 1; i <= 2000; ++i) { /* ten times the lag */
+  for (int i = 1; i <= 2000; ++i) { /* 2 s, ten times the lag */
     const double angle = speed * step * i;
     const double gravity[3] = {sin(angle), cos(angle), 0};
     const double left = supine_stream_gravity_smooth(gravity, step, seconds, smooth);
-    if (i == 2000) { /* the lag is measured after the step, which adds `step` */
+    if (i == 2000) { /* the lag may differ by one step */
       assert_true(fabs(left - speed * seconds) < speed * step);
       assert_true(fabs(atan2(smooth[0], smooth[1]) - (angle - left)) < 1e-12);
     }
@@ -207,8 +210,9 @@ TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
   double none[3] = {0, 1, 0};
   assert_true(supine_stream_gravity_smooth(still, step, 0.0, none) == 0.0);
   assert_memory_equal(none, still, sizeof still);
+  /* A reversal of gravity is half done after `seconds` times ln 2. */
   double opposite[3] = {0, 0, 1};
   assert_true(fabs(supine_stream_gravity_smooth(still, seconds * log(2.0), seconds, opposite) -
-                   M_PI / 2.0) < 1e-9); /* half of the way, in the time of a half */
+                   M_PI / 2.0) < 1e-9);
   assert_true(fabs(opposite[2]) < 1e-9);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Recorded poses, volumes as text, and the histogram of latencies. */
+/* Recorded poses, volumes given as text, and the histogram of latencies. */
 #include "program/stream/tracked_patient.h"
 #include "tests/runtime_fixture.h"
 #include "tests/test.h"
@@ -41,10 +41,10 @@ TEST(test_poses_bad_files_refused) {
                    SUPINE_ERROR_READ);
 }
 
-TEST(test_latency_added_values_have_percentiles) {
+TEST(test_latency_known_values_give_percentiles) {
   supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
   assert_true(supine_stream_latency_quantile(latency, 0.5) == 0.0);
-  for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us: centres of bins */
+  for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us, the centres of bins */
     ++latency->bin[10 * i];
   }
   latency->count = 1000;
@@ -94,9 +94,10 @@ TEST(test_volume_parse_each_form_literal) {
                                     "500", "+40",    "-1200", "0"};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     assert_int_equal(supine_stream_volume_fix(volume, bad[i], &error), SUPINE_ERROR_ARGUMENT);
-    expect_volume(volume, basis, gravity, 1.0, good[6].volume); /* unchanged by refused text */
+    /* The refused text leaves the volume unchanged. */
+    expect_volume(volume, basis, gravity, 1.0, good[6].volume);
   }
-  /* The volume follows the breathing model, between samples to 1e-3. */
+  /* The volume follows the breathing model, within a thousandth of the tidal volume. */
   const supine_pv_breath breath = supine_breath_default();
   assert_int_equal(supine_stream_volume_breathe(volume, supine_breath_normal(), &breath, &error),
                    SUPINE_OK);

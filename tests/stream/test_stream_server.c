@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The server against peers on loopback: honest, slow, stuck, vanishing, hostile, and many. */
+/* The server with peers on loopback: regular, slow, stuck, vanishing, hostile, and many. */
 #include "tests/test.h"
 
 #include <endian.h>
@@ -20,15 +20,15 @@
 
 enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
 
-/* Rest is 20 mL above the reference surface, and 8 mL more if gravity is along y; coefficients of
- * harmonics by hand. */
+/* Coefficients of harmonics of the volume at rest: 20 mL above the reference surface, plus 8 mL
+ * times the y of gravity. */
 static const double resting[9] = {20.0 / 0.2820947917738781, 8.0 / 0.4886025119029199};
 
 static double resting_in(const double gravity[3]) {
   return 20.0 + 8.0 * gravity[1];
 }
 
-/* A server that runs in its own thread. */
+/* A server that runs in a thread of its own, with its basis. */
 typedef struct stage {
   fixture *made;
   unsigned char *bytes;
@@ -65,7 +65,7 @@ static stage *stage_create(void) {
   size_t size = 0;
   supine_error error;
   s->made = fixture_create(VERTICES, MODES, 2, LUNGS, false, true, 15.0, 29);
-  /* Let the constant term dominate: with random terms some poses fold. */
+  /* Make the constant term dominate: with random terms alone some poses would fold. */
   for (size_t k = 0; k < MODES; ++k) {
     double *mode = s->made->mode + 9 * k;
     for (int i = 1; i < 9; ++i) {
@@ -83,7 +83,7 @@ static stage *stage_create(void) {
                                        .volume = &s->volume,
                                        .rate = 1000.0,
                                        .peers = 64,
-                                       .seconds = 60.0, /* no test may last longer */
+                                       .seconds = 60.0, /* ends a test that hangs */
                                        .warn = count_warning,
                                        .stop = is_ending,
                                        .context = s};
@@ -99,7 +99,7 @@ static int stage_run(stage *s) {
   return supine_stream_server_port(s->server);
 }
 
-/* Stop the thread; then the counts may be read. */
+/* Stop the server's thread, after which its counts may be read, and return the counts. */
 static supine_stream_counts stage_end(stage *s) {
   atomic_store(&s->ending, true);
   assert_int_equal(pthread_join(s->thread, NULL), 0);
@@ -129,7 +129,7 @@ static int dial(int port) {
   const struct sockaddr_in here = {.sin_family = AF_INET,
                                    .sin_port = htons((uint16_t)port),
                                    .sin_addr = {htonl(INADDR_LOOPBACK)}};
-  const struct timeval limit = {10, 0}; /* no call blocks for ever */
+  const struct timeval limit = {10, 0}; /* 10 s, so that no call blocks for ever */
   assert_true(s >= 0);
   assert_int_equal(setsockopt(s, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit), 0);
   assert_int_equal(setsockopt(s, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit), 0);
@@ -160,7 +160,7 @@ static bool get(int s, void *bytes, size_t size) {
   return true;
 }
 
-/* Read until the server closes the connection; return whether it does. */
+/* Read until the server closes the connection; return false if it does not. */
 static bool closed_by_server(int s) {
   unsigned char waste[4096];
   ssize_t got = 0;
@@ -170,7 +170,7 @@ static bool closed_by_server(int s) {
   return got == 0 || errno == ECONNRESET;
 }
 
-/* Write a message (header and body) into `bytes`; return its size. */
+/* Write a message (header and body) into `bytes`; return the number of bytes. */
 static size_t make_message(const char *type, const char *device, uint64_t stamp, const void *body,
                            size_t size, unsigned char *bytes) {
   supine_stream_header header = {
@@ -206,7 +206,7 @@ static bool say(int s, const char *device, const char *text) {
   return send_bytes(s, bytes, make_message("STRING", device, 0, body, 4 + strlen(text), bytes));
 }
 
-/* Receive the next message and the first 4096 bytes of its body; return false if none comes. */
+/* Receive the next message and the first 4096 bytes of its body; return false if none arrives. */
 static bool receive(int s, supine_stream_header *header, unsigned char body[4096]) {
   unsigned char raw[SUPINE_STREAM_HEADER];
   unsigned char waste[4096];
@@ -233,8 +233,8 @@ static bool receive(int s, supine_stream_header *header, unsigned char body[4096
   return true;
 }
 
-/* Receive messages until the one with this stamp; return how many came before it. Fail if it does
- * not come. */
+/* Receive messages until the one with this stamp; return the number of messages before it. Fail if
+ * it does not arrive. */
 static int receive_stamp(int s, uint64_t stamp, supine_stream_header *header,
                          unsigned char body[4096]) {
   for (int passed = 0; passed < 100000; ++passed) {
@@ -265,7 +265,8 @@ static void expect_pose(const supine_pose *pose, const unsigned char *content) {
   }
 }
 
-/* Return the pose of a direction and a volume, mL above rest: one gain for all lungs. */
+/* Return the pose at a direction of gravity and a volume in mL above rest, with one gain for all
+ * lungs. */
 static supine_pose pose_of(const stage *s, const double gravity[3], double above) {
   supine_pose pose = {.weights = {0}};
   double gain = 0.0;
@@ -276,7 +277,8 @@ static supine_pose pose_of(const stage *s, const double gravity[3], double above
   return pose;
 }
 
-/* Assert the weights and gains of a direction and a volume. */
+/* Assert that `content` has the weights and gains of a direction of gravity and a volume in mL
+ * above rest. */
 static void expect_weights(const stage *s, const double gravity[3], double above,
                            const unsigned char *content) {
   const supine_pose pose = pose_of(s, gravity, above);
@@ -302,7 +304,7 @@ TEST(test_server_each_pose_answered_by_weights) {
   assert_true(send_pose(peer, poses[1], 200));
   (void)receive_stamp(peer, 200, &header, body);
   expect_weights(s, poses[1], -12.0, body);
-  unsigned char bytes[128]; /* the last byte is sent alone, later */
+  unsigned char bytes[128]; /* a message whose last byte is sent later */
   const size_t size = make_pose(poses[2], 300, bytes);
   const struct timespec later = {0, 50000000};
   assert_true(send_bytes(peer, bytes, size - 1));
@@ -310,7 +312,7 @@ TEST(test_server_each_pose_answered_by_weights) {
   assert_true(send_bytes(peer, bytes + size - 1, 1));
   (void)receive_stamp(peer, 300, &header, body);
   expect_weights(s, poses[2], -12.0, body);
-  rest(1.0); /* the age of the pose is no latency of a volume */
+  rest(1.0); /* the latency of the next message must not include this age of the pose */
   assert_true(say(peer, "VOLUME", "rest-11"));
   assert_true(receive(peer, &header, body));
   expect_weights(s, poses[2], -11.0, body);
@@ -341,7 +343,7 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
     (void)receive_stamp(peer, 1 + i, &header, body);
     expect_pose(&pose, body);
   }
-  /* The volume as an array: 50.0 as a 64-bit float, big-endian. */
+  /* A volume as an NDARRAY: 50.0 mL as a big-endian 64-bit float. */
   const unsigned char array[12] = {11, 1, 0, 1, 0x40, 0x49};
   unsigned char bytes[128];
   assert_true(say(peer, "VOLUME", "rest"));
@@ -356,7 +358,8 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
   stage_destroy(s);
 }
 
-/* Assert the points of a surface frame. Its triangles come with the first frame, or with all. */
+/* After a request for `points` the first frame has triangles; after one for `surface` every frame
+ * has. */
 TEST(test_server_send_request_switches_content) {
   stage *s = stage_create();
   const int peer = dial(stage_run(s));
@@ -364,8 +367,8 @@ TEST(test_server_send_request_switches_content) {
   supine_stream_header header;
   unsigned char body[4096];
   const size_t points = 40 + 12 * info->vertex_count;
-  size_t whole = 0;                          /* with triangles */
-  assert_true(send_pose(peer, poses[3], 1)); /* the answer to the pose before the request */
+  size_t whole = 0;                          /* size of a body with points and triangles */
+  assert_true(send_pose(peer, poses[3], 1)); /* before any request, weights are the answer */
   (void)receive_stamp(peer, 1, &header, body);
   const char *const wishes[] = {"points", "surface"};
   for (uint64_t w = 0; w < 2; ++w) {
@@ -374,7 +377,7 @@ TEST(test_server_send_request_switches_content) {
     for (uint64_t i = 0; i < 4; ++i) {
       const uint64_t stamp = 10 * (w + 1) + i;
       assert_true(send_pose(peer, poses[i], stamp));
-      do { /* a request is answered with the current pose, too */
+      do { /* the request itself is also answered, by the current pose */
         assert_true(receive(peer, &header, body));
         whole = whole == 0 ? header.size : whole;
         assert_true(whole > points);
@@ -385,13 +388,13 @@ TEST(test_server_send_request_switches_content) {
       const supine_pose pose = pose_of(s, poses[i], 30.0);
       float xyz[300];
       supine_deform_range(s->basis, &pose, 0, 100, xyz);
-      for (int k = 0; k < 300; ++k) { /* the same numbers, on the same code */
+      for (int k = 0; k < 300; ++k) { /* the server calls the same function */
         assert_true(fabsf(float_at(body + 40 + 4 * k) - xyz[k]) < 1e-4f);
       }
     }
   }
   assert_true(say(peer, "SEND", "nothing"));
-  assert_true(say(peer, "SEND", "everything")); /* unknown: nothing changes */
+  assert_true(say(peer, "SEND", "everything")); /* an unknown request changes nothing */
   assert_true(send_pose(peer, poses[0], 77));
   rest(0.1);
   struct pollfd quiet = {peer, POLLIN, 0};
@@ -400,8 +403,7 @@ TEST(test_server_send_request_switches_content) {
   stage_destroy(s);
 }
 
-/* Of a thousand poses sent at once, the server answers few, and the last frame is of the last pose.
- */
+/* Of a thousand poses sent at once, the server answers only a few, but always the last one. */
 TEST(test_server_many_poses_newest_answered) {
   enum { BURST = 1000 };
   stage *s = stage_create();
@@ -429,7 +431,7 @@ TEST(test_server_many_poses_newest_answered) {
   stage_destroy(s);
 }
 
-/* Send `count` poses, one every 2 ms; return how many are answered by a frame of their own. */
+/* Send `count` poses, one every 2 ms; return the number of poses before one is answered late. */
 static int keep_rate(int peer, int count, uint64_t stamp) {
   supine_stream_header header;
   unsigned char body[4096];
@@ -443,8 +445,8 @@ static int keep_rate(int peer, int count, uint64_t stamp) {
   return count;
 }
 
-/* An honest peer is answered every time, while one asks for surfaces and never reads, one vanishes
- * in the middle of a frame, one stops in the middle of a message. */
+/* A regular peer is always answered, although one peer asks for surfaces and never reads, one
+ * vanishes in the middle of a frame, and one stops in the middle of a message. */
 TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   stage *s = stage_create();
   const int port = stage_run(s);
@@ -465,7 +467,7 @@ TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   (void)close(honest);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.peers, 4);
-  assert_int_equal(counts.lost, 0); /* a peer that vanishes is not at fault */
+  assert_int_equal(counts.lost, 0); /* a peer that vanishes does not count as lost */
   (void)close(stuck);
   (void)close(half);
   stage_destroy(s);
@@ -491,12 +493,12 @@ TEST(test_server_fifty_peers_one_more_refused) {
       (void)receive_stamp(peer[i], 500 + round, &header, body);
     }
   }
-  const int extra = dial(port); /* one too many: the server closes the connection */
+  const int extra = dial(port); /* one peer too many: the server closes its connection */
   assert_true(closed_by_server(extra));
   (void)close(extra);
   (void)close(peer[0]);
   rest(0.2);
-  peer[0] = dial(port); /* a place is free again */
+  peer[0] = dial(port); /* takes the place of the closed peer */
   assert_true(send_pose(peer[0], poses[0], 900));
   (void)receive_stamp(peer[0], 900, &header, body);
   for (int i = 0; i < MANY; ++i) {
@@ -508,7 +510,7 @@ TEST(test_server_fifty_peers_one_more_refused) {
   stage_destroy(s);
 }
 
-/* Send ten thousand messages of all types, each with a few bytes changed. Half of them get the
+/* The server survives ten thousand messages of all types with random changes. Half of them get the
  * right checksum, so that the code behind the check is reached. */
 TEST(test_server_ten_thousand_mutated_messages_survives) {
   enum { COUNT = 10000 };
@@ -516,7 +518,7 @@ TEST(test_server_ten_thousand_mutated_messages_survives) {
     const char *type, *device;
     size_t size;
     unsigned char begin[12];
-    size_t one[4]; /* offset of 1.0 as a 32-bit float; 0: none */
+    size_t one[4]; /* offsets at which to write 1.0 as a 32-bit float, ended by 0 */
   } seed[] = {{"TRANSFORM", "Patient", 48, {0x3F, 0x80}, {16, 32}},
               {"QTDATA", "Tracker", 150, {'P', 'a', 't', 'i', 'e', 'n', 't'}, {46, 96, 146}},
               {"POSITION", "Patient", 28, {0}, {24}},
@@ -555,11 +557,13 @@ TEST(test_server_ten_thousand_mutated_messages_survives) {
         supine_stream_header_write(&header, bytes);
       }
     }
-    /* Use a connection for each message, so that an error of one cannot hide that of the next. */
+    /* Use one connection per message, so that an error in one message does not hide the next
+     * message. */
     const int peer = dial(port);
-    (void)send_bytes(peer, bytes, size); /* fails if the header was refused */
+    /* This fails if the server closes the connection after the header. */
+    (void)send_bytes(peer, bytes, size);
     (void)shutdown(peer, SHUT_WR);
-    assert_true(closed_by_server(peer)); /* after the whole message */
+    assert_true(closed_by_server(peer)); /* the server closes the connection after the message */
     (void)close(peer);
     if (i % 1000 == 0) {
       assert_true(say(honest, "VOLUME", "rest+30"));
@@ -592,7 +596,7 @@ TEST(test_server_absurd_sizes_refused) {
   assert_true(send_bytes(peer, bytes, sizeof bytes));
   assert_true(closed_by_server(peer));
   (void)close(peer);
-  /* A transform of 8 MiB is skipped like an image, without being stored. */
+  /* The body of a TRANSFORM of 8 MiB is skipped, not stored. */
   header.size = 8u << 20;
   supine_stream_header_write(&header, bytes);
   peer = dial(port);
@@ -601,7 +605,7 @@ TEST(test_server_absurd_sizes_refused) {
     assert_true(send_bytes(peer, piece, sizeof piece));
   }
   assert_int_equal(keep_rate(peer, 2, 1), 2);
-  header.size = 0; /* without a body */
+  header.size = 0; /* a TRANSFORM without a body */
   supine_stream_header_write(&header, bytes);
   assert_true(send_bytes(peer, bytes, sizeof bytes));
   assert_int_equal(keep_rate(peer, 2, 11), 2);
@@ -613,7 +617,7 @@ TEST(test_server_absurd_sizes_refused) {
   stage_destroy(s);
 }
 
-/* A tracker that accepts a connection, closes it, and accepts another. */
+/* The server connects again to a tracker that has closed the connection. */
 TEST(test_server_tracker_gone_reconnects) {
   supine_stream_address here;
   supine_error error;
@@ -657,7 +661,7 @@ TEST(test_server_replay_recorded_poses_same) {
   s->options.replay = &kept;
   s->options.record = record;
   supine_stream_poses_begin(record);
-  const int peer = dial(stage_run(s)); /* the replay begins when a peer connects */
+  const int peer = dial(stage_run(s)); /* the connection starts the replay */
   supine_stream_header header;
   unsigned char body[4096];
   unsigned char last[4096];
@@ -667,9 +671,9 @@ TEST(test_server_replay_recorded_poses_same) {
     memcpy(last, body, sizeof last);
     ++frames;
   }
-  const supine_stream_counts counts = stage_end(s); /* by itself */
+  const supine_stream_counts counts = stage_end(s); /* after the end of the replay */
   assert_int_equal(counts.poses, COUNT);
-  assert_in_range(frames, 2, COUNT + 1); /* and the frame before the first pose */
+  assert_in_range(frames, 2, COUNT + 1); /* including one frame before the first pose */
   expect_weights(s, pose[COUNT - 1].gravity, 30.0, last);
   (void)close(peer);
   assert_int_equal(fclose(record), 0);
@@ -686,8 +690,8 @@ TEST(test_server_replay_recorded_poses_same) {
   stage_destroy(s);
 }
 
-/* With smoothing, frames follow after the last pose until the lungs reach it; with breathing, they
- * never stop. */
+/* With smoothing, the server sends frames after the last pose until the lungs have reached it; with
+ * breathing, it never stops. */
 TEST(test_server_moving_lungs_send_frames) {
   stage *s = stage_create();
   s->options.smooth = 0.1;
@@ -704,8 +708,8 @@ TEST(test_server_moving_lungs_send_frames) {
     assert_true(receive(peer, &header, body));
     ++frames;
   }
-  /* About 95 frames: ln(1e6 pi / 2) time constants of 0.1 s at 15 ms each; a busy machine makes
-   * fewer. */
+  /* About 95 frames are expected: ln(1e6 pi / 2) time constants of 0.1 s, with a frame every 15 ms.
+   * A busy machine sends fewer. */
   assert_in_range(frames, 10, 120);
   expect_weights(s, poses[2], 30.0, body);
   const supine_pv_breath breath = {60.0, 60.0, 0.5, 5.0, SUPINE_PV_COSINE};
@@ -719,7 +723,7 @@ TEST(test_server_moving_lungs_send_frames) {
   const int other = dial(stage_run(s));
   float low = INFINITY;
   float high = -INFINITY;
-  for (int i = 0; i < 100; ++i) { /* 1.5 breaths */
+  for (int i = 0; i < 100; ++i) { /* frames of 15 ms for 1.5 breaths */
     assert_true(receive(other, &header, body));
     const float gain = float_at(body + 4 + 4 * MODES);
     low = fminf(low, gain);
@@ -727,14 +731,14 @@ TEST(test_server_moving_lungs_send_frames) {
   }
   const double supine[3] = {0, 1, 0};
   const double deep = pose_of(s, supine, 60.0).gains[0][0] - pose_of(s, supine, 0.0).gains[0][0];
-  /* From rest to the peak, within the resolution of frames of 15 ms. */
+  /* Frames every 15 ms reach the whole range from rest to the peak within 5 %. */
   assert_true(fabs((double)(high - low) - fabs(deep)) < 0.05 * fabs(deep));
   (void)close(other);
   stage_destroy(s);
 }
 
-/* A port alone listens on 127.0.0.1 and no other address, not even of the loopback; an address is
- * used as given. */
+/* Given a port alone, the server listens on 127.0.0.1 and on no other address of this machine; a
+ * given address is used. */
 TEST(test_server_port_alone_listens_on_loopback) {
   static const struct {
     const char *listen;
@@ -781,7 +785,7 @@ TEST(test_server_bad_address_refused) {
   stage_destroy(s);
 }
 
-/* A socket with a small buffer gets every byte once and in order. */
+/* A frame larger than the socket's buffer arrives with every byte once and in order. */
 TEST(test_server_small_socket_buffer_frame_whole) {
   static const size_t sizes[3] = {3001, 1, 2500007};
   const size_t size = sizes[0] + sizes[1] + sizes[2];
@@ -790,7 +794,7 @@ TEST(test_server_small_socket_buffer_frame_whole) {
   for (size_t i = 0; i < size; ++i) {
     bytes[i] = (unsigned char)(i * 2654435761u >> 13);
   }
-  static const int rooms[2] = {4096, 4096000}; /* bytes, requested from the kernel */
+  static const int rooms[2] = {4096, 4096000}; /* sizes of the socket's send buffer, bytes */
   for (size_t r = 0; r < 2; ++r) {
     supine_stream_peer peer = {0};
     int ends[2];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Messages against those of the public OpenIGTLink library. */
+/* Messages compared with those of the public OpenIGTLink library. */
 #include "tests/test.h"
 
 #include <igtl_header.h>
@@ -21,7 +21,8 @@ static void fill(unsigned char *bytes, size_t size, uint64_t seed) {
   }
 }
 
-/* Every length, at every alignment modulo 8, cut in two anywhere. */
+/* The checksum is right for every length, at every alignment modulo 8, in one call, in two calls,
+ * and joined from two parts. */
 TEST(test_crc_every_length_equals_library) {
   enum { LONGEST = 3000 };
   unsigned char *bytes = fixture_allocate(LONGEST + 8, 1);
@@ -41,7 +42,7 @@ TEST(test_crc_every_length_equals_library) {
 }
 
 TEST(test_crc_large_message_equals_library) {
-  const size_t size = 6096012; /* 508,001 points */
+  const size_t size = 6096012; /* bytes of 508,001 points */
   unsigned char *bytes = fixture_allocate(size, 1);
   fill(bytes, size, 99);
   assert_true(supine_stream_crc64(0, bytes, size) == crc64(bytes, size, 0));
@@ -69,7 +70,7 @@ TEST(test_header_written_equals_library) {
   assert_memory_equal(bytes, &theirs, sizeof bytes);
 }
 
-/* Make a header for a body; the library computes the checksum. */
+/* Return a header for a body, with the checksum that the library computes. */
 static supine_stream_header header_of(const char *type, const char *device, unsigned version,
                                       unsigned char *body, size_t size) {
   supine_stream_header header = {.version = version, .size = size, .crc = crc64(body, size, 0)};
@@ -86,14 +87,14 @@ static supine_stream_message read_ok(const supine_stream_header *header, const u
   return message;
 }
 
-/* The matrix with rows 1 2 3 / 4 5 6 / 7 8 9, in the order of the library. */
+/* Set the body of a TRANSFORM with the matrix rows 1 2 3, 4 5 6, 7 8 9, stored by columns. */
 static void make_transform(igtl_float32 transform[12]) {
   const igtl_float32 columns[12] = {1, 4, 7, 2, 5, 8, 3, 6, 9, 10, 11, 12};
   memcpy(transform, columns, sizeof columns);
   igtl_transform_convert_byte_order(transform);
 }
 
-TEST(test_read_transform_of_library) {
+TEST(test_read_transform_of_library_gives_rotation_or_position) {
   igtl_float32 transform[12];
   make_transform(transform);
   unsigned char *body = (unsigned char *)transform;
@@ -106,7 +107,7 @@ TEST(test_read_transform_of_library) {
       assert_true(m.number[k] == (double)(k + 1));
     }
   }
-  /* A transform of another device gives its position, for observed points. */
+  /* A TRANSFORM of another device gives a position, as for an observed point. */
   const supine_stream_message place = read_ok(&header, body, "Probe");
   assert_int_equal(place.kind, SUPINE_STREAM_POSITION);
   assert_string_equal(place.text, "Patient");
@@ -121,10 +122,11 @@ TEST(test_read_transform_of_library) {
   assert_int_equal(m.kind, SUPINE_STREAM_NOTHING);
 }
 
-TEST(test_read_transform_of_version_2) {
+TEST(test_read_transform_of_version_2_gives_rotation) {
   igtl_float32 transform[12];
   make_transform(transform);
-  /* Written by hand: an extension of 14 bytes, 2 more than known; one key "a" with value "bc". */
+  /* An extended header of 14 bytes, 2 more than the protocol defines, and metadata with the key "a"
+   * of value "bc". */
   unsigned char body[14 + 48 + 10 + 3] = {0, 14, 0, 10, 0, 0, 0, 3, 0, 0, 0, 77, 0xAB, 0xCD};
   const unsigned char metadata[13] = {0, 1, 0, 1, 0, 3, 0, 0, 0, 2, 'a', 'b', 'c'};
   memcpy(body + 14, transform, 48);
@@ -133,7 +135,8 @@ TEST(test_read_transform_of_version_2) {
   assert_true(read_ok(&header, body, NULL).number[8] == 9.0);
   supine_stream_message m;
   supine_error error;
-  for (size_t size = 0; size < sizeof body; ++size) { /* metadata that reaches into the content */
+  /* In a truncated body, the metadata would overlap the content. */
+  for (size_t size = 0; size < sizeof body; ++size) {
     header = header_of("TRANSFORM", "Patient", 2, body, size);
     assert_int_equal(supine_stream_message_read(&header, body, NULL, &m, &error),
                      SUPINE_ERROR_FORMAT);
@@ -156,11 +159,11 @@ static void expect_quaternion(const supine_stream_message *m, double w, double x
   const double wanted[4] = {w, x, y, z};
   assert_int_equal(m->kind, SUPINE_STREAM_QUATERNION);
   for (int i = 0; i < 4; ++i) {
-    assert_true(fabs(m->number[i] - wanted[i]) < 1e-7); /* 32-bit floats */
+    assert_true(fabs(m->number[i] - wanted[i]) < 1e-7); /* precision of 32-bit floats */
   }
 }
 
-TEST(test_read_qtdata_of_library) {
+TEST(test_read_qtdata_of_library_gives_quaternion_of_device) {
   igtl_qtdata_element element[3];
   memset(element, 0, sizeof element);
   memcpy(element[0].name, "Probe", 5);
@@ -178,12 +181,12 @@ TEST(test_read_qtdata_of_library) {
   expect_quaternion(&m, 0.8, 0, 0.6, 0);
   m = read_ok(&header, body, "Probe");
   expect_quaternion(&m, 0.8, 0.6, 0, 0);
-  m = read_ok(&header, body, NULL); /* any device: the last transform */
+  m = read_ok(&header, body, NULL); /* any device: the last one is taken */
   expect_quaternion(&m, 0.8, 0, 0, 0.6);
   assert_int_equal(read_ok(&header, body, "Nobody").kind, SUPINE_STREAM_NOTHING);
 }
 
-TEST(test_read_position_of_library) {
+TEST(test_read_position_of_library_gives_quaternion) {
   igtl_position position = {.position = {1, 2, 3}, .quaternion = {0.48f, -0.36f, 0.48f, 0.64f}};
   igtl_position_convert_byte_order(&position);
   unsigned char *body = (unsigned char *)&position;
@@ -194,7 +197,7 @@ TEST(test_read_position_of_library) {
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
 
-/* Make an array of `type` as the library packs it. */
+/* Pack an NDARRAY of this element type by the library; return its size. */
 static size_t make_array(int type, size_t count, const double *values, unsigned char *body) {
   igtl_ndarray_info info;
   const igtl_uint16 size[1] = {(igtl_uint16)count};
@@ -215,7 +218,7 @@ static size_t make_array(int type, size_t count, const double *values, unsigned 
   return bytes;
 }
 
-TEST(test_read_arrays_of_library) {
+TEST(test_read_arrays_of_library_give_direction_or_volume) {
   unsigned char body[256];
   const double down[4] = {0.25, -0.5, 1.5, 7.0};
   for (int type = IGTL_NDARRAY_STYPE_TYPE_FLOAT32; type <= IGTL_NDARRAY_STYPE_TYPE_FLOAT64;
@@ -236,7 +239,7 @@ TEST(test_read_arrays_of_library) {
   }
 }
 
-TEST(test_read_strings_of_library) {
+TEST(test_read_strings_of_library_give_volume_or_request) {
   igtl_string_header head = {3, 8};
   igtl_string_convert_byte_order(&head);
   unsigned char body[4 + 100] = {0};
@@ -250,16 +253,17 @@ TEST(test_read_strings_of_library) {
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_REQUEST);
   header = header_of("STRING", "Patient", 1, body, 12);
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
-  body[3] = 64; /* one more than is kept */
+  body[3] = 64; /* one byte more than the reader stores */
   header = header_of("STRING", "VOLUME", 1, body, 4 + 64);
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
 
-TEST(test_read_points_of_library) {
+TEST(test_read_points_of_library_give_names_and_positions) {
   igtl_point_element list[3];
   memset(list, 0, sizeof list);
   for (int i = 0; i < 3; ++i) {
-    memset(list[i].name, 'a' + i, i == 2 ? sizeof list[i].name : 5); /* the longest has no NUL */
+    /* The longest name has no terminating NUL. */
+    memset(list[i].name, 'a' + i, i == 2 ? sizeof list[i].name : 5);
     for (int k = 0; k < 3; ++k) {
       list[i].position[k] = (float)(10 * i + k);
     }
@@ -283,7 +287,7 @@ TEST(test_read_points_of_library) {
   }
 }
 
-/* Bodies shorter than their content: every length of each, with the right checksum. */
+/* Every truncation of a body, with a right checksum, gives nothing. */
 TEST(test_read_every_truncation_refused) {
   static const struct {
     const char *type, *device;
@@ -298,7 +302,8 @@ TEST(test_read_every_truncation_refused) {
                  {"STRING", "VOLUME", 34, {0, 3, 0, 30}}};
   for (size_t i = 0; i < sizeof content / sizeof *content; ++i) {
     for (size_t size = 0; size < content[i].whole; ++size) {
-      unsigned char *body = fixture_allocate(size + 1, 1); /* a sanitizer sees reads past its end */
+      /* A block of this size lets a sanitizer see reads past the end of the body. */
+      unsigned char *body = fixture_allocate(size + 1, 1);
       unsigned char *end = body + size;
       memcpy(body, content[i].begin, size < 8 ? size : 8);
       supine_stream_header header =
@@ -306,7 +311,7 @@ TEST(test_read_every_truncation_refused) {
       supine_stream_message m;
       supine_error error;
       const supine_status status = supine_stream_message_read(&header, body, "Patient", &m, &error);
-      if (status == SUPINE_OK) { /* an empty list of instruments; sizes that say nothing */
+      if (status == SUPINE_OK) { /* an empty list is accepted */
         assert_true(size == 0 || size < 4);
       }
       assert_true(m.kind == SUPINE_STREAM_NOTHING || (size == 0 && m.point_count == 0));
@@ -333,7 +338,7 @@ TEST(test_header_invalid_refused) {
   assert_int_equal(supine_stream_header_read(bytes, &header, &error), SUPINE_ERROR_FORMAT);
 }
 
-/* Join the pieces of a message. */
+/* Return the joined pieces of a message (malloc). */
 static unsigned char *gathered(const supine_stream_packet *packet) {
   unsigned char *bytes = fixture_allocate(packet->size, 1);
   size_t at = 0;
@@ -361,7 +366,7 @@ static sample sample_open(fixture *made) {
   s.moment = (supine_stream_snapshot){.gravity = {0.36, 0.48, -0.8}, .stamp = 0x11223344AABBCCDDu};
   assert_int_equal(supine_basis_weights(s.basis, s.moment.gravity, s.moment.pose.weights),
                    SUPINE_OK);
-  for (size_t i = 0; i < 3 * made->lungs; ++i) { /* each axis of each lung has its gain */
+  for (size_t i = 0; i < 3 * made->lungs; ++i) { /* a different gain for each axis of each lung */
     s.moment.pose.gains[i / 3][i % 3] = 0.7 - 0.17 * (double)i;
   }
   return s;
@@ -377,7 +382,7 @@ static void sample_destroy(sample *s) {
   fixture_destroy(s->made);
 }
 
-/* Make a message of version 1 with this body, by the library */
+/* Assert that `bytes` are the library's message of version 1 with this body. */
 static void expect_message(const unsigned char *bytes, const char *type, uint64_t stamp,
                            unsigned char *body, size_t size) {
   igtl_header header = {
@@ -389,7 +394,8 @@ static void expect_message(const unsigned char *bytes, const char *type, uint64_
   assert_memory_equal(bytes + sizeof header, body, size);
 }
 
-/* Assert the K weights, then the gains x, y, z of each lung, of a message; free it. */
+/* Assert that the frame of a sample has its K weights, then the gains x, y, z of each lung; destroy
+ * the sample. */
 static void expect_weights_frame(sample s) {
   supine_stream_frames *frames = NULL;
   supine_error error;
@@ -418,8 +424,8 @@ TEST(test_weights_written_equal_ndarray_of_library) {
   expect_weights_frame(sample_create());
 }
 
-/* The largest numbers of modes and lungs of a basis. */
-TEST(test_weights_largest_basis_complete) {
+/* A basis with the largest numbers of modes and lungs gives a complete frame. */
+TEST(test_weights_largest_basis_frame_complete) {
   expect_weights_frame(sample_open(fixture_create(16 * SUPINE_LUNGS_MAX, SUPINE_MODES_MAX, 15,
                                                   SUPINE_LUNGS_MAX, false, false, 20.0, 23)));
 }
@@ -428,8 +434,7 @@ static uint32_t word_at(const unsigned char *bytes) {
   return (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
 }
 
-/* Pack the surface by the library, with the strips of a message unless they are NULL; `size` is
- * written. */
+/* Pack the surface by the library, with these triangle strips unless they are NULL; set `size`. */
 static unsigned char *make_polydata(const sample *s, const struct iovec *strips, uint32_t count,
                                     double sign, size_t *size) {
   const supine_basis_info *info = supine_basis_get_info(s->basis);
@@ -444,7 +449,8 @@ static unsigned char *make_polydata(const sample *s, const struct iovec *strips,
     surface.points[3 * i] *= (float)sign;
     surface.points[3 * i + 1] *= (float)sign;
   }
-  for (size_t i = 0; strips != NULL && i < strips->iov_len / 4; ++i) { /* native byte order */
+  /* The library expects native byte order. */
+  for (size_t i = 0; strips != NULL && i < strips->iov_len / 4; ++i) {
     surface.triangle_strips[i] = word_at((const unsigned char *)strips->iov_base + 4 * i);
   }
   *size = (size_t)igtl_polydata_get_size(&surface, IGTL_TYPE_PREFIX_NONE);
@@ -498,7 +504,7 @@ TEST(test_surface_written_equals_polydata_of_library) {
       free(body);
     }
     supine_stream_frame_release(frames, frame);
-    /* A frame that is used again holds the points of the new pose. */
+    /* A frame that is reused holds the points of the new pose. */
     supine_stream_snapshot other = s.moment;
     other.pose.gains[0][1] = -0.1;
     supine_stream_frame *again = supine_stream_frame_acquire(frames, &other);
@@ -533,21 +539,22 @@ static int by_corners(const void *a, const void *b) {
   return (x[2] > y[2]) - (x[2] < y[2]);
 }
 
-/* Rotate the corners so that the least comes first; orientation is kept. */
+/* Return a triangle with its corners rotated so that the lowest comes first; orientation is
+ * kept. */
 static triangle face(uint32_t a, uint32_t b, uint32_t c) {
   const triangle way[3] = {{{a, b, c}}, {{b, c, a}}, {{c, a, b}}};
   const triangle *first = by_corners(&way[1], &way[0]) < 0 ? &way[1] : &way[0];
   return by_corners(&way[2], first) < 0 ? way[2] : *first;
 }
 
-/* Add a triangle unless two of its corners are equal. */
+/* Add a triangle to the list unless two of its corners are equal. */
 static void add(triangle *list, size_t *count, uint32_t a, uint32_t b, uint32_t c) {
   if (a != b && b != c && c != a) {
     list[(*count)++] = face(a, b, c);
   }
 }
 
-/* The strips of a surface hold each of its triangles once, in its orientation. */
+/* The strips of a surface hold each of its triangles once, with its orientation. */
 TEST(test_strips_of_surface_hold_each_triangle_once) {
   sample s = sample_create();
   const size_t count = supine_basis_get_info(s.basis)->triangle_count;

@@ -3,8 +3,8 @@
 
     with_server.py SUPINE VERTICES "SERVER OPTIONS" PROGRAM [ARGUMENTS]
 
-{port}, {page} and {basis} among the arguments stand for what they say. The basis is made in a
-temporary folder. The server ends after two minutes at the latest."""
+In the arguments, {port} is replaced by the server's port, {page} by the address of its page, and {basis} by the path of
+its basis, which is made in a temporary folder. The server ends after two minutes at the latest."""
 import os
 import re
 import shlex
@@ -44,10 +44,10 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
     print(rest, end="")
     if result == 77:  # skipped
         sys.exit(result)
-    # Every program sends poses, and the server reports how long each took.
+    # Every program sends poses, so the server must report their latency.
     if not re.search(r"pose received to \w+ sent: median [\d.]+ ms, 99 % within [\d.]+ ms, "
                      r"worst [\d.]+ ms; allowed: 15 ms\n", rest):
-        sys.exit("the server does not say how long it took")
+        sys.exit("the server does not report its latency")
     if not alive or server.returncode != 0:
         sys.exit(f"the server ended with {server.returncode}")
     sys.exit(result)
