@@ -265,16 +265,18 @@ TEST(test_set_stiffness_bad_value_names_vertex) {
 TEST(test_solve_force_not_finite_reports_numerical_error) {
   const fixture *f = *state;
   supine_equilibrium *eq = equilibrium_of(&f->mesh, &f->topology, f->stiffness);
-  double *out = malloc(f->mesh.vertex_count * sizeof *out);
-  double *force = calloc(f->mesh.vertex_count, sizeof *force);
+  double *out = malloc(2 * f->mesh.vertex_count * sizeof *out);
+  double *force = calloc(2 * f->mesh.vertex_count, sizeof *force); /* [N, 2] */
   supine_error error;
-  force[3] = NAN;
-  assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, out, &error),
-                   SUPINE_ERROR_NUMERICAL);
-  assert_non_null(strstr(error.message, "residual"));
-  force[3] = 0.0; /* a force of 0 is valid */
-  assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, out, &error), SUPINE_OK);
-  assert_close(helper_largest(f->mesh.vertex_count, out), 0.0, 0.0);
+  for (size_t column = 0; column < 2; ++column) {
+    force[6 + column] = NAN;
+    assert_int_equal(supine_physics_equilibrium_solve(eq, 2, force, out, &error),
+                     SUPINE_ERROR_NUMERICAL);
+    assert_non_null(strstr(error.message, "residual"));
+    force[6 + column] = 0.0; /* a force of 0 is valid */
+  }
+  assert_int_equal(supine_physics_equilibrium_solve(eq, 2, force, out, &error), SUPINE_OK);
+  assert_close(helper_largest(2 * f->mesh.vertex_count, out), 0.0, 0.0);
   supine_physics_equilibrium_destroy(eq);
   free(out);
   free(force);

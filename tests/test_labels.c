@@ -624,7 +624,7 @@ TEST(test_labels_bad_maps_refused) {
       {"left=0", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=70000", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=-1", SUPINE_ERROR_ARGUMENT, "--labels takes"},
-      {"left=1,right=2", SUPINE_ERROR_MESH, "the other way round"},
+      {"left=1,right=2", SUPINE_ERROR_MESH, "Exchange the labels"},
       {"left=2,right=3", SUPINE_ERROR_MESH, "gives the right lung"},
       {"totalsegmentator", SUPINE_ERROR_MESH, "the left lung; the labels present are 1, 2"},
       {"left=9", SUPINE_ERROR_MESH, "gives the left lung"},

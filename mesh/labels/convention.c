@@ -8,8 +8,8 @@
 
 #include "mesh/labels/mask.h"
 
-/* Labels of segmenters: R231 and LTRCLobes of lungmask; `total` of TotalSegmentator 2.0 and later,
- * and of earlier versions. */
+/* Lung labels of segmenters: lungmask's models R231 and LTRCLobes, and TotalSegmentator's task
+ * `total` in versions 2.0 and later and in version 1. */
 static const struct {
   const char *name, *labels;
 } conventions[] = {{"lungmask", "left=2,right=1"},
@@ -126,7 +126,7 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
     return true;
   }
   for (size_t c = 0; c < CONVENTIONS; ++c) {
-    bool same = true; /* the convention's labels are those present */
+    bool same = true; /* whether exactly the convention's labels are present */
     memset(side, 0, LABELS_MAX);
     (void)read_sides(conventions[c].labels, side);
     for (size_t label = 1; same && label < LABELS_MAX; ++label) {
@@ -176,7 +176,7 @@ static supine_status choose(const char *path, const supine_image *image, const l
 }
 
 /* Check that each lung with labels has voxels. If both have, set `doubted` to whether the left lung
- * does not lie left of the right one. */
+ * does not lie mainly to the left of the right lung. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
                            const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};

@@ -35,7 +35,7 @@ static void average(const float *in, size_t outer, size_t n, size_t inner, size_
   }
 }
 
-/* Average the mask [rows, n] in the same way along its rows, into `out` [rows, m]. */
+/* Average the mask [rows, n] along its rows as average() does, into `out` [rows, m]. */
 static void average_rows(const labels_mask *mask, size_t m, double ratio, float *out) {
   const size_t n = mask->size[0];
   const double width = fmax(1.0, ratio);

@@ -12,7 +12,7 @@
 
 static const double least_edge = 0.2;      /* mm; gives some ten million vertices */
 static const double most_edge = 20.0;      /* mm; larger cubes leave little of a lung */
-static const double most_closing = 20.0;   /* largest radius, mm */
+static const double most_closing = 20.0;   /* largest radius of closing, mm */
 static const double least_lung = 1.0;      /* least volume of a lung, mL */
 static const double longest_lung = 1000.0; /* mm; if longer, the header's voxel size is wrong */
 
@@ -23,10 +23,10 @@ typedef struct work {
   double edge;
   supine_image image; /* the label map; freed once `both` is cut from it */
   labels_mask both;
-  bool doubted; /* by the header, the left lung does not lie left of the right one */
+  bool doubted; /* whether the axes are doubtful: the left lung is not left of the right lung */
 } work;
 
-/* Report progress; SUPINE_ERROR_INTERRUPTED if the caller stops. */
+/* Report progress. Return SUPINE_ERROR_INTERRUPTED if the caller stops. */
 static supine_status advance(work *w, double fraction, supine_error *error) {
   const supine_labels_options *options = w->options;
   return options->progress == NULL || options->progress(options->progress_context, fraction)
@@ -280,8 +280,8 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
                                 w->path, name, w->edge);
 }
 
-/* Report that the left lung does not lie left of the right one; judge by the shape of the lungs
- * whether the labels or the header's axes are wrong. */
+/* Report that the header does not put the left lung left of the right lung, and judge by the lungs'
+ * shape whether the labels or the header's axes are wrong. */
 static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, supine_error *error) {
   const supine_labels_report *report = w->report;
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);
@@ -292,8 +292,8 @@ static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, su
                           "%s). %s%s",
                           w->path, report->taken,
                           found.axes == SUPINE_AXES_LPS
-                              ? "Name the labels the other way round, --labels "
-                                "left=...,right=..., or give the header's axes, --axes ABC"
+                              ? "Exchange the labels, --labels left=...,right=..., or give "
+                                "the header's axes, --axes ABC"
                               : "Their shape fits other axes: if the labels are correct, add "
                                 "--axes ",
                           found.axes == SUPINE_AXES_LPS ? "" : letters);

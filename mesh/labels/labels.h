@@ -16,9 +16,9 @@ typedef struct supine_labels_options {
    * lungs. "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1": labels of a segmenter.
    * Or a list, "left=10+11,right=12+13+14", of one or both sides. */
   const char *labels;
-  supine_axes axes; /**< axes of the header's coordinates; AUTO: the axes it names */
+  supine_axes axes; /**< axes of the header's coordinates; AUTO: the axes that the header names */
   double edge;      /**< approximate distance between vertices, mm; 0: SUPINE_LABELS_EDGE */
-  double close;     /**< closes gaps narrower than twice this radius, mm; 0: none */
+  double close;     /**< radius of closing, mm: fills gaps up to twice as wide; 0: none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -34,7 +34,7 @@ typedef struct supine_labels_lung {
   size_t cavities; /**< number of cavities filled */
   double filled;   /**< volume of the cavities filled */
   double surface;  /**< volume that the surface encloses */
-  long tunnels;    /**< number of tunnels through the lung: the surface's genus */
+  long tunnels;    /**< genus of the surface: number of tunnels through the lung */
   bool cut;        /**< whether the lung reaches the image's border, where it is cut off */
 } supine_labels_lung;
 
@@ -43,8 +43,8 @@ typedef struct supine_labels_report {
   size_t size[3];
   double spacing[3];  /**< distances between voxels, mm */
   char axes[64];      /**< "i to the left, j to the back, k to the head" */
-  const char *source; /**< as in supine_image */
-  bool frames_differ; /**< as in supine_image */
+  const char *source; /**< header field that gives the frame of the image, such as "sform" */
+  bool frames_differ; /**< whether qform and sform of a NIfTI header differ */
   char taken[256];    /**< labels of each side: "2 left; 1 right (convention lungmask)" */
   double neck;        /**< width of the neck at which touching lungs were split, mm; 0: none */
   size_t lung_count;

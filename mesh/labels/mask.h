@@ -13,7 +13,7 @@ typedef struct labels_mask {
   size_t size[3];
   long from[3];      /**< index of voxel 0 in the image or mask that the box was cut from */
   double origin[3];  /**< centre of voxel 0, mm, LPS */
-  double step[3][3]; /**< from a voxel to the next along each axis, mm, LPS */
+  double step[3][3]; /**< vector from a voxel to the next along each axis, mm, LPS */
   double spacing[3]; /**< lengths of the steps, mm */
   uint8_t *at;       /**< [size[2], size[1], size[0]] values */
 } labels_mask;
@@ -50,8 +50,8 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                                   supine_error *error);
 
 typedef struct labels_choice {
-  char *taken;  /**< [256] output: `taken` of supine_labels_report */
-  bool doubted; /**< by the header, the left lung does not lie left of the right one */
+  char *taken;  /**< [256] output: labels of each side (supine_labels_report) */
+  bool doubted; /**< whether the axes are doubtful: the left lung is not left of the right lung */
 } labels_choice;
 
 /** Choose the side of each label, as `wanted` says or, if it is NULL, by the labels present.
@@ -91,8 +91,8 @@ typedef struct labels_pieces {
 /** Find the pieces of zero voxels or, if `zero` is false, of nonzero voxels. */
 supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, labels_pieces *pieces);
 void supine_labels_pieces_free(labels_pieces *pieces);
-/** Set all pieces of nonzero voxels except the largest to 0 or, if `zero`, all pieces of zeros
- * except the outer one (cavities) to 1.
+/** Set all pieces of nonzero voxels except the largest to 0. If `zero`, instead set the cavities,
+ * all pieces of zero voxels except the outer one, to 1.
  * @param others  output: number of pieces changed
  * @param voxels  output: number of voxels changed */
 supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *others, size_t *voxels);
@@ -127,7 +127,7 @@ typedef struct labels_cubes {
 } labels_cubes;
 
 /** Average a mask over cubes with edges of `edge` mm.
- * @param one  keep only the largest piece, and fill its cavities */
+ * @param one  whether to keep only the largest piece and fill its cavities */
 supine_status supine_labels_cubes_create(const labels_mask *mask, double edge, bool one,
                                          labels_cubes *cubes);
 void supine_labels_cubes_free(labels_cubes *cubes);
@@ -136,7 +136,7 @@ void supine_labels_cubes_free(labels_cubes *cubes);
 
 /** Make the surface of a mask by a surface net of cubes of `edge` mm, and smooth it, keeping each
  * vertex within its cell.
- * @param one  keep only the largest piece, and fill its cavities */
+ * @param one  whether to keep only the largest piece and fill its cavities */
 supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
                                          supine_mesh *mesh);
 

@@ -19,7 +19,7 @@ typedef struct surface_net {
   double (*at)[3];          /* position of each vertex in its cell, 0 to 1 along each axis */
   uint32_t (*neighbour)[6]; /* vertices across the cell's faces -x, +x, -y, ..., or NONE */
   size_t quad_count;
-  uint32_t (*quad)[4]; /* corners; faces outwards if the map's axes are right-handed */
+  uint32_t (*quad)[4]; /* corners, whose order faces outwards if the map's axes are right-handed */
 } surface_net;
 
 static const float half = 0.5F;
@@ -174,7 +174,7 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
  * 16 cubes, and removes the steps between slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
-enum { TURNS = 40 }; /* each shrinks the net, then inflates it */
+enum { TURNS = 40 }; /* number of times that the net is shrunk and inflated */
 
 /* Move every vertex by a share of the way to the mean of its neighbours, within its cell. */
 static void step(const surface_net *net, double share, double (*next)[3]) {
@@ -238,7 +238,7 @@ static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes
     in_voxels(net, cubes, i, voxel);
     supine_labels_mask_place(mask, voxel, made.vertices + 3 * i);
   }
-  for (size_t q = 0; q < net->quad_count; ++q) { /* cut along the shorter diagonal */
+  for (size_t q = 0; q < net->quad_count; ++q) { /* cut each along its shorter diagonal */
     uint32_t c[4];
     for (size_t k = 0; k < 4; ++k) {
       c[k] = net->quad[q][turned ? 3 - k : k];

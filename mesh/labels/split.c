@@ -7,7 +7,7 @@
 
 #include "mesh/labels/mask.h"
 
-/* Smallest ratio of the smaller lung's volume to that of the larger. */
+/* Smallest ratio of the smaller lung's volume to the larger lung's volume. */
 static const double least_share = 0.1;
 /* Widest neck between lungs that is cut, mm. */
 static const double widest_neck = 40.0;
@@ -115,7 +115,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
-    if (depth == step) { /* only for lungs that touch */
+    if (depth == step) { /* lungs that touch need the distances */
       status = supine_labels_distance(both, true, squares);
     }
     erode(both, squares, depth, eroded.at);

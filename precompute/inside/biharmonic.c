@@ -77,7 +77,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
  *
  *     K_ij = ALPHA - |p_i - p_j|,    ALPHA > 2
  *
- * On weights with sum 0 it acts as -|p_i - p_j|. */
+ * On weights with sum 0, K acts like the matrix of -|p_i - p_j|. */
 typedef struct kernel {
   size_t size;
   double *matrix; /* [size, size], the lower triangle column by column */

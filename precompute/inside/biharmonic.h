@@ -24,15 +24,15 @@ typedef struct supine_inside_biharmonic {
   double spacing;   /**< largest distance of a point from the nearest centre, mm */
 } supine_inside_biharmonic;
 
-/** Choose at most `centre_max` of the points, each the farthest from the earlier ones, and fit
- * the values there.
+/** Choose at most `centre_max` of the points as centres, each as far as possible from the earlier
+ * centres, and fit the values at the centres.
  *
  * @param points  [count, 3] mm
  * @param values  [count, columns]
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY
  * Cost: count M distances to choose; M^3 / 6 multiplications to factorise one matrix of 8 M^2
- * bytes, of which half are touched. */
+ * bytes, of which half are used. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
                                            const double *values, size_t centre_max,
                                            supine_inside_biharmonic *fit, supine_error *error);

@@ -11,7 +11,7 @@
 typedef struct supine_inside_content {
   size_t count;
   double *points; /**< [count, 3] mm, LPS */
-  uint32_t *part; /**< [count] index of the point's part; for a grid, its node i + size[0] (j +
+  uint32_t *part; /**< [count] index of the point's part; in a grid, its node i + size[0] (j +
                    * size[1] k) */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] indices of points */

@@ -23,7 +23,7 @@ typedef struct embedding {
   supine_inside_place *place; /* [N] in the content's order */
   unsigned char *lung;        /* [N] in the content's order */
   size_t *order;              /* [N] indices of the content's points, lung by lung */
-  float *vertices;      /* [N, 3] mm at full inflation; this and all arrays below are in `order` */
+  float *vertices;      /* [N, 3] at full inflation, mm; this and the arrays below follow `order` */
   float *coefficients;  /* [N, 3, K] displacement by each mode, mm */
   float *depth;         /* [N] mm below the surface */
   uint32_t *part;       /* [N] index of the part */
@@ -139,9 +139,9 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
 }
 
 /* Find the displacements of points [begin, end) of `order`, at most BLOCK, all of one lung. `space`
- * holds positions [2 BLOCK, 3], of the points and then of the surface points nearest to those
- * within `reach`, their values [2 BLOCK, columns], and a surface point's value [columns]. The eight
- * parameters are one block and its work space. */
+ * holds positions [2 BLOCK, 3] of the points, then of the nearest surface points of the points
+ * within `reach`; their values [2 BLOCK, columns]; and one surface point's values [columns]. All
+ * eight parameters describe one block and its work space. */
 static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
@@ -184,7 +184,7 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
                                 supine_error *error) {
-  static const double reach_spacings = 2.0; /* reach / (centres' spacing + mean edge) */
+  static const double reach_spacings = 2.0; /* reach over (centres' spacing + mean edge) */
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
@@ -230,7 +230,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double *scan = e->content->points + 3 * e->order[i];
       double p[3];
-      for (size_t a = 0; a < 3; ++a) { /* R' (position in the scan - mean) */
+      for (size_t a = 0; a < 3; ++a) { /* transposed rotation of (position in the scan - mean) */
         p[a] = r[a] * (scan[0] - given[0]) + r[3 + a] * (scan[1] - given[1]) +
                r[6 + a] * (scan[2] - given[2]);
       }
@@ -247,7 +247,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Report whether this metadata describes the surface alone, and not its content. */
+/* Report whether metadata with this key describes the surface, but not its content. */
 static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};
@@ -259,7 +259,7 @@ static bool is_of_surface(const char *key) {
   return false;
 }
 
-/* Write the file with the surface's metadata, then the content's. */
+/* Write the file with the metadata of the surface, followed by that of the content. */
 static supine_status write_file(const embedding *e, const char *path, supine_tensor *tensors,
                                 size_t tensor_count, supine_error *error) {
   enum { OWN = 5 };

@@ -4,18 +4,18 @@
  * result is a basis of kind vector with the modes, volume forms and metadata of the surface's
  * basis; the same weights and gains apply to both.
  *
- * Near the surface, the residual there of the interpolation b is added,
+ * Near the surface, the residual of the interpolation b on the surface is added:
  *
  *     u(x) = b(x) + (1 - t)^2 (1 + 2 t) (s(q) - b(q)),    t = |x - q| / reach < 1
  *
  * where q is the surface point nearest to x, s(q) its displacement (linear in a triangle), and
- * reach twice the sum of the centres' spacing and the mean edge. So points on the surface move
- * exactly with it, although only some vertices are centres of b.
+ * reach is twice the sum of the centres' spacing and the mean edge. So points on the surface move
+ * exactly with the surface, although only some vertices are centres of b.
  *
  * A rigid part belongs to the lung with most of its vertices (runtime/rigid.h).
  *
- * Content, x and q are given in the scan. The file holds the content at full inflation, as it does
- * the surface: x minus u at the scan's weights and gains. */
+ * Content, x and q are given in the scan. The file holds the content at full inflation, as a basis
+ * holds the surface: x minus u at the scan's weights and gains. */
 #ifndef SUPINE_INSIDE_EMBED_H
 #define SUPINE_INSIDE_EMBED_H
 
@@ -28,9 +28,9 @@
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 
 typedef struct supine_inside_options {
-  bool clamp;          /**< points outside a lung move like the nearest point of its surface */
-  size_t centres;      /**< largest number of centres of one lung; 0: SUPINE_INSIDE_CENTRES */
-  const char *made_by; /**< optional: maker named in the file's metadata */
+  bool clamp;     /**< whether points outside a lung move like the surface point nearest to them */
+  size_t centres; /**< largest number of centres of one lung; 0: SUPINE_INSIDE_CENTRES */
+  const char *made_by; /**< name of the maker for the file's metadata; optional */
 } supine_inside_options;
 
 /** Result of embedding. */

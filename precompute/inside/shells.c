@@ -124,8 +124,8 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-/* Update a walk's place in one lung for the next point. Keep it unchanged if it implies that the
- * point is farther than `far` from the surface, on the same side. */
+/* Update a walk's place in one lung for the next point. Keep the last place if it implies that the
+ * point is farther than `far` from the surface and on the same side as the last point. */
 static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
                     double far, supine_inside_walk *walk) {
   supine_inside_place *place = &walk->place[lung];

@@ -11,9 +11,9 @@
 
 /** One lung's surface. */
 typedef struct supine_inside_shell {
-  size_t begin; /**< index of its first vertex in the basis */
+  size_t begin; /**< index in the basis of the lung's first vertex */
   size_t vertex_count;
-  double *vertices; /**< [vertex_count, 3] mm, in the scan */
+  double *vertices; /**< [vertex_count, 3] positions in the scan, mm */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3], vertices counted from `begin` */
   double edge;         /**< mean length of an edge, mm */
@@ -49,10 +49,10 @@ typedef struct supine_inside_walk {
   size_t lung;                                 /**< lung found for the last point */
 } supine_inside_walk;
 
-/** Find the lung that a point is in, or the nearest lung; walk->place[lung] is its place there.
+/** Return the lung that a point is in, or the nearest lung; walk->place[lung] is the point's place.
  * @param walk  zeroed for the first point
- * @param far   distance in mm: if the surface is farther, the place may be that of an earlier point
- *              on the same side; INFINITY: never */
+ * @param far   distance in mm: if the surface is farther, the place may be left from an earlier
+ *              point on the same side; INFINITY: it is always the point's own */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk);
 

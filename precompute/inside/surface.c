@@ -12,10 +12,10 @@
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
-/* Distance, in radii of a box, beyond which a dipole replaces its triangles: the winding number
- * errs by less than 1 %, and its threshold is 50 %. */
+/* Distance from a box, in radii of the box, beyond which a dipole replaces its triangles. The error
+ * of the winding number is then below 0.01; its threshold is 0.5. */
 static const double dipole_distance = 2.0;
-/* Largest distance, mm, at which a point counts as on the surface, whose positions are float32. */
+/* Largest distance, mm, of a point that counts as on the surface; positions are in float32. */
 static const double on_surface = 1e-3;
 
 typedef struct node {
@@ -27,9 +27,9 @@ typedef struct node {
 
 /* The dipole that replaces the triangles of a node for a distant point. */
 typedef struct dipole {
-  double area, centre[3]; /* mm^2; centre of area, mm */
+  double area, centre[3]; /* area, mm^2, and its centre, mm */
   double normal[3];       /* sum of the triangles' unit normals times their areas, mm^2 */
-  double radius;          /* of a ball about `centre` that contains the box, mm */
+  double radius;          /* radius of a ball about `centre` that contains the box, mm */
 } dipole;
 
 /* The boxes of a leaf's triangles, rounded outwards: least and greatest x, y and z. */
@@ -199,7 +199,7 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error) {
-  const size_t leaves = 2 * count / LEAF + 1; /* most leaves, as each is at least half full */
+  const size_t leaves = 2 * count / LEAF + 1; /* upper bound: each is at least half full */
   supine_inside_surface *s = calloc(1, sizeof *s);
   keyed *space = malloc((count + count / 2) * sizeof *space);
   *surface = NULL;
@@ -250,7 +250,7 @@ static double along(const double offset[3], const double edge[3]) {
  * its squared distance from x exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  static const double slender = 1e-4; /* sin^2 of a corner below which b is too inexact */
+  static const double slender = 1e-4; /* sin^2 of a corner below which coordinates are inexact */
   double u[3];
   double v[3];
   double w[3];
@@ -266,7 +266,7 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   b[1] = (vv * uw - uv * vw) / determinant;
   b[2] = (uu * vw - uv * uw) / determinant;
   b[0] = 1.0 - b[1] - b[2];
-  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* NaN if the triangle has no area */
+  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* false for a triangle without area */
     return true;
   }
   const double ww = supine_dot(w, w);
@@ -424,7 +424,7 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
                                                   const supine_inside_place *near) {
   supine_inside_place place = {.point = {point[0], point[1], point[2]}};
   double best = INFINITY;
-  if (near != NULL) { /* upper bound: the distance to `near` plus its depth */
+  if (near != NULL) { /* upper bound of the distance */
     const double limit =
         (fabs(near->depth) + supine_distance(point, near->point)) * (1.0 + 1e-9) + 1e-9;
     best = limit * limit;
@@ -438,7 +438,7 @@ typedef struct distances {
   const supine_inside_surface *surface;
   const double *points;
   double *distance;
-  double *nearest; /* optional */
+  double *nearest; /* may be NULL */
 } distances;
 
 static void distance_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -467,7 +467,7 @@ supine_inside_place supine_inside_surface_find(const supine_inside_surface *surf
   supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)
-                           ? near->depth > 0.0 /* no surface between them: the same side */
+                           ? near->depth > 0.0 /* same side: the surface is farther from `near` */
                            : angle(surface, 0, point) > half);
   place.depth = inside ? place.depth : -place.depth;
   return place;

@@ -17,7 +17,7 @@ typedef struct supine_inside_place {
   double depth;          /**< distance to the surface, mm; positive inside, negative outside */
   double nearest[3];     /**< the surface's nearest point, mm */
   size_t triangle;       /**< index of the triangle of the nearest point */
-  double barycentric[3]; /**< barycentric coordinates of the nearest point in it */
+  double barycentric[3]; /**< barycentric coordinates of that point in the triangle */
 } supine_inside_place;
 
 /** Build a tree of boxes over the triangles.

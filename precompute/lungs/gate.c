@@ -150,10 +150,11 @@ static supine_status judge(const supine_lungs *lungs, const supine_lungs_source 
   *side = found.side;
   *axes_hold = found.certain && found.axes == SUPINE_AXES_LPS;
   if (found.joined && source->midline == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: this looks like both lungs in one piece: separate them (--labels "
-                            "one does in a label map), or give --midline if it is one lung",
-                            source->name);
+    return supine_error_set(
+        error, SUPINE_ERROR_MESH,
+        "%s: this looks like both lungs in one piece: separate them (in a label "
+        "map by --labels one), or give --midline if it is one lung",
+        source->name);
   }
   if (found.axes != SUPINE_AXES_LPS) {
     char letters[4];

@@ -15,8 +15,8 @@ static const double same_box_share = 0.01;
 /* Least ratio of the longest sides of two surfaces: lobes and lungs of one chest differ by less
  * than a factor of ten. */
 static const double least_side_share = 0.05;
-/* Largest ratio of a lung's extent beyond the midline to that on its own side: lungs reach across
- * the midline behind the breastbone. */
+/* Largest ratio of a lung's extent beyond the midline to its extent on its own side: lungs reach
+ * across the midline behind the breastbone. */
 static const double most_beyond_share = 0.5;
 
 /* A surface and the mean x of its vertices. Surfaces are joined from left to right. */

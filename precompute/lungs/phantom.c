@@ -74,7 +74,7 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
         const unsigned a = faces[face][k];
         const unsigned b = faces[face][next];
         const size_t along =
-            a < b ? step[next] : step[k]; /* steps from the corner of lower index */
+            a < b ? step[next] : step[k]; /* steps from the corner with the lower index */
         return CORNERS + edge_index(a, b) * (f - 1) + along - 1;
       }
     }

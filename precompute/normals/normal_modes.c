@@ -29,7 +29,7 @@ enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
  * held-out ones have slightly different errors. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
-static const double degrees = 57.29577951308232; /* per radian */
+static const double degrees = 57.29577951308232; /* degrees per radian */
 
 /* Smallest squared residual, relative to a state's squared normals, at which the state becomes
  * another snapshot. */
@@ -41,9 +41,9 @@ typedef struct fit {
   size_t snapshots;                 /* number of snapshots, R */
   size_t state[SNAPSHOTS];          /* [R] indices of the snapshots' states */
   float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share[1 + r][j] N(state_r) */
-  double *weights;                  /* [MOST, 3, terms] V */
+  double *weights;                  /* [MOST, 3, terms] weights V */
   supine_normals_rows rows;         /* polynomials of held-out vertices */
-  float *modes;                     /* [rows, 3, MOST] n of the held-out vertices */
+  float *modes;                     /* [rows, 3, MOST] modes n of the held-out vertices */
 } fit;
 
 typedef struct normals_work {
@@ -80,8 +80,8 @@ static void apply_gram(const supine_normals_rows *rows, size_t terms, const doub
   }
 }
 
-/* Choose the snapshots by pivoted Cholesky factorisation of the scalar products [S, S] of
- * normalised states, P ~ L L^T, and find the `count` best modes of their span: n_j = sum over r of
+/* Choose the snapshots by pivoted Cholesky factorisation, P ~ L L^T, of the scalar products P [S,
+ * S] of normalised states, and find the `count` best modes of their span: n_j = sum over r of
  * coefficients_jr state_r. The products are overwritten. */
 static supine_status choose_snapshots(size_t s, double *product, fit *made,
                                       double coefficients[MOST * SNAPSHOTS]) {
@@ -91,7 +91,7 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   double values[SNAPSHOTS];
   const lapack_int info = LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product,
                                          (lapack_int)s, pivots, &rank, least_new);
-  if (info < 0) { /* above 0 if the rank is below S */
+  if (info < 0) { /* positive if the rank is below S, which is no error */
     return supine_lapack_status(info);
   }
   const size_t r = rank < SNAPSHOTS ? (size_t)rank : SNAPSHOTS;

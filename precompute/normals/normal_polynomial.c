@@ -47,7 +47,7 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface,
     supine_normals_fans_free(fans);
     return SUPINE_ERROR_MEMORY;
   }
-  uint32_t *next = fans->begin + 1; /* next[i] moves from the beginning of i's fan to its end */
+  uint32_t *next = fans->begin + 1; /* filling advances next[i] to the end of fan i */
   for (size_t s = 0; s < corners; ++s) {
     ++next[surface->triangles[s] + 1];
   }

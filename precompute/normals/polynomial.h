@@ -56,15 +56,15 @@ void supine_normals_rows_free(supine_normals_rows *rows);
 
 /* Monomials of the weights and gains in some states. */
 typedef struct supine_normals_states {
-  size_t count;    /* S: states whose volume the lungs can reach */
-  size_t room;     /* states requested */
+  size_t count;    /* number S of states, all with volumes that the lungs can reach */
+  size_t room;     /* number of states requested */
   double *phi;     /* [G, room, 3, terms] monomials of each lung in each state */
   double range[2]; /* range of the states, as in supine_normals_modes */
 } supine_normals_states;
 
 /* Spread up to `count` states over the sphere and over the volumes from rest to the reference
  * surface, or if rest is unknown, over largest displacements of -15 to 60 mm. Another `shift`, 0 to
- * 1, gives states between the others. Release them with supine_normals_states_free.
+ * 1, gives states in between. Release them with supine_normals_states_free.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states);

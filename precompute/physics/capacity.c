@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Estimate the volume at full inflation, and warn of an implausible scan state.
  *
- * Total lung capacity of adults by height H in m (ECSC: Quanjer et al., Eur Respir J 6
- * Suppl 16, 1993): men 7.99 H - 7.08 L, women 6.60 H - 5.79 L, standard deviation 0.7 and 0.6 L;
- * measured upright, so divided by 1 + SUPINE_FULL_UPRIGHT_GAIN here; plus 0.86 L of tissue (Denison
- * 1986, Thorax 41:620, n 12: 431 mL in each lung). The coefficients were checked against an
- * implementation of the ECSC table in R (getQuanjerPred, getQuanjerLLN), not against the paper. At
- * 40 years they agree within 5 %, for men of 1.60 to 1.95 m and women of 1.50 to 1.80 m, with the
- * medians of Hall et al. (Eur Respir J 57: 2000289, 2021), without their splines. */
+ * The total lung capacity of adults of height H in m (ECSC: Quanjer et al., Eur Respir J 6 Suppl
+ * 16, 1993) is 7.99 H - 7.08 L in men (SD 0.7 L) and 6.60 H - 5.79 L in women (SD 0.6 L). These are
+ * capacities upright, so the code divides them by 1 + SUPINE_FULL_UPRIGHT_GAIN; it adds 0.86 L of
+ * tissue (Denison 1986, Thorax 41:620, n 12: 431 mL in each lung). The coefficients were checked
+ * against an R implementation of the ECSC table (getQuanjerPred, getQuanjerLLN), not against the
+ * paper. For men of 1.60 to 1.95 m and women of 1.50 to 1.80 m, they are within 5 % of the medians
+ * of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021, without their splines). */
 #include <math.h>
 #include <stdio.h>
 
@@ -16,19 +16,19 @@
 
 static const double tissue = 860.0; /* volume of the tissue of both lungs, mL */
 
-/* Limits of the full volume of both lungs, beyond which the stated scan state is doubtful: smallest
- * share of the expected volume, and smallest and largest volume in mL. */
+/* The state given for a scan is doubtful if the full volume of both lungs is less than
+ * `least_share` of the expected volume, less than `least_ml`, or more than `most_ml`. */
 static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 
-/* Largest relative difference of two volumes at rest that still agree. */
+/* Largest relative difference between a scan's volume and the volume that the options state. */
 static const double agreement = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
   static const struct {
-    double slope, offset;                                                 /* L per m, L */
-    double usual[2];                                                      /* usual heights, cm */
+    double slope, offset; /* of the capacity: L per m, L */
+    double usual[2];      /* shortest and tallest usual adults, cm */
   } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* women, men */
   range[0] = INFINITY;
   range[1] = 0.0;
@@ -46,7 +46,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* Return the usual share of both lungs' volume that is in the lungs of the reference. */
+/* Return the usual share of both lungs' volume that the reference has: 1 if it has both lungs. */
 static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0
          : reference->side[0] > 0   ? SUPINE_LEFT_SHARE
@@ -93,13 +93,13 @@ void supine_reference_doubt(const supine_reference *reference, const supine_pers
     supine_text_add(
         text, size,
         "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was not at full "
-        "inflation, say what it shows, as --scanned supine:rest or full-1000",
+        "inflation, give its state with --scanned, such as supine:rest or full-1000",
         separator, full, expected);
   } else if (full > part * most_ml) {
     supine_text_add(
         text, size,
         "%sat full inflation the lungs hold %.0f mL (%s mL): if the scan was fuller than "
-        "rest, say so, as --scanned full or supine:rest+1000, or change --resting",
+        "rest, give --scanned full or supine:rest+1000, or change --resting",
         separator, full, expected);
   }
 }

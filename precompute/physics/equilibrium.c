@@ -23,20 +23,20 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
 /* BATCH: largest number of right-hand sides that are solved together, which limits the work space.
- * LARGE: number of vertices above which the factor of a part is freed after each solve. */
+ * LARGE: number of vertices of a part above which its factor is freed after each solve. */
 enum { BATCH = 8, LARGE = 100000 };
 
-/* Largest relative residual of a solve. Double precision reaches about 1e-16 (R / h)^2 on edges of
- * length h. */
+/* Largest relative residual of a solve. With a reach R and edges of length h, double precision
+ * reaches about 1e-16 (R / h)^2. */
 static const double residual_limit = 1e-8;
 
 /* A part of the mesh without edges to other parts, such as one lung. Each part is solved in its own
- * thread, unless the first part is large. */
+ * thread, unless the first part has more than LARGE vertices. */
 typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and their number */
   size_t edge, edge_count;
-  bool factorised;        /* `factor` matches the values of `matrix` */
-  cholmod_sparse *matrix; /* lower half: column i has the diagonal and the edges from i on */
+  bool factorised;        /* whether `factor` matches the values of `matrix` */
+  cholmod_sparse *matrix; /* lower triangle: column i has the diagonal, then the edges from i */
   cholmod_factor *factor;
   cholmod_common common;
 } part;
@@ -44,12 +44,12 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
-  double reach;    /* mm */
-  double *area;    /* [N] area of a vertex over the mean; NULL: no reach */
-  double *link;    /* [edges] D(mass, spring) in mm; with a reach: w / 2 */
+  double reach;    /* mm; 0: none */
+  double *area;    /* [N] area of each vertex over the mean area; NULL without a reach */
+  double *link;    /* [edges] with a reach w / 2, else D(mass, spring) in mm (equilibrium.h) */
   double *lesions; /* [N] factors on the normalised stiffness; NULL: 1 */
-  double *mass_s;  /* [N] S in the matrix: a = 1/E; with a reach: 1 */
-  double *load;    /* [N] right-hand side for a unit force: 1; with a reach: area / E */
+  double *mass_s;  /* [N] S of the masses in the matrix: with a reach 1, else 1 / E */
+  double *load;    /* [N] right-hand side for a unit force: with a reach area / E, else 1 */
   size_t part_count;
   part parts[2];
 };
@@ -100,12 +100,12 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
 }
 
 /* Split the vertices into two ranges of indices without edges between them, as equal in size as
- * possible; one range if that is impossible. */
+ * possible. If there are no such ranges, make one part of all vertices. */
 static void split(supine_equilibrium *eq) {
   const size_t n = eq->vertex_count;
   const supine_topology *topology = eq->topology;
   size_t last = 0;  /* highest neighbour of the vertices before i */
-  size_t least = n; /* size of the larger part so far */
+  size_t least = n; /* size of the larger part in the best split so far */
   part *first = &eq->parts[0];
   *first = (part){.vertex_count = n, .edge_count = topology->edge_count};
   for (size_t i = 1, e = 0; i < n; ++i) {
@@ -125,8 +125,8 @@ static void split(supine_equilibrium *eq) {
                         .edge_count = topology->edge_count - first->edge_count};
 }
 
-/* Create the matrix of a part, without values. As topology->edges is sorted, edge e is entry
- * e + i + 1 of column i, with indices counted within the part. */
+/* Create the matrix of a part, without values. Edges are sorted by their first vertex i, so edge e
+ * is entry e + i + 1 of the matrix, with e and i counted within the part. */
 static bool create_matrix(const supine_topology *topology, part *p) {
   const size_t entries = p->vertex_count + p->edge_count;
   const uint32_t *edges = topology->edges + 2 * p->edge;
@@ -175,14 +175,14 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   return e;
 }
 
-/* Compute vertex areas and link weights for a reach.
+/* Compute vertex areas and link weights for a reach R.
  *
- * The system of equilibrium.h with a reach is (1 - R^2 Laplacian) F = a f in the weak form on the
- * surface, where area_i is the vertex's area A_i over the mean area A and w = 2 R^2 c / A, with
- * link coefficients c that make sum of c (F_i - F_j)^2 the Dirichlet integral of |grad F|^2. With
- * the link's area a (a third of its triangles' area) and length h, c = 2 a / h^2 does so if links
- * run equally in all directions. Unlike cotangent weights it is never negative, whatever the
- * triangles, but R^2 is then accurate only to about a tenth. */
+ * The system of equilibrium.h with a reach is the weak form of (1 - R^2 Laplacian) F = a f on the
+ * surface, divided by the mean vertex area A. Its link weights are w = 2 R^2 c / A, where the
+ * coefficients c make the sum of c (F_i - F_j)^2 over all links the integral of |grad F|^2. With
+ * the link's length h and a third of the area of its triangles, s, this holds for c = 2 s / h^2 if
+ * links run equally in all directions. Unlike cotangent weights, these are never negative, but they
+ * realise R^2 only to about a tenth. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
@@ -191,7 +191,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* mm^2; degenerate triangles must not give a vertex or a link the weight 0 */
+  /* lower limit, mm^2: degenerate triangles must not give a vertex or a link the weight 0 */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
@@ -199,7 +199,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   memset(eq->link, 0, eq->topology->edge_count * sizeof *eq->link);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    double normal[3]; /* its length is twice the triangle's area */
+    double normal[3]; /* length: twice the triangle's area */
     supine_normal(p + 3 * (size_t)corner[0], p + 3 * (size_t)corner[1], p + 3 * (size_t)corner[2],
                   normal);
     for (size_t k = 0; k < 3; ++k) {
@@ -268,7 +268,7 @@ static void set_values(const supine_equilibrium *eq, part *p) {
       const double s[2] = {eq->mass_s[edge[0]], eq->mass_s[edge[1]]};
       const double wide = d + 2.0 * s[0] * s[1];
       c = s[0] * s[1] / (d * wide);
-      *first += (s[0] + s[1]) / (2.0 * s[1] * wide); /* kept by the spring */
+      *first += (s[0] + s[1]) / (2.0 * s[1] * wide); /* force kept by the spring */
       *second += (s[0] + s[1]) / (2.0 * s[0] * wide);
     }
     *first += c;
@@ -316,7 +316,7 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
   return supine_physics_equilibrium_set_stiffness(eq, stiffness, error);
 }
 
-/* One solve for all right-hand sides. */
+/* Forces and results of one solve. */
 typedef struct solve {
   supine_equilibrium *eq;
   size_t count;
@@ -343,8 +343,7 @@ static supine_status factorise(part *p) {
   return SUPINE_OK;
 }
 
-/* Solve a part for right-hand sides r to r + count - 1, and include their residuals in the largest
- * residual of the part. */
+/* Solve part k for the right-hand sides r to r + count - 1, and update its largest residual. */
 static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   part *p = &s->eq->parts[k];
   const size_t n = p->vertex_count;
@@ -376,7 +375,7 @@ static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   }
   for (size_t c = 0; c < count && solved; ++c) {
     const double relative = sqrt(square[c] / (norm[c] > 0.0 ? norm[c] : 1.0));
-    s->residual[k] = relative <= s->residual[k] ? s->residual[k] : relative; /* keeps NaN */
+    s->residual[k] = fmax(s->residual[k], isnan(relative) ? INFINITY : relative);
   }
   cholmod.free_dense(&right, &p->common);
   cholmod.free_dense(&t, &p->common);

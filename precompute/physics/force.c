@@ -16,8 +16,8 @@ typedef struct force_work {
   const supine_lungs *lungs;
   const supine_force_law *law;
   const supine_gravities *gravities;
-  const size_t *vertices; /* NULL: all */
-  double middle[3];       /* mean position of all vertices; computed only with softening */
+  const size_t *vertices; /* indices; NULL: all vertices */
+  double middle[3];       /* mean position of all vertices, mm; computed only with softening */
   double *force;
 } force_work;
 

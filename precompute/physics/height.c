@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the range of g.p over all vertices for many directions g: the min and max in (18). */
+/* Find the range of g.p over all vertices p for many directions g: the min and max in (18). */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -22,9 +22,9 @@ typedef struct block_box {
 } block_box;
 
 typedef struct range_work {
-  size_t count;            /* vertices */
-  const double *vertices;  /* [count, 3] sorted */
-  const block_box *boxes;  /* [box_count] */
+  size_t count;            /* number of vertices */
+  const double *vertices;  /* [count, 3] sorted along the curve, mm */
+  const block_box *boxes;  /* [box_count] boxes of the blocks */
   const block_box *groups; /* boxes of GROUP blocks each */
   size_t box_count;
   size_t direction_count;
@@ -32,8 +32,8 @@ typedef struct range_work {
   double *minimum, *maximum;
 } range_work;
 
-/* LANES directions, the absolute values of their components, and the greatest height along each so
- * far, mm. */
+/* LANES directions g, the absolute values of their components, and the greatest height g.p along
+ * each that was found so far, mm. */
 typedef struct lanes {
   double g[3][LANES];
   double size[3][LANES];
@@ -51,7 +51,7 @@ static block_box box_of(const double *vertices, size_t count) {
       high = x > high ? x : high;
     }
     box.centre[k] = 0.5 * (low + high);
-    box.half[k] = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-9; /* wide enough for rounding */
+    box.half[k] = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-9; /* margin for rounding */
   }
   return box;
 }
@@ -70,14 +70,14 @@ static inline bool may_improve(const block_box *box, const lanes *at) {
   return any != 0;
 }
 
-/* Raise the best height of each lane to that of a block's vertices. */
+/* Raise the best height of each lane to the greatest height of a block's vertices. */
 static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   const size_t end = (block + 1) * BLOCK < work->count ? (block + 1) * BLOCK : work->count;
   for (size_t i = block * BLOCK; i < end; ++i) {
     const double x = work->vertices[3 * i];
     const double y = work->vertices[3 * i + 1];
     const double z = work->vertices[3 * i + 2];
-#pragma GCC unroll 1 /* as above */
+#pragma GCC unroll 1
     for (size_t l = 0; l < LANES; ++l) {
       const double h = at->g[0][l] * x + at->g[1][l] * y + at->g[2][l] * z;
       at->best[l] = h > at->best[l] ? h : at->best[l];
@@ -85,8 +85,8 @@ static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   }
 }
 
-/* Find the greatest heights, beginning in block `seed`; return the last block searched, a good seed
- * for the next directions. */
+/* Find the greatest heights, beginning in block `seed`. Return the last block searched, which is a
+ * good seed for similar directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
   raise_best(work, seed, at);
   for (size_t first = 0; first < work->box_count; first += GROUP) {
@@ -127,11 +127,11 @@ SUPINE_CLONES static void height_range(void *context, size_t begin, size_t end, 
   }
 }
 
-/* Find the cell of the mesh's box that holds a vertex, numbered along the curve. */
+/* Return the number, along the Morton curve, of the cell that holds a vertex. */
 static size_t cell_of(const block_box *box, const double *p) {
   size_t cell = 0;
   for (size_t k = 0; k < 3; ++k) {
-    const double share = 0.5 + 0.5 * (p[k] - box->centre[k]) / box->half[k]; /* within 0 to 1 */
+    const double share = 0.5 + 0.5 * (p[k] - box->centre[k]) / box->half[k]; /* 0 to 1 */
     const size_t step = (size_t)(share * ((1 << CELL_BITS) - 1));
     for (size_t bit = 0; bit < CELL_BITS; ++bit) {
       cell |= (step >> bit & 1) << (3 * bit + k);
@@ -140,8 +140,8 @@ static size_t cell_of(const block_box *box, const double *p) {
   return cell;
 }
 
-/* Sort the vertices along the curve by counting sort, into sorted [count, 3]. begin [CELLS + 1] is
- * zero and is overwritten. */
+/* Sort the vertices along the Morton curve by counting sort, into sorted [count, 3]. begin
+ * [CELLS + 1] is work space, zero on entry. */
 static void sort_vertices(const double *vertices, size_t count, size_t *begin, double *sorted) {
   const block_box box = box_of(vertices, count);
   for (size_t i = 0; i < count; ++i) {
@@ -156,7 +156,7 @@ static void sort_vertices(const double *vertices, size_t count, size_t *begin, d
   }
 }
 
-/* Find the boxes of every `size` vertices. */
+/* Find the bounding box of each run of `size` vertices. */
 static void find_boxes(const double *vertices, size_t count, size_t size, block_box *boxes) {
   for (size_t i = 0; i < count; i += size) {
     boxes[i / size] = box_of(vertices + 3 * i, count - i < size ? count - i : size);
@@ -178,7 +178,7 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
   if (boxes != NULL && groups != NULL && vertices != NULL && sorted != NULL && begin != NULL) {
     range_work work = {n, sorted, boxes, groups, box_count, count, directions, minimum, maximum};
     memcpy(vertices, lungs->mesh.vertices, 3 * single * sizeof *vertices);
-    for (size_t i = 3 * single; i < 3 * n; ++i) { /* the mirror image in the midline */
+    for (size_t i = 3 * single; i < 3 * n; ++i) { /* append the mirror image in the midline */
       const double at = vertices[i - 3 * single];
       vertices[i] = i % 3 == 0 ? 2.0 * lungs->midline - at : at;
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Move a scan to full inflation by Anderson acceleration (D. G. Anderson, J. ACM 12, 1965) of the
- * iteration p_j -> scan_j - A_j F(g; p) d_j(p), whose result for p is called the image of p. The
- * next p is the combination of the last images whose residual, image - p, is smallest. */
+/* Move a scan to full inflation: solve p = image(p), the fixed-point equation of reference.h, with
+ * image_j(p) = scan_j - A_j F(g; p) d_j(p), by Anderson acceleration (D. G. Anderson, J. ACM 12,
+ * 1965). The next p is the combination of the last images with the smallest residual, image - p. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,13 +17,12 @@
 
 enum { SOLVES_MAX = 30, DEPTH = 4 };
 
-/* RMS residual, mm, that ends the iteration, and a larger limit that ends it if a step does not
- * halve the residual: near a nearly degenerate triangle a few vertices oscillate by about 0.03 mm.
- */
+/* RMS residuals, mm. The iteration ends at `converged`, or at `stalled` if a step does not halve
+ * the residual: near an almost degenerate triangle some vertices oscillate by about 0.03 mm. */
 static const double converged = 5e-4;
 static const double stalled = 5e-3;
 static const double folded_share = 0.01; /* largest share of folded triangles in a valid surface */
-static const double ridge = 1e-12;       /* relative regularisation, against equal residuals */
+static const double ridge = 1e-12;       /* relative regularisation, for equal residuals */
 
 typedef struct ascent {
   supine_lungs lungs; /* current estimate; the caller owns its vertices */
@@ -31,38 +30,39 @@ typedef struct ascent {
   supine_model model;
   supine_reference *found;
   supine_solution field;  /* solution for the current estimate */
-  size_t size;            /* 3 N */
+  size_t size;            /* number of coordinates, 3 N */
   double *image;          /* [size] image of the current estimate, mm */
   double *last;           /* [size] the previous image, mm */
   double *residual;       /* [size] the previous residual, mm */
   double rms;             /* RMS residual of the current estimate, mm */
   double *images;         /* [DEPTH, size] differences of successive images */
   double *residuals;      /* [DEPTH, size] differences of successive residuals */
-  size_t stored, history; /* number of differences stored so far; number in use */
+  size_t stored, history; /* numbers of differences stored so far and in use */
 } ascent;
 
-/* Fail if too many triangles turn over between the scan and full inflation. */
+/* Return an error if too many triangles turn over between the scan and full inflation. */
 static supine_status check_folds(const ascent *a, supine_error *error) {
   const double share = supine_mesh_turned_over(&a->scan.mesh, a->lungs.mesh.vertices);
   return share <= folded_share
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the scan folds on its way up to full inflation: %.3g %% of its "
+                                "the scan folds on its way to full inflation: %.3g %% of its "
                                 "triangles turn over. If the scan is fuller than --scanned says, "
                                 "change --scanned or --resting; --scanned none uses the scan as it "
                                 "is",
                                 100.0 * share);
 }
 
-/* Find the gains A = s (sigma + 2 bend e(sigma)) of one lung's scan. Applied to the scan, gains of
- * -A add `to_full` mL (full inflation) and gains of s - A add `to_rest` mL (rest). The first
- * equation gives s for any sigma; secant steps on the second give sigma.
- * @param form  of the field on the scan */
+/* Find the gains A = s (sigma + 2 bend e(sigma)) of one lung's scan, on the path from full
+ * inflation (sigma 0) to rest (sigma 1, gains s; supine/volume.h). Applied to the scan, gains of -A
+ * add `to_full` mL and lead to full inflation, and gains of s - A add `to_rest` mL and lead to
+ * rest. For each sigma, `to_full` gives s; secant steps find the sigma that also gives `to_rest`.
+ * @param form  volume form of the field applied to the scan */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],
                                      supine_error *error) {
   enum { STEPS = 50 };
-  static const double tolerance = 1e-9; /* mL */
+  static const double tolerance = 1e-9; /* largest error of the volume, mL */
   const bool straight = at_rest || (bend[0] == 0.0 && bend[1] == 0.0 && bend[2] == 0.0);
   double sigma = straight ? 1.0 : to_full / (to_full - to_rest);
   double last_sigma = 0.0;
@@ -166,7 +166,7 @@ static void store_differences(ascent *a) {
   }
 }
 
-/* Replace the estimate by the combination of images whose residual is smallest. */
+/* Replace the estimate by the combination of images with the smallest residual. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
@@ -242,7 +242,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
               .size = 3 * lungs->mesh.vertex_count};
   const size_t bytes = a.size * sizeof(double);
   supine_status status = SUPINE_OK;
-  a.model.share[0] = a.model.share[1] = 1.0; /* the shares scale the field after the solve */
+  a.model.share[0] = a.model.share[1] = 1.0; /* collapse scales the field after the solve */
   a.scan.mesh.vertices = malloc(bytes);
   a.image = malloc(bytes);
   a.last = calloc(a.size, sizeof *a.last);

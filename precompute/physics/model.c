@@ -28,11 +28,9 @@ supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const 
                                                supine_error *error) {
   if (model->force.soften != 0.0 && !(model->reach > 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--soften needs a reach: the paper's transfer depends on the "
-                            "stiffness, so it would change with gravity. Give --reach 10, or "
-                            "leave --soften out");
+                            "--soften needs a reach: give --reach 10, or leave --soften out");
   }
-  /* Limit the reach: a longer one spreads every force evenly, and makes the matrix singular. */
+  /* A longer reach would spread every force evenly and make the matrix singular. */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);
   const double reach = fmin(model->reach, longest);
   if (*equilibrium != NULL) {

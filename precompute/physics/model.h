@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Constants of the two laws, and the physical model of a basis or a solve. */
+ * Constants of the two laws, and the physical model of a basis or of one solve. */
 #ifndef SUPINE_MODEL_H
 #define SUPINE_MODEL_H
 
@@ -15,17 +15,16 @@
  * of ten patients (DIR-Lab), c1..c6 of `deep` to the full breaths of ten others (DIR-Lab COPDgene).
  * Those scans are supine, where h = 1 - Y, so base, cy and gain cannot be determined separately.
  * The gain of `deep` is an assumption: with cy Y at its mean the force is 0.8 on the uppermost
- * tissue and 1.2 on the lowest, a ratio of 1.5. Milic-Emili (J Appl Physiol 1966) showed that lower
- * regions are emptier.
+ * tissue and 1.2 on the lowest, a ratio of 1.5. That lower tissue moves more agrees with
+ * Milic-Emili (J Appl Physiol 1966), who found lower regions emptier.
  *
- * The bend has one free number, 0.45, chosen on ten quiet breaths (DIR-Lab 4-D CT). One gain for
- * each patient then explains a median of 78 % (53 to 87) of the squared displacement, and without
- * the bend 47 %.
+ * The bend has one free number, 0.45, chosen on ten quiet breaths (DIR-Lab 4-D CT). With it, one
+ * gain for each patient explains a median of 78 % (53 to 87) of the squared displacement; without
+ * it, 47 %.
  *
- * The weight of the heart on the lung below it is left out. If it raises the left lung's share of a
- * breath, lying on the left, from 48 to 49.5 % (58 published), it also raises the ratio of
- * ventilation of the lowest to the uppermost quarter, prone, from 1.4 to 1.6, which should be
- * nearer 1. */
+ * The weight of the heart on the lung below it is left out. A weight that raises the left lung's
+ * share of a breath, lying on the left, from 48 to 49.5 % (published: 58) also raises the ratio of
+ * ventilation of the lowest to the uppermost quarter, prone, from 1.4 to 1.6 (expected: 1). */
 #define SUPINE_LAWS(LAW)                                                                           \
   LAW(DEEP, "deep", 0.9, 0.4, (0, -0.2, 0), (6, 2.6, 15, 1, 16, 1.3), (0, -0.45, 0.45), 10, true,  \
       "postures and breaths between full inflation, rest and beyond (default)")                    \
@@ -46,11 +45,11 @@ typedef struct supine_model {
   supine_force_law force;
   supine_direction_law direction;
   double bend[3];          /**< bend of the path from full inflation to rest (supine/volume.h) */
-  const double *stiffness; /**< [N] E, or NULL: 1 everywhere */
-  const double *lesions;   /**< [N] factors on the normalised E (disease.h), or NULL: 1 */
-  double reach;    /**< R of equilibrium.h, mm, limited to half the diagonal of the lungs' box;
-                        0: the paper's transfer over links */
-  double share[2]; /**< each lung's volume and breath relative to healthy; 1 unless collapsed */
+  const double *stiffness; /**< [N] stiffness E; NULL: 1 everywhere */
+  const double *lesions;   /**< [N] factors on the normalised E (disease.h); NULL: 1 */
+  double reach;            /**< R of equilibrium.h, mm, at most half the diagonal of the lungs' box;
+                                0: the paper's transfer over links */
+  double share[2]; /**< volume and breath of each lung relative to healthy; 1 unless collapsed */
 } supine_model;
 
 /** Return the model of healthy lungs of uniform stiffness under a law. */
@@ -61,8 +60,8 @@ extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
 
 /** Set up the equilibrium of lungs with the model's stiffness, lesions and reach.
  * @param lungs        must outlive the equilibrium
- * @param equilibrium  NULL: replaced by a new equilibrium, which the caller destroys. Otherwise an
- *                     equilibrium of the same lungs, updated for moved vertices
+ * @param equilibrium  points to NULL, replaced by a new equilibrium, which the caller destroys; or
+ *                     to an equilibrium of the same lungs, which is updated for moved vertices
  * @retval SUPINE_ERROR_ARGUMENT  softening without a reach: the paper's transfer depends on the
  *                                stiffness, so it would change with gravity
  * Other statuses as supine_physics_equilibrium_create and supine_physics_equilibrium_set_stiffness

@@ -5,17 +5,17 @@
 
 #include "precompute/physics/equilibrium.h"
 
-/* Nodes 0 to N - 1 are the masses, node N + e is the spring of edge e. */
+/* State of the iteration. Nodes 0 to N - 1 are the masses; node N + e is the spring of edge e. */
 typedef struct iteration {
   size_t node_count;
   size_t *clique_begin; /* [nodes + 2] index in `clique` of the first neighbour of a node */
   size_t *clique;       /* neighbours of each node, without itself */
-  double *te;           /* Te[j->i] of each neighbour in `clique` */
+  double *te;           /* Te[j->i] from each node j to each neighbour i, as ordered in `clique` */
   double *te_self;      /* [nodes] Te[j->j] */
-  double *pitcher;      /* [nodes] may be negative */
-  double *catcher;      /* [nodes] */
-  size_t *largest;      /* [2 nodes] tree of nodes: leaf nodes + j is node j, and entry k the one of
-                           its children 2 k and 2 k + 1 with the larger |pitcher|; 1 is the root */
+  double *pitcher;      /* [nodes] force still to be distributed; may be negative */
+  double *catcher;      /* [nodes] force kept so far */
+  size_t *largest; /* [2 nodes] tree: entry nodes + j is node j; every other entry k is the node
+                      of entries 2 k and 2 k + 1 with the larger |pitcher|; 1 is the root */
 } iteration;
 
 static void iteration_free(iteration *it) {
@@ -28,7 +28,7 @@ static void iteration_free(iteration *it) {
   free(it->largest);
 }
 
-/* Find the node with the largest Pitcher again, after that of `node` has changed. */
+/* Update the tree after the Pitcher of `node` has changed. */
 static void update(iteration *it, size_t node) {
   for (size_t k = (it->node_count + node) / 2; k > 0; k /= 2) {
     const size_t a = it->largest[2 * k];
@@ -54,7 +54,7 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
       it->pitcher == NULL || it->catcher == NULL || it->largest == NULL) {
     return false;
   }
-  /* Offset by one: filling advances each entry to the beginning of the next node. */
+  /* Offset by one entry: filling the cliques advances each entry to the next node's beginning. */
   size_t *begin = it->clique_begin + 1;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];
@@ -104,8 +104,7 @@ static void distribute(iteration *it, size_t j) {
   }
 }
 
-/* Nine parameters and over 50 lines: the paper's algorithm with the paper's quantities, step by
- * step. */
+/* This function has nine parameters, the quantities of the paper's algorithm. */
 supine_status
 supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *topology,
                                const double *stiffness, const double *force, double tolerance,

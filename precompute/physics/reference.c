@@ -25,15 +25,15 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
   const supine_volume_kind kind = read.state.volume.kind;
   if (read.state.lung_count > 0 || (kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s' is not the state of a scan: give full or POSTURE:rest, also with "
-                            "+ML or -ML for both lungs together, or none",
+                            "'%s' is not the state of a scan: give full or POSTURE:rest, each "
+                            "optionally with +ML or -ML for both lungs together, or none",
                             text);
   }
   *scan = read;
   return SUPINE_OK;
 }
 
-/* Compute the volume of a lung at t from its volumes at rest and at full inflation (resting.h). */
+/* Compute a lung's volume at t (resting.h) from its volumes at rest and at full inflation. */
 static double volume_at(double rest, double full, double t) {
   return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
 }
@@ -70,9 +70,9 @@ void supine_reference_share_out(const supine_reference *reference, const double 
   }
 }
 
-/* Find the reference volumes F of lungs that hold `volume` [lung_count] mL in the scan. Bisect t of
- * resting.h, which gives F, until the scan is as many mL from rest, or from full inflation, as its
- * state says. */
+/* Find the reference volume F of each lung from the volumes in the scan, volume [lung_count], mL.
+ * Each t of resting.h gives an F; bisect t until the scan differs from rest, or from full
+ * inflation, by as many mL as its state says. */
 static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
   const supine_state *state = &found->scan.state;
   const bool from_rest = state->volume.kind == SUPINE_VOLUME_REST;
@@ -81,7 +81,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   double high = 1.0;
   double t = from_rest ? 0.0 : 1.0;
   for (int halving = 0; halving < 60; ++halving) {
-    double beyond = 0.0; /* volume of the scan beyond rest, or full inflation, at this t, mL */
+    double beyond = 0.0; /* volume of the scan above rest or full inflation at this t, mL */
     for (size_t lung = 0; lung < found->lung_count; ++lung) {
       const double rest =
           supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);

@@ -9,26 +9,26 @@
 
 #include "precompute/physics/resting.h"
 
-/* Shares of healthy people: gas and tissue, relative to gas and tissue at full inflation, supine.
+/* Volumes at rest of healthy people, gas and tissue, as shares of the volume at full inflation.
  * Sources, for both lungs together:
  *
- *   supine   functional residual capacity 3.39 L of 7.21 L upright (GLI 2021, Hall et al., Eur
- *            Respir J 57: 2000289, man of 45 years and 1.78 m), 0.86 L of tissue (Denison 1986,
- *            Thorax 41:620, n 12), less 0.806 L (SD 0.293; Lumb & Nimmo 1991, Anesth Analg 73:422,
- *            n 13): 0.43
- *   prone, on either side  0.35 L above supine (Lumb & Nimmo; one figure for all three): 0.47
- *   upright  15 % above supine (Yamada 2020, Sci Rep 10, n 100: 3.2 L seated, 2.7 L supine)
- *   head down  as supine: no volume in litres was found; end-expiratory volume follows the sine of
- *            a tilt feet down and is at or near its minimum when horizontal ("Effects of body
- *            tilting on respiratory mechanics", J Appl Physiol 1956)
+ *   supine     0.43 = (3.39 - 0.806 + 0.86) / (7.21 + 0.86): functional residual and total lung
+ *              capacity upright, 3.39 L and 7.21 L (GLI 2021, Hall et al., Eur Respir J 57, man
+ *              of 45 years, 1.78 m); decrease to supine 0.806 L (SD 0.293; Lumb & Nimmo 1991,
+ *              Anesth Analg 73:422, n 13); tissue 0.86 L (Denison 1986, Thorax 41:620, n 12)
+ *   prone, on either side   0.47, 0.35 L above supine (Lumb & Nimmo; one figure for all three)
+ *   upright    15 % above supine (Yamada 2020, Sci Rep 10, n 100: 3.2 L seated, 2.7 L supine)
+ *   head down  as supine, because no volume in litres was found; with the feet down, end-expiratory
+ *              volume follows the sine of the tilt and is at or near its minimum when horizontal
+ *              ("Effects of body tilting on respiratory mechanics", J Appl Physiol 1956)
  *
- * The shares of each lung have the proportions tabulated after Svanberg 1957. The left lung's 0.563
- * when lying on the right follows from the lower lung's part of a breath in that posture; no other
- * source for it was found. */
+ * The ratio of the left to the right lung's share is taken from a table after Svanberg 1957, except
+ * for the left lung's 0.563 when lying on the right, for which no source was found: it follows from
+ * the lower lung's share of a breath in that posture. */
 static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
                                                {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
 
-static const double least_share = 0.1; /* share of the tissue without gas */
+static const double least_share = 0.1; /* share of the tissue alone */
 static const double most_share = 1.0;
 
 supine_resting supine_reference_resting_default(void) {
@@ -39,8 +39,8 @@ static bool is_share(double share) {
   return share > least_share && share <= most_share;
 }
 
-/* Read "0.43", "0.42/0.44" or "2600mL" for the axis; return false if the text is none of them or
- * out of range. */
+/* Read the volume at rest for an axis, "0.43", "0.42/0.44" or "2600mL". Return false if the text
+ * has another form or is out of range. */
 static bool read_value(supine_resting *resting, size_t axis, const char *text) {
   char *end = NULL;
   const double first = strtod(text, &end);
@@ -105,7 +105,7 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error) {
-  double sum = 0.0; /* of the ratios of given to default volume */
+  double sum = 0.0; /* sum of the ratios of given to default volume */
   size_t known = 0;
   for (size_t axis = 0; axis < 6; ++axis) {
     double rest = 0.0;
@@ -119,7 +119,7 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
       resting->share[k][axis] *= factor;
       if (!is_share(resting->share[k][axis])) {
         return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "lungs whose full volume is %.0f mL do not hold %.0f mL at rest, "
+                                "lungs with a full volume of %.0f mL do not hold %.0f mL at rest, "
                                 "%s: change --resting or --scanned",
                                 full[0] + (count > 1 ? full[1] : 0.0), resting->ml[axis],
                                 names[axis]);
@@ -135,7 +135,7 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
       if (!is_share(*share)) {
         return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "--resting scales the volume at rest, %s, to less than the tissue: "
-                                "give this volume too",
+                                "give --resting for this posture too",
                                 names[axis]);
       }
     }
@@ -168,13 +168,13 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
   return value;
 }
 
-/* With the even parts e and their mean m, the sum of e_k g_k^2 is
+/* With e_k = (v(+k) + v(-k)) / 2, their mean m and g = (x, y, z), the sum of e_k g_k^2 is
  *
  *     m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) / 2 (x^2 - y^2)
  *
- * Each term is divided by the factor that its harmonic Y has. */
+ * Each coefficient is divided by the factor of the polynomial in its harmonic. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]) {
-  static const size_t axis_term[3] = {3, 1, 2}; /* index of the harmonics x, y, z of band 1 */
+  static const size_t axis_term[3] = {3, 1, 2}; /* harmonics of band 1 along x, y and z */
   double even[3];
   for (size_t t = 0; t < 9; ++t) {
     harmonics[t] = 0.0;

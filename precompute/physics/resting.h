@@ -2,13 +2,13 @@
 /** @file
  * Compute volumes at rest and at full inflation, by posture and by lung.
  *
- * At rest lung l holds the share r_l(g) of its reference volume F_l, tissue included. At full
- * inflation it holds phi(g) F_l, phi(g) = 1 + 0.109 max(0, -g_z)^2, which is larger upright.
+ * At rest, lung l holds the share r_l(g) of its reference volume F_l, tissue included. At full
+ * inflation it holds phi(g) F_l with phi(g) = 1 + 0.109 max(0, -g_z)^2, which is larger upright.
  * Between these volumes, each lung fills linearly (Milic-Emili, J Appl Physiol 1966), with one t
- * for both:
+ * for both lungs:
  *
- *     V_l = F_l [r_l + (phi - r_l) t]      t >= 0: 0 at rest, 1 at full inflation
- *     V_l = F_l r_l (1 + t)                t < 0: both shrink in proportion */
+ *     V_l = F_l [r_l + (phi - r_l) t]      for t >= 0; t is 0 at rest and 1 at full inflation
+ *     V_l = F_l r_l (1 + t)                for t < 0; both lungs shrink in proportion */
 #ifndef SUPINE_RESTING_H
 #define SUPINE_RESTING_H
 
@@ -17,18 +17,18 @@
 
 #include <supine/status.h>
 
-/** Increase of the volume at full inflation from supine to upright, as a share: mean of both lungs
- * of 32 people; left lung 0.116, right lung 0.103 (Yamada et al., Respiration 99:598, 2020). */
+/** Relative increase of the volume at full inflation from supine to upright, both lungs, mean of 32
+ * people; left lung 0.116, right lung 0.103 (Yamada et al., Respiration 99:598, 2020). */
 #define SUPINE_FULL_UPRIGHT_GAIN 0.109
 
-/** Usual share of both lungs' full volume that is in the left lung. */
+/** Usual share of the left lung in the full volume of both lungs. */
 #define SUPINE_LEFT_SHARE 0.45
 
 /** Volumes at rest with gravity along +x, -x, +y, -y, +z, -z: lying on the left, on the right,
  * supine, prone, head down, upright. */
 typedef struct supine_resting {
-  double share[2][6]; /**< r of the left and the right lung */
-  double ml[6];       /**< volume of both lungs together, mL, if given in mL; 0: by share */
+  double share[2][6]; /**< share r of the left and the right lung */
+  double ml[6];       /**< volume of both lungs together, mL; 0: given as a share */
 } supine_resting;
 
 /** Return the default shares, for healthy people; resting.c names their sources. */
@@ -54,22 +54,22 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
                                               const int *side, const double *full,
                                               supine_error *error);
 
-/** Compute r of one lung with gravity along the unit vector g.
+/** Compute r, the share of F that one lung holds at rest, with gravity along the unit vector g.
  * @param side  +1: left lung, -1: right lung */
 double supine_reference_resting_share(const supine_resting *resting, int side, const double g[3]);
 
-/** Compute phi with gravity along the unit vector g. */
+/** Compute phi, the share of F held at full inflation, with gravity along the unit vector g. */
 double supine_reference_full_share(const double g[3]);
 
-/** Compute r of both lungs together, if the left lung has SUPINE_LEFT_SHARE of F. */
+/** Compute r of both lungs together, with SUPINE_LEFT_SHARE of their F in the left lung. */
 double supine_reference_resting_total(const supine_resting *resting, const double g[3]);
 
-/** Interpolate values given along the axes +x, -x, +y, -y, +z, -z at unit gravity g:
+/** Interpolate the values v along the axes +x, -x, +y, -y, +z, -z at the unit vector g:
  *
  *     sum over k of (v(+k) - v(-k)) / 2 g_k + (v(+k) + v(-k)) / 2 g_k^2 */
 double supine_reference_along_axes(const double values[6], const double g[3]);
 
-/** Compute the coefficients [9] of that function in the real harmonics of bands 0 to 2 (sh.h). */
+/** Expand supine_reference_along_axes in the real harmonics [9] of bands 0 to 2 (sh.h). */
 void supine_reference_harmonics(const double values[6], double harmonics[9]);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Solve the full physics for one orientation, the reference for every basis. */
+ * Solve the full physics for one direction of gravity, without a basis. */
 #ifndef SUPINE_SOLVE_H
 #define SUPINE_SOLVE_H
 
@@ -9,13 +9,13 @@
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
 
-/** Solution for one orientation, without harmonics: displacements u_i = s F_i d_i at scale s. */
+/** Solution for one direction of gravity: displacements u_i = s F_i d_i at scale s. */
 typedef struct supine_solution {
   size_t vertex_count;
-  supine_equilibrium *equilibrium; /**< kept for another solve of the same lungs */
-  double *catch_;                  /**< [N] F */
-  double *directions;              /**< [N, 3] d, mm; for collapsed lungs by
-                                      supine_tissue_rest_directions */
+  supine_equilibrium *equilibrium; /**< kept for the next solve of the same lungs */
+  double *catch_;                  /**< [N] the catch F */
+  double *directions;              /**< [N, 3] d, mm; for collapsed lungs scaled by
+                                      supine_tissue_collapse_directions */
   double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
   supine_volume_form form[2]; /**< volume that each lung gains as a form of its three gains, mL */
 } supine_solution;
@@ -33,9 +33,9 @@ void supine_physics_solution_free(supine_solution *solution);
 /** Find the largest displacement at scale 1, |F_i d_i|, mm. */
 double supine_physics_solution_largest(const supine_solution *solution);
 
-/** Compute positions [N, 3], p + s F d, mm.
+/** Compute positions [N, 3] p + s F d, mm.
  * @param reference  p: the lungs' mesh; for collapsed lungs the surface of supine_tissue_collapse
- */
+ * @param scale      s */
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *reference,
                                    double scale, double *positions);
 

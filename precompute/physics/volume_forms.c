@@ -10,11 +10,11 @@
 #include "sh/base/vec3.h"
 
 /* The triangles of each lung are summed in PARTS parts, BLOCK triangles at a time. The number of
- * parts is fixed, so that the sum does not depend on the number of threads. FORM: number of terms
- * of a supine_volume_form. */
+ * parts is fixed, so that the sums do not depend on the number of threads. FORM: number of terms of
+ * a supine_volume_form. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double sixth_ml = 1e-3 / 6.0; /* mL in a tetrahedron whose determinant is 1 mm^3 */
+static const double sixth_ml = 1e-3 / 6.0; /* tetrahedron: mL per mm^3 of its determinant */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
@@ -23,14 +23,14 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   *forms = (supine_volume_forms){0};
 }
 
-/* Sums over the triangles of one lung. */
+/* Inputs and sums of one lung. */
 typedef struct lung_work {
   const supine_lungs *lungs;
-  const double *directions; /* [N, 3]; NULL: columns are vectors */
-  const double *columns;    /* [N, K]; without directions [N, 3, K] */
-  size_t count;             /* K */
+  const double *directions; /* [N, 3] d, mm; NULL: the columns are vectors */
+  const double *columns;    /* [N, count]; without directions [N, 3, count] */
+  size_t count;             /* number of columns */
   size_t lung;
-  double centre[3]; /* centre of the lungs' box, mm, origin of the corners */
+  double centre[3]; /* centre of the lungs' box, mm, subtracted from vertices */
   double *sums;     /* [PARTS, size] */
   size_t size;      /* number of sums of one part */
   double *space;    /* [threads, room] work space */
@@ -47,7 +47,7 @@ static lung_work begin_lung(const supine_lungs *lungs, const double *directions,
   return work;
 }
 
-/* Read a triangle's corners, mm from the centre; return their indices. */
+/* Read a triangle's corners, mm from the centre of the box. Return their vertex indices. */
 static const uint32_t *read_corners(const lung_work *work, size_t triangle, double p[3][3]) {
   const uint32_t *corner = work->lungs->mesh.triangles + 3 * triangle;
   for (size_t v = 0; v < 3; ++v) {
@@ -66,12 +66,12 @@ static size_t part_begin(const lung_work *work, size_t part) {
 
 /* --- forms of columns ------------------------------------------------------------------------ */
 
-/* Return the index of the product of columns k and l in a list without duplicates. */
+/* Return the index of the product of columns k and l among the distinct products. */
 static size_t pair_of(size_t k, size_t l) {
   return k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
 }
 
-/* Compute pairs += factor (a_k b_l + a_l b_k) for k >= l. */
+/* Add factor (a_k b_l + a_l b_k) to pairs [count (count + 1) / 2] for all k >= l. */
 static void add_pairs(size_t count, double factor, const double *a, const double *b,
                       double *pairs) {
   for (size_t k = 0; k < count; ++k) {
@@ -83,8 +83,9 @@ static void add_pairs(size_t count, double factor, const double *a, const double
   }
 }
 
-/* Add the cubic terms of a block: det(u0, u1, u2), symmetric in the first two columns. With
- * directions it is det(d0, d1, d2) c0 c1 c2. */
+/* Add the cubic terms of n triangles to sums [pairs, count]: det(u0, u1, u2) of the displacements
+ * of their corners, made symmetric in the columns of the first two. With directions d and columns c
+ * the determinant is det(d0, d1, d2) c0 c1 c2. x: work space. */
 SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
                                     double *x, double *sums) {
   const size_t count = work->count;
@@ -117,9 +118,10 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
   }
 }
 
-/* Add the terms of det(p0 + u0, p1 + u1, p2 + u2) of up to BLOCK triangles to separate sums for
- * each power of u and each axis: linear terms by the axis of u, quadratic terms by the axis of p.
- * The rows of u, area and at are the n first corners, then the n second, then the n third. */
+/* Add the terms of det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK, with corners p and
+ * their displacements u, to separate sums for each power of u and each axis: linear terms by the
+ * axis of u, quadratic terms by the axis of p. The rows of u, area and at are the first corners of
+ * the n triangles, then the second, then the third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;

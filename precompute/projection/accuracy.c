@@ -17,10 +17,10 @@
 #include "precompute/projection/tally.h"
 
 /* BLOCK: vertices in a block. PARTS: parts into which sums are divided, a fixed number, so that
- * sums do not depend on the number of threads. VOLUME_HALVINGS: most halvings of a volume. */
+ * sums do not depend on the number of threads. VOLUME_HALVINGS: limit of halvings of a volume. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
-/* Sums over one of the PARTS. */
+/* Sums over one of the PARTS of the vertices. */
 typedef struct tally {
   double field2;         /* sum of the squared displacements at gain 1, mm^2 */
   supine_tally error;    /* errors at gain 1, mm */
@@ -37,7 +37,7 @@ typedef struct accuracy_work {
   double *space;        /* [threads, BLOCK, K + 2 D] work space */
 } accuracy_work;
 
-/* Compute the errors out [n], mm: the differences of displacements |a is - b should| length. */
+/* Compute errors of displacements, mm: out [n] = |a is - b should| length. */
 SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {

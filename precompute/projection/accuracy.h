@@ -22,18 +22,18 @@ typedef struct supine_accuracy {
   double rms_mm, p95_mm, max_mm; /**< errors at equal volumes */
 } supine_accuracy;
 
-/** The full solve at D held-out directions, which no grid used: columns x functions^T, as exact as
- * the projection's span. */
+/** The full solve at D held-out directions, which no grid used: the fields columns x functions^T,
+ * exact up to the tolerance of the projection's span. */
 typedef struct supine_truth {
   size_t direction_count;
   double *directions; /**< [D, 3] unit vectors */
   size_t rank;
   const double *columns; /**< [N, rank] owned by the projection */
   double *functions;     /**< [D, rank] weights of the columns */
-  double *cubic;         /**< [D, 3] volume, mL, in powers 1 to 3 of the gain; NULL: open surface */
+  double *cubic;         /**< [D, 3] volume, mL, as a cubic of the gain; NULL: open surface */
 } supine_truth;
 
-/** Find the full solve at `count` held-out directions. The projection must outlive it.
+/** Find the full solve at `count` held-out directions. The projection must outlive `truth`.
  * @param directions  [N, 3] directions of displacement, mm
  * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
@@ -61,9 +61,9 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       supine_error *error);
 
 /** Find the share, 0 to 1, of the triangles whose normal turns by more than a right angle from the
- * reference surface to a volume: the largest share in the six postures with gravity along an axis,
- * without those in which the field cannot reach the volume. Up to 50,000 evenly chosen triangles
- * are examined. Above a few in a thousand the surface looks torn.
+ * reference surface to a volume. The share is the largest in the six postures with gravity along an
+ * axis; a posture in which the field cannot reach the volume is left out. Up to 50,000 evenly
+ * chosen triangles are examined. Above a few in a thousand the surface looks torn.
  * @param directions  [N, 3] directions of displacement, mm
  * @param forms       volume forms of the compression; the surface must be closed
  * @param volume      [9] harmonics of the state's volume, mL beyond the reference surface

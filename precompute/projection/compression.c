@@ -98,7 +98,7 @@ void supine_projection_compression_truncate(supine_compression *compression, siz
   if (count < width) {
     keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
     keep_columns(compression->mix, rank, width, count, sizeof(double));
-    compression->mode_count = count; /* each mode is a row, so the first ones are in place */
+    compression->mode_count = count; /* each mode is a row, so the first modes stay in place */
   }
 }
 

@@ -69,11 +69,11 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
   return status;
 }
 
-/* Find the squares [R] of the singular values of C = sqrt(W) columns x functions, its leading right
- * singular vectors, modes [count, P], and the sum of all squares. These are also those of A = H
- * functions with H^T H = columns^T W columns, because C^T C = A^T A. As A has only R rows, the R x
- * R matrix A A^T gives them: its eigenvalues sigma_k^2 and eigenvectors U_k. gram [R, R], columns^T
- * W columns, is overwritten. */
+/* Find the squares [R] of the singular values of C = sqrt(W) columns x functions, their sum, and
+ * the leading right singular vectors, modes [count, (band + 1)^2]. These are the same for
+ * A = H functions if H^T H = columns^T W columns, because then C^T C = A^T A. As A has only R rows,
+ * the eigenvalues sigma_k^2 and eigenvectors U_k of the R x R matrix A A^T give them. gram [R, R],
+ * which is columns^T W columns, is overwritten. */
 static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = projection->rank;

@@ -21,7 +21,7 @@ void supine_projection_free(supine_projection *projection) {
 
 /* --- functions of gravity -------------------------------------------------------------------- */
 
-/* Directions of the grid [count, 3], and the lungs' least and largest g.p along each, mm. */
+/* Directions g of the grid [count, 3], and the least and largest g.p of vertices p, mm. */
 typedef struct grid_heights {
   double *directions, *minimum, *maximum;
 } grid_heights;
@@ -45,7 +45,7 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Find the harmonics of the span's weights, functions [R, (band + 1)^2]. */
+/* Expand the span's weights, as functions of gravity, in harmonics: functions [R, (band + 1)^2]. */
 static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                                const supine_span *span, double *functions, supine_error *error) {
   const size_t least = LATITUDES_PER_BAND * (band + 1);
@@ -89,7 +89,7 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
 
 /* --- columns --------------------------------------------------------------------------------- */
 
-/* Solve for the span's directions into columns [N, R]. */
+/* Solve for each direction of the span, into columns [N, R]. */
 static supine_status solve(const supine_lungs *lungs, const supine_model *model,
                            supine_projection *made, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;

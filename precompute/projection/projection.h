@@ -49,7 +49,7 @@ typedef struct supine_compression {
 
 void supine_projection_compression_free(supine_compression *compression);
 
-/** Use the harmonics themselves as modes: K = (band + 1)^2, the paper's form.
+/** Use the harmonics themselves as modes, as the paper does: K = (band + 1)^2.
  * @retval SUPINE_ERROR_ARGUMENT  more than SUPINE_MODES_MADE_MAX harmonics
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_projection_compress_harmonics(const supine_projection *projection,

@@ -41,7 +41,7 @@ static size_t largest_of(const double *force, size_t count) {
   return at;
 }
 
-/* Invert the matrix f_j(g_r) in place. */
+/* Invert the matrix of the forces f_j(g_r) (span.h) in place. */
 static supine_status invert(double *matrix, size_t rank) {
   lapack_int pivots[SUPINE_SPAN_MAX];
   const lapack_int n = (lapack_int)rank;

@@ -17,7 +17,8 @@
 
 #include <jansson.h>
 
-/** A file that supine_embed puts into the program. The last element of an array has name NULL. */
+/** A file that the CMake function supine_embed puts into the program. The last element of an array
+ * has name NULL. */
 typedef struct supine_asset {
   const char *name;  /**< name of the file, for example "page.css" */
   const char *bytes; /**< content, followed by a zero that `size` does not count */

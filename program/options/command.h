@@ -67,8 +67,7 @@ bool supine_options_parse_numbers(const char *text, size_t count, double *values
 /* Return the candidate with the fewest edits from `text`, or NULL where all differ too much. */
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
 
-/* Progress with the remaining time, in one line of stderr where that is a terminal. step is a
- * supine_progress_function; it returns false after an interruption. */
+/* Progress with the remaining time, in one line of stderr where that is a terminal. */
 typedef struct supine_progress {
   const char *label;
   double start;  /* when the work began, s of supine_clock_seconds */
