@@ -287,7 +287,7 @@ TEST(test_mesh_bad_input_named_and_no_file_left) {
   write_text("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
   EXPECT(2, "points.obj", "solve points.obj --posture prone -o f.ply");
   EXPECT(2, ".", "precompute . -o f.safetensors");
-  EXPECT(1, "which surface", "precompute -o f.safetensors");
+  EXPECT(1, "name one or more mesh files", "precompute -o f.safetensors");
   EXPECT(1, "--units takes", "precompute lungs.ply --units parsec -o f.safetensors");
   EXPECT(1, "--axes takes", "precompute lungs.ply --axes XYZ -o f.safetensors");
   assert_int_equal(count_files("f."), 0);

@@ -17,7 +17,7 @@ supine_status supine_options_basis_closed(const supine_basis *basis, const char 
   return supine_basis_get_info(basis)->has_volume
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                                "%s: its surface is open and encloses no volume: close the mesh "
+                                "%s: the surface is open and encloses no volume: close the mesh "
                                 "before 'supine precompute'",
                                 path);
 }
@@ -45,7 +45,7 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
   return SUPINE_OK;
 }
 
-/* Convert [N, 3] to doubles; NULL: no memory. */
+/* Convert positions [N, 3] to doubles; return NULL if out of memory. */
 static double *to_doubles(const supine_basis *basis, const float *xyz) {
   const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
   double *converted = malloc(count * sizeof *converted);

@@ -12,30 +12,30 @@
 
 #include "program/options/command.h"
 
-/* --as-scanned, into a bool: write outputs in the axes and units of the scan. */
+/* Table of --as-scanned, which sets a bool: write outputs in the axes and units of the scan. */
 extern const supine_option supine_options_as_scanned[];
 
-/* Open a basis without its stored normals: commands compute normals from the triangles. Close it also
- * after a failure.
- * @retval SUPINE_ERROR_OPEN_SURFACE  its surface encloses no volume
- * @retval those of supine_basis_open_with */
+/* Open a basis without its stored normals, as commands compute normals from the triangles. Close
+ * the basis also after a failure.
+ * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume
+ * @retval any status of supine_basis_open_with */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
-/* Check that the surface of the basis in file `path` encloses a volume.
+/* Check that the surface of a basis, read from the file `path`, encloses a volume.
  * @retval SUPINE_ERROR_OPEN_SURFACE */
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
                                           supine_error *error);
 
-/* Set the axes and unit of `save` to those of the scan where `wanted`.
+/* If `wanted`, set the axes and unit of `save` to those of the scan.
  * @retval SUPINE_ERROR_FORMAT  the basis does not state them */
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
 
-/* Compute the positions of a pose as doubles [N, 3], which the caller frees; NULL: no memory. */
+/* Return the positions [N, 3] of a pose, which the caller frees; NULL if out of memory. */
 double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose);
 
-/* Copy the reference surface into a mesh; release it with supine_mesh_free.
+/* Copy the reference surface into a mesh; release the mesh with supine_mesh_free.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh);
 
@@ -45,22 +45,22 @@ supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *
   "It was measured on full breaths in one posture; for a change of posture it is an "              \
   "extrapolation."
 
-/* Expected errors. Zero-initialise, and release with supine_options_expected_free. */
+/* Expected errors. Initialise with zeros, and release with supine_options_expected_free. */
 typedef struct supine_expected {
-  float *sigma;        /* [N] mm; NULL: unknown */
+  float *sigma;        /* [N] expected error of each vertex, mm; NULL: unknown */
   double rms, largest; /* RMS and maximum over the vertices, mm */
   bool turned;         /* the two states differ in posture */
 } supine_expected;
 
-/* Compute the expected errors of a displacement from one state to another. They are unknown for
- * fields of another simulator and for open surfaces: `expected` is unchanged.
- * @retval those of supine_basis_pose, SUPINE_ERROR_MEMORY */
+/* Compute the expected errors of the displacements from one state to another. For fields of another
+ * simulator and for open surfaces they are unknown, and `expected` keeps its value.
+ * @retval SUPINE_ERROR_MEMORY, or any status of supine_basis_pose */
 supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
                                            const supine_state *from, supine_expected *expected,
                                            supine_error *error);
 void supine_options_expected_free(supine_expected *expected);
 
-/* Print the RMS and maximum of the errors in one line, or nothing where they are unknown. */
+/* Print the RMS and maximum of the errors in one line, or nothing if they are unknown. */
 void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute gravity during a turn of the body, and the state of a breath. */
+/* Compute gravity while the body turns, and the state of the lungs at a volume of a breath. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "program/options/breath_turn.h"
 #include "program/options/state_options.h"
 
-/* Compute the direction 90 degrees from `from`, towards `to`. */
+/* Compute the direction at 90 degrees from `from`, towards `to`. */
 static void find_quarter(const breath_turn *turn, double quarter[3]) {
   static const double left[3] = {1.0, 0.0, 0.0};
   static const double back[3] = {0.0, 1.0, 0.0};
@@ -17,10 +17,10 @@ static void find_quarter(const breath_turn *turn, double quarter[3]) {
   double axis[3];
   supine_cross(from, turn->to, axis);
   const double sine = supine_length(axis);
-  if (sine < 1e-9) { /* opposite */
+  if (sine < 1e-9) { /* opposite directions leave the axis open */
     const double *over = fabs(from[2]) > 0.5 ? back : left;
     supine_cross(from, over, axis);
-    if (supine_dot(axis, axis) < 1e-9) { /* from one side to the other: over the back */
+    if (supine_dot(axis, axis) < 1e-9) { /* a turn from one side to the other */
       supine_cross(from, back, axis);
     }
   }

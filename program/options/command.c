@@ -109,7 +109,7 @@ bool supine_options_parse_count(const char *text, size_t *value) {
 
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
-  size_t fewest = 1 + strlen(text) / 2; /* distance beyond which a word is not suggested */
+  size_t fewest = 1 + strlen(text) / 2; /* edits allowed; then the fewest found */
   for (size_t i = 0; i < count; ++i) {
     const size_t edits = supine_words_distance(text, candidates[i]);
     if (edits < fewest || (edits == fewest && best == NULL)) {
@@ -120,12 +120,12 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
   return best;
 }
 
-/* orderly: 1 if the command stops by itself after a signal; interrupted: 1 after a signal. */
+/* orderly: 1 if the command stops by itself after a signal; interrupted: 1 once it must stop. */
 static volatile sig_atomic_t orderly, interrupted;
-static volatile time_t interrupted_at; /* when it was received, s since 1970 */
+static volatile time_t interrupted_at; /* time of the first signal, s since 1970 */
 
-/* Ask the command to stop where it does so by itself; else end the program. A further signal ends
- * the program at once, but not within a second of the first: timeout(1) sends each signal twice. */
+/* Ask the command to stop, if it can stop by itself; else end the program. A later signal ends the
+ * program too, except within a second of the first, as timeout(1) sends each signal twice. */
 static void on_signal(int number) {
   const time_t now = time(NULL);
   if (orderly != 0 && interrupted == 0) {
@@ -137,7 +137,7 @@ static void on_signal(int number) {
   }
   supine_output_abandon_all();
   (void)signal(number, SIG_DFL);
-  (void)raise(number); /* ends the program when this handler returns */
+  (void)raise(number); /* takes effect when this handler returns */
 }
 
 void supine_options_signals_catch(bool orderly_end) {
@@ -149,7 +149,7 @@ void supine_options_signals_catch(bool orderly_end) {
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     (void)sigaction(numbers[i], &action, NULL);
   }
-  (void)signal(SIGXFSZ, SIG_IGN); /* a file that grows too large is an error of the write */
+  (void)signal(SIGXFSZ, SIG_IGN); /* a write beyond the size limit then fails */
 }
 
 bool supine_options_interrupted(void) {

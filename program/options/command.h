@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Shared by commands: exit codes, messages, numbers, suggestions, progress, signals. */
+/* Exit codes, messages, numbers, suggestions, progress and signals, shared by the commands. */
 #ifndef SUPINE_COMMAND_H
 #define SUPINE_COMMAND_H
 
@@ -13,7 +13,6 @@
 
 #include "program/options/option.h"
 
-/* Exit codes of the program. */
 enum {
   SUPINE_EXIT_OK = 0,
   SUPINE_EXIT_USAGE = 1,
@@ -23,51 +22,50 @@ enum {
   SUPINE_EXIT_NUMERICAL = 5
 };
 
-/* The commands, in the order of the program's help. */
 extern const supine_command supine_command_phantom, supine_command_precompute, supine_command_info,
     supine_command_deform, supine_command_compare, supine_command_render, supine_command_breathe,
     supine_command_export, supine_command_solve, supine_command_pv, supine_command_stream,
     supine_command_fit, supine_command_validate, supine_command_embed, supine_command_locate;
 
-/* All commands, ended by NULL. */
+/* All commands, in the order of the program's help, ended by NULL. */
 extern const supine_command *const supine_command_list[];
 
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
-/* Print the error's message, or if it is empty the status in words; return the exit code. */
+/* Print the message of an error, or if it is empty the status in words; return the exit code. */
 int supine_options_fail(const char *command, supine_status status, const supine_error *error);
 
-/* Flush standard output; return SUPINE_EXIT_OUTPUT where the disk is full or the pipe closed. */
+/* Flush standard output; return SUPINE_EXIT_OUTPUT if the disk is full or the pipe is closed. */
 int supine_options_finish(const char *command);
 
-/* Print an object, or a list of rows, to standard output, and release it: as JSON; or as text, with
- * a line per member and a table per list of rows. A failed output is reported when the command
- * ends. */
+/* Print a JSON object, or a list of objects, to standard output and release it. As text, each
+ * member is a line and each list of objects a table. A failure to write is reported when the
+ * command ends. */
 void supine_options_print(json_t *value, bool json);
 
 /* Return a text from outside, such as a file name, as a JSON string; invalid UTF-8 is replaced. */
 json_t *supine_options_json_text(const char *text);
 
-/* Return numbers as a JSON array; those that are not finite become null. */
+/* Return numbers as a JSON array; numbers that are not finite become null. */
 json_t *supine_options_json_numbers(size_t count, const double *numbers);
 
-/* Write the command line into `text` [size], for the metadata of a file; of each path only the part
- * after its last slash. */
+/* Write the command line into `text` [size], for the metadata of a file; paths are shortened to the
+ * part after the last slash. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
-/* Read a finite number, or a whole number of at least 0, that takes up the whole text; return false
- * for any other text. */
+/* Read a text that is a finite number, or a whole number of at least 0; return false for other
+ * texts. */
 bool supine_options_parse_number(const char *text, double *value);
 bool supine_options_parse_count(const char *text, size_t *value);
 
-/* Read exactly `count` finite numbers separated by commas. */
+/* Read a text of `count` finite numbers, separated by commas; return false for other texts. */
 bool supine_options_parse_numbers(const char *text, size_t count, double *values);
 
-/* Return the candidate with the fewest edits from `text`, or NULL where all differ too much. */
+/* Return the candidate that is the fewest edits away from `text`; NULL if all differ too much. */
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
 
-/* Progress with the remaining time, in one line of stderr where that is a terminal. */
+/* Progress and remaining time, shown in one line of stderr if stderr is a terminal. */
 typedef struct supine_progress {
   const char *label;
   double start;  /* when the work began, s of supine_clock_seconds */
@@ -81,8 +79,8 @@ bool supine_options_progress_step(void *progress, double fraction);
 void supine_options_progress_end(supine_progress *progress);
 
 /* Make SIGINT, SIGTERM and SIGHUP remove unfinished outputs before they end the program. With
- * `orderly_end` the first of them only sets supine_options_interrupted, so that the command can
- * stop by itself. */
+ * `orderly_end`, the first signal only makes supine_options_interrupted return true, so that the
+ * command can stop by itself. */
 void supine_options_signals_catch(bool orderly_end);
 bool supine_options_interrupted(void);
 

@@ -59,7 +59,7 @@ void supine_options_visit(const supine_option *options, size_t base, supine_opti
 typedef struct printing {
   FILE *file;
   bool all;
-  size_t hidden; /* options that --help-all adds */
+  size_t hidden; /* number of options that only --help-all shows */
 } printing;
 
 static void print_row(void *context, const supine_option *option, size_t base) {
@@ -101,8 +101,8 @@ void supine_options_print_help(const supine_command *command, bool all, FILE *fi
   (void)fputc('\n', file);
   supine_options_visit(command->options, 0, print_row, &p);
   if (p.hidden > 0) {
-    (void)fprintf(file, "\nMore: %zu further options, shown by 'supine %s --help-all'.\n", p.hidden,
-                  command->name);
+    (void)fprintf(file, "\nMore: %zu further option%s, shown by 'supine %s --help-all'.\n",
+                  p.hidden, p.hidden == 1 ? "" : "s", command->name);
   }
   if (command->notes != NULL) {
     (void)fputc('\n', file);

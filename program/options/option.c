@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read a command line by the command's table, and run the command. */
+/* Read the command line with the table of a command's options, and run the command. */
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 
 #include "program/options/command.h"
 
-enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* long options are FIRST_LONG + row */
+enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* getopt code of row i: FIRST_LONG + i */
 
 typedef struct row {
   const supine_option *option;
@@ -24,8 +24,8 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
-  char standard[16]; /* replaces the output "-": "-" and its first ending, as "-.ply" */
-  int help;          /* 0, 'h' or HELP_ALL */
+  char standard[16]; /* replaces the output "-": "-" with the first ending, such as "-.ply" */
+  int help;          /* 0: run the command; 'h' or HELP_ALL: print help */
 } reading;
 
 static void collect(void *context, const supine_option *option, size_t base) {
@@ -54,7 +54,7 @@ static supine_status read_choice(const supine_option *option, const char *text, 
   return SUPINE_ERROR_ARGUMENT;
 }
 
-/* Read a value by its kind. Statuses as supine_option_reader. */
+/* Read the value of an option into its field. Statuses as supine_option_reader. */
 static supine_status read_value(const supine_option *option, const char *text, void *field,
                                 supine_error *error) {
   if (option->read != NULL) {
@@ -144,7 +144,7 @@ static supine_status read_given(reading *r, row *target, const char *text, supin
   return read_row(target, text, error);
 }
 
-/* Report an unknown option, or one without its value. */
+/* Report an unknown option, or an option without its value. */
 static supine_status refuse_unknown(const reading *r, int got, const char *given,
                                     supine_error *error) {
   const char *names[ROWS_MAX + 1];
@@ -162,7 +162,7 @@ static supine_status refuse_unknown(const reading *r, int got, const char *given
                           nearest != NULL ? nearest : "", nearest != NULL ? "'?" : "");
 }
 
-/* Read argv into the request, or up to --help. */
+/* Read argv into the request; stop at --help. */
 static supine_status read_options(reading *r, int argc, char **argv, supine_error *error) {
   struct option names[ROWS_MAX + 3] = {{0}};
   char letters[2 * ROWS_MAX + 4] = ":h";
@@ -178,7 +178,7 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
   }
   names[n++] = (struct option){"help", no_argument, NULL, 'h'};
   names[n] = (struct option){"help-all", no_argument, NULL, HELP_ALL};
-  optind = 0; /* begin anew; options and operands in any order */
+  optind = 0; /* restarts getopt_long(), which accepts any order */
   opterr = 0;
   supine_status status = SUPINE_OK;
   for (int got;
@@ -199,7 +199,7 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
   return status;
 }
 
-/* Return whether a name ends in one of ".ply, .obj or .stl", in any case. */
+/* Return whether a file name has one of the endings ".ply, .obj or .stl", in any letter case. */
 static bool has_ending(const char *path, const char *endings) {
   const char *dot = strrchr(path, '.');
   if (dot == NULL || dot == path || dot[-1] == '/') {
@@ -294,7 +294,6 @@ static supine_status check_outputs(const reading *r, const supine_arguments *giv
   return status;
 }
 
-/* Read the command line, then print the help or run the command. */
 static supine_status read_and_run(reading *r, int argc, char **argv, supine_error *error) {
   const supine_command *command = r->command;
   char made_by[512];

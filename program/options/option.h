@@ -32,8 +32,8 @@
 
 /* Kind of a value; SUPINE_FILLS derives it from the type of the field. */
 typedef enum supine_option_kind {
-  SUPINE_OPTION_OWN,     /* read by the option's `read` */
-  SUPINE_OPTION_FLAG,    /* bool: no value; true where given */
+  SUPINE_OPTION_OWN,     /* another type, read by the option's `read` */
+  SUPINE_OPTION_FLAG,    /* bool, without a value: true if the option is given */
   SUPINE_OPTION_NUMBER,  /* double: a finite number within the range */
   SUPINE_OPTION_NUMBERS, /* double[n]: n numbers separated by commas */
   SUPINE_OPTION_COUNT,   /* size_t: a whole number within the range */
@@ -41,43 +41,43 @@ typedef enum supine_option_kind {
   SUPINE_OPTION_CHOICE   /* enum: the index of the word among the choices */
 } supine_option_kind;
 
-/* Role of a file that an option names. Before the command runs, each output is checked to be
- * writable, and not to be an input. */
+/* Role of a file that an option names. Before the command runs, each output is checked: it must be
+ * writable and not be an input. */
 typedef enum supine_option_file {
   SUPINE_FILE_NONE,
   SUPINE_FILE_IN,
   SUPINE_FILE_OUT
 } supine_option_file;
 
-/* Read `text` into `field`, the option's field; for an option without a field, the
- * struct that its table fills.
- * @retval SUPINE_ERROR_ARGUMENT  an invalid text; printed as "--NAME: MESSAGE", or where the reader
- *                                sets no message, as "--NAME takes WANTS, not 'TEXT'" */
+/* Read `text` into `field`, the option's field, or the struct that the table fills if the option
+ * has no field.
+ * @retval SUPINE_ERROR_ARGUMENT  the text is invalid; printed as "--NAME: MESSAGE", or if there is
+ *                                no message, as "--NAME takes WANTS, not 'TEXT'" */
 typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
 static inline supine_status supine_options_fits(bool fits) {
   return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
 }
 
-/* One row: an option, a heading, or another table. The last row is all zero. */
+/* Row of a table: an option, a heading or another table. A row of zeros ends the table. */
 typedef struct supine_option {
   const char *name;     /* long name; NULL: a heading or a table */
   char letter;          /* short name, or 0 */
-  const char *argument; /* name of its value in the help; NULL: it has no value */
-  const char *help;     /* wrapped to the terminal; "\n" begins a line. Without a name: heading */
+  const char *argument; /* name of the value in the help; NULL: no value */
+  const char *help;     /* description, or the heading; "\n" begins a new line */
   supine_option_kind kind;
-  size_t offset, size; /* of the field within its struct, bytes */
-  size_t given;        /* 1 + offset of a bool set where the option was given; 0: none */
+  size_t offset, size; /* offset and size of the field in its struct, bytes */
+  size_t given;        /* 1 + offset of a bool that is set if the option is given; 0: none */
   supine_option_reader *read;
   const char *standard;       /* default, read like a value and shown in the help; NULL: zero */
-  double range[2];            /* range of numbers and counts; both 0: any */
-  bool open;                  /* the ends of the range are excluded */
-  const char *wants;          /* valid values, for messages; NULL: derived from kind and range */
-  const char *const *choices; /* ends with NULL; with `read`, for shell completion only */
-  const char *rivals;         /* name of a group; of its options only one may be given, and once */
+  double range[2];            /* limits of numbers and counts; both 0: no limits */
+  bool open;                  /* the limits themselves are excluded */
+  const char *wants;          /* description of valid values; NULL: derived from kind and range */
+  const char *const *choices; /* valid words, then NULL; with `read`, for shell completion only */
+  const char *rivals;         /* group of options, of which one may be given, and only once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
-  const char *endings;               /* valid endings of a file's name: ".ply, .obj or .stl" */
+  const char *endings;               /* valid endings of the file name: ".ply, .obj or .stl" */
   const struct supine_option *table; /* a shared table, which fills the struct at `offset` */
 } supine_option;
 
@@ -95,7 +95,7 @@ typedef struct supine_option {
 #define SUPINE_SAYS_GIVEN(type, member) .given = (1 + offsetof(type, member))
 #define SUPINE_ABOVE_ZERO .range = {0.0, INFINITY}, .open = true
 
-/* Operands of a command, and its command line. */
+/* Operands of a command, and the command line. */
 typedef struct supine_arguments {
   char **operand; /* [count] in the order given */
   size_t count;
@@ -105,42 +105,41 @@ typedef struct supine_arguments {
 typedef struct supine_command {
   const char *name;
   const char *summary; /* a few words, for the list of commands */
-  const char *usage;   /* what follows "supine NAME "; further lines after "\n" */
-  const char *about;   /* its purpose; wrapped, but lines that begin with a space are kept */
+  const char *usage;   /* text after "supine NAME "; "\n" begins another usage */
+  const char *about;   /* purpose; lines are wrapped unless they begin with a space */
   const supine_option *options;
-  const char *notes; /* below the options, examples last; formatted as `about` */
+  const char *notes; /* text below the options, examples last; wrapped like `about` */
   size_t operands_least, operands_most;
-  const char *operands_missing; /* message for fewer or more operands */
+  const char *operands_missing; /* message if there are fewer or more operands */
   size_t request_size;
   void (*begin)(void *request); /* sets defaults that rows cannot express; NULL: none */
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
 
-/* Operands of commands that read surfaces, and of those that read one basis. */
+/* Operands of commands that read surfaces, and of commands that read one basis. */
 #define SUPINE_SURFACES                                                                            \
-  .operands_least = 1, .operands_most = SIZE_MAX,                                                  \
-  .operands_missing = "which surface? Name one or more mesh files"
+  .operands_least = 1, .operands_most = SIZE_MAX, .operands_missing = "name one or more mesh files"
 #define SUPINE_ONE_BASIS                                                                           \
   .operands_least = 1, .operands_most = 1,                                                         \
   .operands_missing = "name one basis file (made by 'supine precompute')"
 
-/* Read the options into a request and run the command on it; return an exit code. argv[0] is the
+/* Read the options into a request and run the command; return an exit code. argv[0] is the
  * command's name. */
 int supine_options_run(const supine_command *command, int argc, char **argv);
 
-/* Refuse an output that is the same file as an input (SUPINE_ERROR_ARGUMENT). Call it for inputs
- * named in a list file or within an option's value; all others are checked before the command runs.
- */
+/* Return SUPINE_ERROR_ARGUMENT if an output is the same file as an input. Commands call it for
+ * inputs named in a list file or within an option's value; other inputs are checked before they
+ * run. */
 supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 
-/* Call `each` for every row of a table and of the tables in it, in order; `base` is the offset of
- * the row's struct in the request. */
+/* Call `each` for every row of a table and of the tables in it, in order; `base` is the offset in
+ * the request of the struct that the row fills. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);
 
-/* Print the help of a command: every option for --help-all, else those without `more`. */
+/* Print the help of a command, with every option if `all`, else without those that set `more`. */
 void supine_options_print_help(const supine_command *command, bool all, FILE *file);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Print a JSON value as JSON, or as text with a line per member and tables. */
+/* Print a JSON value as JSON, or as text in lines and tables. */
 #include <math.h>
 #include <string.h>
 
@@ -10,9 +10,9 @@
 #include "program/options/command.h"
 
 enum { TEXT_MAX = 4096, COLUMNS_MAX = 16, LABEL_WIDTH = 36, LIST_MAX = 9 };
-static const double zero = 1e-12; /* smaller numbers are rounding errors, printed as 0 */
+static const double zero = 1e-12; /* smaller absolute values are printed as 0 */
 
-/* Write a value, or the first LIST_MAX values of a list, on one line. */
+/* Format a value, or the first LIST_MAX values of a list, as one line. */
 static void write_text(const json_t *value, char text[TEXT_MAX]) {
   size_t i;
   const json_t *item;
@@ -58,7 +58,7 @@ static bool has_objects(const json_t *value) {
   return json_is_object(value) || json_is_object(json_array_get(value, 0));
 }
 
-/* Return whether every member of an object fits on one line. */
+/* Return whether a value is an object of which every member fits on one line. */
 static bool is_row(json_t *object) {
   const char *name;
   json_t *member;
@@ -70,7 +70,7 @@ static bool is_row(json_t *object) {
   return json_is_object(object);
 }
 
-/* Labels of members; `parent` is the member that holds them, NULL: any. */
+/* Labels of members. `parent` is the key of the object with the member; NULL: any object. */
 static const struct {
   const char *parent, *key, *label;
 } labels[] = {{NULL, "additions", "additions per vertex"},
@@ -88,7 +88,7 @@ static const struct {
               {"sphere", "directions", "sampled directions"},
               {NULL, "energy_per_band", "displacement by band, share"},
               {NULL, "error", "compression error"},
-              {"error", "volume_ml", "state of the mm: volume, mL"},
+              {"error", "volume_ml", "errors in mm at volume, mL"},
               {NULL, "error_harmonics", "error by highest band, share"},
               {NULL, "error_modes", "error by number of modes, share"},
               {NULL, "expected_constant_mm", "expected error^2 / displacement, mm"},
@@ -125,7 +125,7 @@ static const struct {
               {NULL, "paper", "Santhanam 2008 found"},
               {NULL, "pressure_cmH2O", "pressure, from and to, cmH2O"},
               {NULL, "reach_mm", "reach of a force, mm"},
-              {NULL, "rest_part", "state of the mm: full 0, rest 1"},
+              {NULL, "rest_part", "errors in mm at (0 full, 1 rest)"},
               {NULL, "resting_shares", "volume at rest, share of full"},
               {NULL, "rms", "RMS"},
               {NULL, "rms_after_mm", "distance after, RMS, mm"},
@@ -151,8 +151,8 @@ static const struct {
               {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
               {NULL, "volume_mL", "volume, from and to, mL"}};
 
-/* Write the label of a member. Without one in the table, write its key with spaces instead of
- * underscores, and a comma before a unit at its end. */
+/* Write the label of a member. If the table has none, write the key with spaces for underscores and
+ * with a comma before the unit. */
 static void write_label(const char *parent, const char *key, char text[TEXT_MAX]) {
   static const char *const units[][2] = {{"_mm", ", mm"},   {"_mm2", ", mm2"},
                                          {"_ml", ", mL"},   {"_percent", ", %"},
@@ -178,12 +178,12 @@ static void write_label(const char *parent, const char *key, char text[TEXT_MAX]
   }
 }
 
-/* Print rows of equal members as a table with a heading. */
+/* Print a list of objects, which have the same keys, as a table with a heading. */
 static void print_table(const json_t *rows) {
   json_t *first = json_array_get(rows, 0);
   size_t width[COLUMNS_MAX] = {0};
   char text[TEXT_MAX];
-  for (int pass = 0; pass < 2; ++pass) { /* measure, then print */
+  for (int pass = 0; pass < 2; ++pass) { /* measure the columns, then print */
     for (size_t i = 0; i <= json_array_size(rows); ++i) {
       const char *name;
       json_t *member;
@@ -199,7 +199,7 @@ static void print_table(const json_t *rows) {
           width[column] = length > width[column] ? length : width[column];
         } else {
           const bool last = column + 1 == json_object_size(first);
-          const int side = json_is_number(member) ? 1 : last ? 0 : -1; /* numbers to the right */
+          const int side = json_is_number(member) ? 1 : last ? 0 : -1; /* align numbers right */
           (void)printf("  %*s", side * (int)width[column], text);
         }
         column += column + 1 < COLUMNS_MAX;
@@ -211,7 +211,7 @@ static void print_table(const json_t *rows) {
 
 static void print_object(const char *parent, json_t *object, int indent);
 
-/* Print a member: one line, a table where its rows are alike, else each of its objects. */
+/* Print a member as one line, as a table if it is a list of rows, or else object by object. */
 static void print_member(const char *parent, const char *name, json_t *value, int indent) {
   char text[TEXT_MAX];
   char heading[TEXT_MAX];
@@ -241,8 +241,8 @@ static void print_member(const char *parent, const char *name, json_t *value, in
   }
 }
 
-/* Print the members of an object, which is the member `parent` of another; members that are all
- * rows, as a table with their labels. */
+/* Print the members of the object with the key `parent`; if all are rows, print one table with
+ * their labels. */
 static void print_object(const char *parent, json_t *object, int indent) {
   const char *name;
   json_t *member;

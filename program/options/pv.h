@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Fit a lung's pressure-volume relation (supine/breath.h) to samples; read its parameters. Everything here is thread-safe. Turn GSL's default error handler off first: it
- * aborts. */
+ * Fit a lung's pressure-volume relation (supine/breath.h) to samples; read its parameters. The
+ * functions are thread-safe. Turn off GSL's default error handler first: it would abort. */
 #ifndef SUPINE_PV_H
 #define SUPINE_PV_H
 
@@ -20,24 +20,24 @@ typedef struct supine_pv_sample {
 
 /** Quality of the fit of one limb. */
 typedef struct supine_pv_report {
-  size_t samples; /**< 0: the limb has none and takes the other limb's curve */
+  size_t samples; /**< number; 0: the limb has the other limb's curve */
   double control_interval[SUPINE_PV_CONTROLS]; /**< half-width of the confidence interval of c_i */
-  double volume_interval[2];                   /**< half-widths for V_low and V_high, mL */
+  double volume_interval[2];                   /**< confidence half-widths of V_low, V_high, mL */
   double rms;                                  /**< root mean square residual, mL */
   double rms_percent; /**< rms as a percentage of the samples' range of volumes */
 } supine_pv_report;
 
-/** Fit a limb to samples:
+/** Fit the curve of a limb to samples:
  *
  *     minimise over c, V_low, V_high:  sum of (V(P_j) - V_j)^2
  *
- * by Levenberg-Marquardt; intervals are Student's t with the covariance at the minimum. The limb
+ * by Levenberg-Marquardt; intervals are Student's t with the covariance at the minimum. The curve
  * covers the range of the samples' pressures. Where a limb is flat over much of its range, the
  * samples determine some parameters poorly: these stay within +-SUPINE_PV_CONTROL_MAX and have wide
  * intervals, while the curve itself still fits.
  *
  * Pressures must keep rising or keep falling. Volumes must rise with pressure except for noise: a
- * sample may lie below the largest volume before it by up to 10 % of the range of volumes.
+ * volume may be less than a volume at a lower pressure by up to 10 % of the range of volumes.
  *
  * @param name        the samples' file, for messages
  * @param count       at least SUPINE_PV_UNKNOWNS + 1
@@ -50,7 +50,7 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
                                 double confidence, supine_pv_curve *curve, supine_pv_report *report,
                                 supine_error *error);
 
-/** Fit both limbs to a file of samples. A limb without samples takes the other's curve.
+/** Fit both limbs to a file of samples. A limb without samples takes the other limb's curve.
  *
  * The file is CSV with the columns pressure_cmH2O, volume_mL and, optionally, limb (inhale or
  * exhale; without it all samples are inhale).
@@ -59,7 +59,7 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
 supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
                                      supine_pv_report *reports, supine_error *error);
 
-/** Read the parameters that 'supine pv fit -o' wrote. A single limb serves for both.
+/** Read the parameters that 'supine pv fit -o' wrote. A file with one limb sets both limbs.
  * @retval SUPINE_ERROR_READ, SUPINE_ERROR_FORMAT, SUPINE_ERROR_MEMORY */
 supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *error);
 

@@ -9,7 +9,7 @@
 
 #include "program/options/pv.h"
 
-/* Read the limb that a row names; inhale where the file has no such column. */
+/* Read which limb a row belongs to: inhale if the file has no such column. */
 static supine_status read_limb(const supine_csv *csv, supine_pv_limb *limb, supine_error *error) {
   const char *text = supine_csv_text(csv, 2);
   *limb = SUPINE_PV_INHALE;
@@ -25,7 +25,7 @@ static supine_status read_limb(const supine_csv *csv, supine_pv_limb *limb, supi
                           csv->line, text);
 }
 
-/* The samples of a limb, in the file's order. */
+/* Samples of a limb, in the order of the file. */
 typedef struct samples {
   size_t count;
   supine_pv_sample *sample;
@@ -90,7 +90,6 @@ supine_status supine_breath_fit_file(const char *path, double confidence, supine
   return status;
 }
 
-/* Read the curve of a limb. */
 static supine_status read_curve(json_t *limb, supine_pv_curve *curve, supine_error *error) {
   json_error_t why;
   double *p = curve->pressure;
@@ -124,9 +123,9 @@ supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *
     }
   }
   if (status == SUPINE_OK && limbs[0] == NULL && limbs[1] == NULL) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_FORMAT,
-                         "%s: neither inhale nor exhale: make the file with 'supine pv fit'", path);
+    status = supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s: has neither inhale nor exhale: make the file with 'supine pv fit'", path);
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
     pv->limb[limb] = found.limb[limbs[limb] != NULL ? limb : 1 - limb];

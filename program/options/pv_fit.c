@@ -21,12 +21,12 @@ enum {
 typedef struct problem {
   const char *name;
   size_t count;
-  supine_pv_sample *sample; /* [count] by rising pressure */
+  supine_pv_sample *sample; /* [count] sorted by rising pressure */
   gsl_multifit_nlinear_workspace *work;
   gsl_matrix *covariance;
   double *x; /* [count] pressures mapped to -1 to 1 */
-  double *v; /* [count] volumes above the first, divided by their range */
-  double *q; /* [count] the curve with volumes 0 to 1 */
+  double *v; /* [count] volumes less the first volume, divided by the range of volumes */
+  double *q; /* [count] values of the curve, scaled to rise from 0 to 1 */
 } problem;
 
 static supine_status refuse(const problem *limb, const supine_pv_sample *sample, const char *why,
@@ -70,9 +70,9 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
              : refuse_fall(limb, &sorted[count - 1], sorted[0].volume, error);
 }
 
-/* Refuse volumes that fall below the largest one before them by more than noise explains. */
+/* Refuse a volume that is less than a volume at a lower pressure by more than noise explains. */
 static supine_status check_falls(const problem *limb, double span, supine_error *error) {
-  static const double allowed = 0.1; /* largest fall, as a share of the range of volumes */
+  static const double allowed = 0.1; /* largest fall, as a fraction of the range of volumes */
   double peak = limb->sample[0].volume;
   for (size_t j = 1; j < limb->count; ++j) {
     const supine_pv_sample *sample = &limb->sample[j];
@@ -84,7 +84,7 @@ static supine_status check_falls(const problem *limb, double span, supine_error 
   return SUPINE_OK;
 }
 
-/* Compute q at the samples; false where a control parameter is beyond its bounds. */
+/* Compute q at the samples; return false if a control parameter is beyond its bounds. */
 static bool find_shape(const problem *limb, const double *control, double *q) {
   supine_pv_curve curve = {{-1.0, 1.0}, {0.0, 1.0}, {0.0}};
   memcpy(curve.control, control, sizeof curve.control);
@@ -93,7 +93,7 @@ static bool find_shape(const problem *limb, const double *control, double *q) {
 
 /* Compute the residuals V(x_j) - V_j, where V = (1 - q) V_low + q V_high. */
 static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector *residual) {
-  static const double wall = 1e6; /* residual beyond the bounds, so that the search steps back */
+  static const double wall = 1e6; /* residual beyond the bounds; makes the search step back */
   const problem *limb = context;
   if (!find_shape(limb, unknowns->data, limb->q)) {
     gsl_vector_set_all(residual, wall);
@@ -107,8 +107,8 @@ static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector 
   return GSL_SUCCESS;
 }
 
-/* Compute dV/dc_i by central differences, which are accurate to about 1e-10, and the derivatives by
- * V_low and V_high, in which V is linear. */
+/* Compute dV/dc_i by central differences, which are accurate to about 1e-10, and the derivatives of
+ * V with respect to V_low and V_high, in which V is linear. */
 static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *jacobian) {
   static const double step = 1e-5;
   const problem *limb = context;
@@ -136,7 +136,7 @@ static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *
   return GSL_SUCCESS;
 }
 
-/* Fill the report of a minimum found. */
+/* Compute the report at the minimum. */
 static void describe(const problem *limb, double span, double confidence,
                      supine_pv_report *report) {
   const gsl_matrix *jacobian = gsl_multifit_nlinear_jac(limb->work);
@@ -146,7 +146,7 @@ static void describe(const problem *limb, double span, double confidence,
   const double misfit = cblas_dnrm2((int)count, residual->data, (int)residual->stride);
   const double share = misfit / sqrt((double)count);
   *report = (supine_pv_report){.samples = count, .rms = span * share, .rms_percent = 100.0 * share};
-  /* covariance = sigma^2 (J^T J)^-1 */
+  /* The covariance of the unknowns is sigma^2 (J^T J)^-1, where sigma^2 = misfit^2 / freedom. */
   (void)gsl_multifit_nlinear_covar(jacobian, 0.0, limb->covariance);
   const double t = gsl_cdf_tdist_Pinv(0.5 + 0.5 * confidence, freedom);
   for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
@@ -156,7 +156,7 @@ static void describe(const problem *limb, double span, double confidence,
   }
 }
 
-/* Minimise by Levenberg-Marquardt, from the straight line between the end samples. */
+/* Minimise by Levenberg-Marquardt, from the straight line between the first and last samples. */
 static supine_status minimise(problem *limb) {
   enum { STEPS_MAX = 300 };
   static const double tolerance = 1e-13;
@@ -175,11 +175,10 @@ static supine_status minimise(problem *limb) {
     code = gsl_multifit_nlinear_driver(STEPS_MAX, tolerance, tolerance, 0.0, NULL, NULL, &info,
                                        limb->work);
   }
-  /* A minimum reached to rounding makes no further progress. */
+  /* GSL_ENOPROG: the minimum is reached to rounding, so that no step improves it. */
   return code == GSL_SUCCESS || code == GSL_ENOPROG ? SUPINE_OK : SUPINE_ERROR_NUMERICAL;
 }
 
-/* Fit sorted samples. */
 static supine_status fit_sorted(problem *limb, double confidence, supine_pv_curve *curve,
                                 supine_pv_report *report, supine_error *error) {
   const size_t count = limb->count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options --posture, --gravity, --volume and --from, and the poses computed from them. */
+/* Declare --posture, --gravity, --volume and --from, and compute the poses that they request. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,10 +7,10 @@
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
-/* Range of plausible volumes, as shares of full inflation; the lowest is that of tissue alone. */
+/* Limits of plausible volumes, as fractions of full inflation. Tissue alone has about the least. */
 static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
-/* Share of turned-over triangles above which the surface is implausible. */
+/* Fraction of triangles turned over, above which a surface is implausible. */
 static const double folded_limit = 0.01;
 
 supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error) {
@@ -106,7 +106,7 @@ supine_status supine_options_read_volume(const char *text, void *field, supine_e
 
 static supine_status read_from(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
-  *state = (supine_state){.gravity = {0.0}}; /* no posture: supine_options_reference chooses it */
+  *state = (supine_state){.gravity = {0.0}}; /* zero: supine_options_reference sets the posture */
   return supine_state_parse(text, state, error);
 }
 
@@ -142,7 +142,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     const double *g = from->state.gravity;
     const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
     state = from->state;
-    if (!posed) { /* a volume without a posture: that of the scan, else supine */
+    if (!posed) { /* the scan's posture for the scan's volume, else supine */
       const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
       const supine_state in = supine_basis_scan(basis);
       const double supine[3] = {0.0, 1.0, 0.0};
@@ -166,7 +166,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
-/* Return the share of the triangles that turn over in a pose, or -1: no memory. */
+/* Return the fraction of the triangles that turn over in a pose; -1 if out of memory. */
 static double turned_over(const supine_basis *basis, const supine_pose *pose) {
   supine_mesh mesh = {0};
   double *moved = supine_options_basis_positions(basis, pose);
@@ -208,8 +208,7 @@ supine_status supine_options_pose_check(const supine_basis *basis, const char *c
     }
   }
   if (wrong[0] != '\0' && info->has_rest && !allow_folds) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "%s; --allow-folds computes it nevertheless", wrong);
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s; --allow-folds accepts this", wrong);
   }
   if (wrong[0] != '\0') {
     supine_options_say(command, "%s", wrong);

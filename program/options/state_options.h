@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options --posture, --gravity, --volume and --from, and the poses computed from them. */
+/* Declare --posture, --gravity, --volume and --from, and compute the poses that they request. */
 #ifndef SUPINE_OPTIONS_STATE_H
 #define SUPINE_OPTIONS_STATE_H
 
@@ -7,26 +7,27 @@
 
 #include "program/options/command.h"
 
-/* --posture and --gravity: a table that fills a supine_orientation. */
+/* Table of --posture and --gravity, which fills a supine_orientation. */
 extern const supine_option supine_options_orientation[];
 
 typedef struct supine_orientation {
   bool given;
-  double gravity[3]; /* unit, body axes */
+  double gravity[3]; /* unit vector in body axes */
 } supine_orientation;
 
-/* Parse a posture into a unit direction of gravity: "prone"; "supine+15", tilted by degrees towards
- * the head; "0.6:0:-0.8", gravity in body axes. Statuses as supine_state_parse_posture. */
+/* Parse a posture, such as "prone", "supine+15" (tilted by 15 degrees towards the head) or
+ * "0.6:0:-0.8" (gravity in body axes), into a unit vector along gravity. Statuses as
+ * supine_state_parse_posture. */
 supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error);
 
-/* Copy the direction of gravity that was given.
- * @retval SUPINE_ERROR_ARGUMENT  none was given */
+/* Copy the direction of gravity that --posture or --gravity has set.
+ * @retval SUPINE_ERROR_ARGUMENT  neither option was given */
 supine_status supine_options_gravity(const supine_orientation *orientation, double gravity[3],
                                      supine_error *error);
 
 enum { SUPINE_POSTURE_NAME_MAX = 48, SUPINE_POSTURE_LIST_MAX = 32 };
 
-/* A posture as the user wrote it, and its unit direction of gravity. */
+/* A posture as the user wrote it, and its unit vector along gravity. */
 typedef struct supine_posture_item {
   char name[SUPINE_POSTURE_NAME_MAX];
   double gravity[3];
@@ -37,13 +38,12 @@ typedef struct supine_posture_list {
   supine_posture_item item[SUPINE_POSTURE_LIST_MAX];
 } supine_posture_list;
 
-/* The syntax of a list, for a command's help. */
 #define SUPINE_POSTURE_LIST_HELP                                                                   \
   "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
   "position), a name with a tilt towards the head in degrees (supine+15: Trendelenburg), "         \
   "or a gravity in body axes, X:Y:Z (0.6:0:-0.8)."
 
-/* Parse "supine,prone,supine+15,0.6:0:-0.8".
+/* Parse a list of postures, such as "supine,prone,supine+15,0.6:0:-0.8".
  * @retval SUPINE_ERROR_ARGUMENT */
 supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,
                                                 supine_error *error);
@@ -51,17 +51,17 @@ supine_status supine_options_posture_list_parse(const char *text, supine_posture
 /* Return a posture's name in words: "left side" for "left"; other names unchanged. */
 const char *supine_options_posture_label(const char *name);
 
-/* --volume and --allow-folds: a table that fills a supine_volume_options. */
+/* Table of --volume and --allow-folds, which fills a supine_volume_options. */
 extern const supine_option supine_options_volume[];
 
 /* Read the value of --volume into a supine_state. */
 supine_status supine_options_read_volume(const char *text, void *field, supine_error *error);
 
-/* --allow-folds alone, into a bool. */
+/* Table of --allow-folds alone, which sets a bool. */
 extern const supine_option supine_options_folds[];
 
 typedef struct supine_volume_options {
-  supine_state state; /* volume of kind SUPINE_VOLUME_DEFAULT: none was given */
+  supine_state state; /* requested volume; of kind SUPINE_VOLUME_DEFAULT if none was given */
   bool allow_folds;
 } supine_volume_options;
 
@@ -71,7 +71,7 @@ typedef struct supine_volume_options {
   "-ML added, as rest+500; or the absolute volume of gas and tissue in all lungs, as "             \
   "measured in a CT: 2600mL"
 
-/* --from, into a supine_from. */
+/* Table of --from, which fills a supine_from. */
 extern const supine_option supine_options_from[];
 
 typedef struct supine_from {
@@ -83,24 +83,24 @@ typedef struct supine_from {
 typedef struct supine_reference_pose {
   supine_state state;
   supine_pose pose;
-  char name[96]; /* "the scan", "supine at rest" */
+  char name[96]; /* such as "the scan" or "supine at rest" */
 } supine_reference_pose;
 
-/* Choose the state that displacements are measured from: --from where it is given; else supine at
- * rest where postures are compared and rest is known; else the scan. Statuses as
+/* Choose the state that displacements are measured from: --from if it is given; else supine at rest
+ * if the command compares postures and rest is known; else the scan. Statuses as
  * supine_basis_pose. */
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
-/* Check that the state is plausible: a volume between that of tissue alone and a fifth above full,
- * and a surface that does not fold. Where rest is known and folds are not allowed, an implausible
- * state is an error, SUPINE_ERROR_NUMERICAL; otherwise a warning. */
+/* Check that a pose is plausible: that its volume is 10 % to 120 % of full inflation, if rest is
+ * known, and that its surface does not fold. If rest is known and folds are not allowed, an
+ * implausible pose is an error, SUPINE_ERROR_NUMERICAL; otherwise a warning. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);
 
-/* Compute the pose of a posture at the requested volume, and check it. Statuses as
+/* Compute the pose for a direction of gravity and the requested volume, and check it. Statuses as
  * supine_basis_pose and supine_options_pose_check. */
 supine_status supine_options_pose(const supine_basis *basis, const char *command,
                                   const supine_volume_options *wanted, const double gravity[3],

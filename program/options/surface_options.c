@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options of commands that read surfaces: axes and units, landmarks. */
+/* Declare options of commands that read surfaces: axes and units, landmarks. */
 #include <ctype.h>
 #include <string.h>
 

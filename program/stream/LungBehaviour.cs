@@ -37,7 +37,7 @@ public class LungBehaviour : MonoBehaviour
     }
 
     /// <summary>Converts an object's rotation to the rotation from the body (left, back, head) to a world
-    /// whose z points up, by rows.</summary>
+    /// whose z points up, row by row.</summary>
     public static float[] Pose(Quaternion rotation)
     {
         Vector3[] axes = { rotation * new Vector3(-1, 0, 0), rotation * new Vector3(0, 0, -1),

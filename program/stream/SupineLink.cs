@@ -244,7 +244,7 @@ namespace Supine
             return frame;
         }
 
-        // Returns the index in supine_pose of number i of a frame.
+        // Returns the index in supine_pose of the number with index i in a frame.
         int PoseIndex(int i)
         {
             return i < modes ? i : ModesMax + i - modes;

@@ -20,8 +20,8 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
     const size_t length = (size_t)(colon - text) - (bracketed ? 2 : 0);
     if (length == 0 || length >= sizeof address->host) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "'%s' has no host, or one of more than 255 characters, before the "
-                              "port: give HOST:PORT",
+                              "'%s': the host before the port is missing or longer than 255 "
+                              "characters: give HOST:PORT",
                               text);
     }
     memcpy(host, text + (bracketed ? 1 : 0), length);
@@ -40,7 +40,7 @@ supine_status supine_stream_address_read(const char *text, bool numeric,
   if (failure != 0) {
     return supine_error_set(
         error, SUPINE_ERROR_ARGUMENT, "'%s': %s: give %s", host, gai_strerror(failure),
-        numeric ? "a numeric address, as 127.0.0.1" : "the name or the numeric address of a host");
+        numeric ? "a numeric address, such as 127.0.0.1" : "a host name or a numeric address");
   }
   memcpy(&address->where, found->ai_addr, found->ai_addrlen);
   address->size = found->ai_addrlen;
@@ -66,7 +66,7 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
     }
     return -1;
   }
-  /* sin_port and sin6_port have the same offset. */
+  /* The port is at the same offset in sockaddr_in and sockaddr_in6. */
   *port = ntohs(((const struct sockaddr_in *)(const void *)&given)->sin_port);
   return s;
 }

@@ -11,13 +11,13 @@
 
 #include "program/stream/message.h"
 
-static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* without the term x^64 */
+static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* generator P without its term x^64 */
 
-/* Sizes of the steps of folding, bytes. */
+/* Sizes of the steps in which messages are folded, bytes. */
 enum { NEAR, FAR, FARTHEST, STEPS };
 static const size_t step[STEPS] = {16, 64, 256};
 
-/* Tables computed once: table[b] = b(x) x^64 mod P, and for each step of n bits x^n, x^(n + 64). */
+/* Computed once, mod P: table[b] = b(x) x^64; power[i] = x^n, x^(n + 64), n = 8 step[i]. */
 static struct { uint64_t table[256], power[STEPS][2]; } known;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
@@ -36,7 +36,7 @@ static uint64_t multiply(uint64_t a, uint64_t b) {
 /* Compute x^(8 size) mod P, the factor of a checksum when `size` bytes follow. */
 static uint64_t power_of(size_t size) {
   uint64_t power = 1;
-  uint64_t square = 1u << 8; /* x^8, then its square, ... */
+  uint64_t square = 1u << 8; /* in turn x^8, x^16, x^32, ... */
   for (; size != 0; size >>= 1) {
     power = (size & 1) != 0 ? multiply(power, square) : power;
     square = multiply(square, square);
@@ -77,7 +77,7 @@ typedef __m512i lanes;
 #define WIDE __attribute__((target("vpclmulqdq,avx512bw")))
 #define FRONT _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
-/* Load 16 bytes, the last first. */
+/* Load 16 bytes in reverse order. */
 CARRY_LESS static lane take(const void *at) {
   return _mm_shuffle_epi8(_mm_loadu_si128(at), FRONT);
 }
@@ -86,13 +86,13 @@ WIDE static lanes take_wide(const void *at) {
   return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(FRONT));
 }
 
-/* Compute a_high x^(n + 64) + a_low x^n + next, with powers = (x^n, x^(n + 64)). */
+/* Compute a x^n + next, where a = a_high x^64 + a_low and powers = x^n, x^(n + 64) mod P. */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
 }
 
-/* Compute the CRC of at least 64 bytes, a multiple of 16. */
+/* Extend a CRC by `size` bytes: at least 64, and a multiple of 16. */
 CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, size_t size) {
   const lane far = _mm_loadu_si128((const void *)known.power[FAR]);
   const lane near = _mm_loadu_si128((const void *)known.power[NEAR]);
@@ -114,7 +114,7 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   return by_bytes(0, (const void *)&remainder, sizeof remainder);
 }
 
-/* Compute the CRC of at least 256 bytes, a multiple of 256. */
+/* Extend a CRC by `size` bytes: at least 256, and a multiple of 256. */
 WIDE static uint64_t by_wide_folding(uint64_t crc, const unsigned char *at, size_t size) {
   const lanes powers = _mm512_broadcast_i32x4(_mm_loadu_si128((const void *)known.power[FARTHEST]));
   lanes part[4];

@@ -27,20 +27,20 @@ struct supine_stream_frames {
   const supine_basis_info *info;
   char device[21];
   bool ras;
-  uint64_t number;     /* of the newest frame */
-  uint32_t *strips;    /* big-endian, for each triangle strip: number of corners, then corners */
-  size_t strips_size;  /* bytes */
-  size_t strips_count; /* number of strips */
+  uint64_t number;    /* number of the newest frame */
+  uint32_t *strips;   /* for each triangle strip: number of corners, then corners; big-endian */
+  size_t strips_size; /* bytes */
+  size_t strips_count;
   uint64_t strips_crc;
   supine_stream_frame *unused; /* list of frames without users */
 };
 
 const char *const supine_stream_content_names[] = {"weights", "points", "surface", "nothing", NULL};
 
-/* Convert the triangles to strips. Corners i, i + 1, i + 2 of a strip are a triangle, reversed if i
- * is odd, or a degenerate one that joins two triangles. */
+/* Convert the triangles to strips. Corners i, i + 1 and i + 2 of a strip form a triangle, reversed
+ * if i is odd; degenerate triangles join others. */
 static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
-  static const uint32_t restart = UINT32_MAX; /* separates strips */
+  static const uint32_t restart = UINT32_MAX; /* separates strips in the output of stripify() */
   const size_t corners = 3 * f->info->triangle_count;
   const supine_status status = SUPINE_LIBRARY_LOAD(SUPINE_MESHOPT, FUNCTIONS, &meshopt, error);
   if (status != SUPINE_OK) {
@@ -80,8 +80,8 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   f->info = supine_basis_get_info(basis);
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
-  /* Compute the strips now: it takes 0.1 s for a million triangles, a delay for every peer if done
-   * at the first request for a surface. */
+  /* Compute the strips now. They take 0.1 s for a million triangles, and if the first request for a
+   * surface computed them, every peer would wait. */
   const supine_status status = make_strips(f, error);
   if (status != SUPINE_OK) {
     supine_stream_frames_destroy(f);
@@ -124,7 +124,7 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
       return NULL;
     }
     if (page == HUGE_PAGE) {
-      (void)madvise(points, whole, MADV_HUGEPAGE); /* fewer address translations */
+      (void)madvise(points, whole, MADV_HUGEPAGE); /* reduces address translations */
     }
     frame->points = points;
     frame->errors = (unsigned char *)(points + 3 * count);
@@ -144,7 +144,7 @@ void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_fra
   }
 }
 
-/* Convert points to the form in which they are sent: in RAS if the frames are in RAS. */
+/* Convert points to big-endian floats, in RAS if the frames are in RAS. */
 static void encode_points(const supine_stream_frames *f, size_t count, float *xyz) {
   for (size_t i = 0; f->ras && i < count; ++i) {
     xyz[3 * i] = -xyz[3 * i];
@@ -153,8 +153,8 @@ static void encode_points(const supine_stream_frames *f, size_t count, float *xy
   supine_stream_encode_floats(3 * count, xyz);
 }
 
-/* Compute positions and expected errors of lungs located from observed points; return false if that
- * fails. */
+/* Compute the positions of lungs located from observed points, and their expected errors; return
+ * false on failure. */
 static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
@@ -173,7 +173,7 @@ typedef struct points_work {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
   uint64_t crc[THREADS_MAX];
-  size_t size[THREADS_MAX]; /* bytes; 0 after the last part */
+  size_t size[THREADS_MAX]; /* size of each thread's part, bytes; 0: no part */
 } points_work;
 
 static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -188,7 +188,7 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute the points of a frame, of the pose if the lungs cannot be located. */
+/* Compute the points of a frame from the location; without one, or if that fails, from the pose. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
   points_work p = {.frames = f, .frame = frame};
   if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {
@@ -226,7 +226,7 @@ void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame 
                               supine_stream_content content, bool triangles,
                               supine_stream_packet *packet) {
   const bool weights = content == SUPINE_STREAM_WEIGHTS;
-  if (!weights && !frame->has_points) { /* once for all peers */
+  if (!weights && !frame->has_points) { /* compute once for all peers */
     compute_points(frames, frame);
     frame->has_points = true;
   }

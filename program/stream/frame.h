@@ -5,7 +5,7 @@
  * A weights message is an NDARRAY of K + 3 G floats: the K weights, then the gains x, y, z of each
  * of the G lungs. A surface message is a POLYDATA; if the lungs were located from observed points,
  * it has the expected error of each vertex as an attribute. The triangle strips and their checksum
- * are computed once; the checksum of a message is joined from the checksums of its parts. */
+ * are computed once; the checksum of a message is joined from those of its parts. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
 
@@ -18,62 +18,61 @@
 /** Content sent to a peer. */
 typedef enum supine_stream_content {
   SUPINE_STREAM_WEIGHTS = 0,
-  SUPINE_STREAM_POINTS,  /**< POLYDATA: triangles in the first frame only */
-  SUPINE_STREAM_SURFACE, /**< POLYDATA: triangles in every frame, as most viewers need them */
+  SUPINE_STREAM_POINTS,  /**< POLYDATA with triangles in the first frame only */
+  SUPINE_STREAM_SURFACE, /**< POLYDATA with triangles in every frame, as most viewers require */
   SUPINE_STREAM_SILENCE,
   SUPINE_STREAM_CONTENT_COUNT
 } supine_stream_content;
 
-/** "weights", "points", "surface", "nothing", NULL. */
+/** Names of the contents: "weights", "points", "surface", "nothing"; then NULL. */
 extern const char *const supine_stream_content_names[SUPINE_STREAM_CONTENT_COUNT + 1];
 
 /** State of the lungs at one time. */
 typedef struct supine_stream_snapshot {
-  double gravity[3]; /**< unit */
-  double volume;     /**< mL of all lungs together, gas and tissue */
-  double above;      /**< mL above rest in the posture, or above the scan where rest is unknown */
-  uint64_t stamp;    /**< time of the pose, as in supine_stream_header */
-  double received;   /**< when the newest pose or volume was received, s of supine_clock_seconds;
-                          < 0: none since the previous frame */
-  double pose_received; /**< when the newest pose was received, s; < 0: no pose yet */
+  double gravity[3]; /**< unit vector in body axes */
+  double volume;     /**< volume of all lungs together, gas and tissue, mL */
+  double above;   /**< volume above rest in the posture, or above the scan if rest is unknown, mL */
+  uint64_t stamp; /**< time of the newest pose, as in supine_stream_header */
+  double received; /**< when the newest message was received, s of supine_clock_seconds; < 0: none
+                        since the previous frame */
+  double pose_received; /**< when a pose or observed point was last received, s; < 0: never */
   supine_pose pose;
-  const supine_location *location; /**< NULL: no points were observed */
+  const supine_location *location; /**< lungs located from observed points; NULL: none */
 } supine_stream_snapshot;
 
-/** A frame that peers share. */
+/** A frame, which peers share. */
 typedef struct supine_stream_frame {
-  size_t users;    /**< peers that send it, and the server while it is the newest */
-  uint64_t number; /**< 1, 2, ... */
+  size_t users;    /**< number of peers that it is sent to, plus 1 while it is the newest frame */
+  uint64_t number; /**< serial number: 1, 2, ... */
   supine_stream_snapshot snapshot;
   bool has_points; /**< `points` and `points_crc` are computed */
-  float *points;   /**< [N, 3] positions as sent: big-endian */
+  float *points;   /**< [N, 3] positions as sent, big-endian */
   uint64_t points_crc;
   unsigned char *errors;            /**< expected errors as sent, valid if the lungs were located */
-  struct supine_stream_frame *next; /**< in the list of unused frames */
+  struct supine_stream_frame *next; /**< next frame in the list of unused frames */
 } supine_stream_frame;
 
-/** Data shared by the frames of a basis. */
 typedef struct supine_stream_frames supine_stream_frames;
 
 /** Create the data shared by the frames of a basis.
  * @param basis   must outlive the frames
  * @param device  device name of the messages, up to 20 characters
- * @param ras     points in RAS instead of LPS
+ * @param ras     true: points are sent in RAS; false: in LPS
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_frames_create(const supine_basis *basis, const char *device, bool ras,
                                           supine_stream_frames **frames, supine_error *error);
 /** Release the data and every frame; NULL is legal. */
 void supine_stream_frames_destroy(supine_stream_frames *frames);
 
-/** Return a frame of a snapshot, with one user; NULL if out of memory. Frames without users are
- * reused. */
+/** Return a frame of a snapshot, with one user; NULL if out of memory. The memory of frames without
+ * users is reused. */
 supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
                                                  const supine_stream_snapshot *snapshot);
 /** Remove one user of a frame; NULL is legal. */
 void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_frame *frame);
 
-/** Largest number of pieces of a message, and largest size of the first piece, which holds a
- * weights message whole. */
+/** Largest number of pieces of a message, and size of the first piece, bytes, which is enough for a
+ * whole message of weights. */
 enum {
   SUPINE_STREAM_PIECES = 4,
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + 40 + 4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX)
@@ -84,13 +83,13 @@ typedef struct supine_stream_packet {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];
   int first, count; /**< index of the first piece not sent completely; number of pieces */
-  size_t size;      /**< length of the whole message, bytes */
+  size_t size;      /**< size of the whole message, bytes */
 } supine_stream_packet;
 
-/** Make the message of a frame, with a header of version 1, which all peers read. The first message
- * of a frame that needs positions computes them.
+/** Make the message of a frame, with a header of version 1, which all peers can read. The positions
+ * of a frame are computed for the first message that contains them.
  * @param content    not SUPINE_STREAM_SILENCE
- * @param triangles  true: a POLYDATA also holds the triangles */
+ * @param triangles  true: a POLYDATA also contains the triangles */
 void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
                               supine_stream_content content, bool triangles,
                               supine_stream_packet *packet);

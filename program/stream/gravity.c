@@ -8,10 +8,10 @@
 #include "program/options/breath_turn.h"
 #include "program/stream/gravity.h"
 
-/* Largest deviation from a rotation that counts as exact: 32-bit floats cause 1e-6, the arithmetic
- * of trackers up to about 1e-4. */
+/* Largest deviation from a rotation at which a matrix counts as exact. Rounding to 32-bit floats
+ * causes 1e-6, the arithmetic of trackers up to about 1e-4. */
 static const double slack = 1e-3;
-static const double uneven_max = 0.1; /* largest deviation that is repaired, after scaling */
+static const double uneven_max = 0.1; /* largest stretch or shear that is repaired */
 
 supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -32,7 +32,7 @@ bool supine_stream_rotation(const double q[4], double r[9]) {
   return isfinite(square) && square > 1e-12;
 }
 
-/* out = M^T v */
+/* Compute out = M^T v, for M stored row by row. */
 static void apply_transpose(const double m[9], const double v[3], double out[3]) {
   for (int i = 0; i < 3; ++i) {
     out[i] = m[i] * v[0] + m[3 + i] * v[1] + m[6 + i] * v[2];
@@ -42,35 +42,36 @@ static void apply_transpose(const double m[9], const double v[3], double out[3])
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why) {
-  double product[9]; /* M^T M: the square of the scale times 1 for a scaled rotation */
+  double product[9]; /* R^T R; for a scaled rotation, the squared scale times the identity */
   for (int i = 0; i < 3; ++i) {
     const double column[3] = {rotation[i], rotation[3 + i], rotation[6 + i]};
     apply_transpose(rotation, column, product + 3 * i);
   }
-  const double square = (product[0] + product[4] + product[8]) / 3.0; /* square of the scale */
+  const double squared_scale = (product[0] + product[4] + product[8]) / 3.0;
   *why = "its matrix is zero or not finite; send a rotation";
-  if (!(square > 1e-12) || !isfinite(square)) {
+  if (!(squared_scale > 1e-12) || !isfinite(squared_scale)) {
     return SUPINE_STREAM_REFUSED;
   }
   double uneven = 0.0;
   for (int i = 0; i < 9; ++i) {
-    uneven = fmax(uneven, 0.5 * fabs(product[i] / square - (i % 4 == 0 ? 1.0 : 0.0)));
+    uneven = fmax(uneven, 0.5 * fabs(product[i] / squared_scale - (i % 4 == 0 ? 1.0 : 0.0)));
   }
-  *why = "its matrix shears; send a rotation";
+  *why = "its matrix contains stretch or shear; send a rotation";
   if (!(uneven <= uneven_max)) {
     return SUPINE_STREAM_REFUSED;
   }
-  *why = "its matrix mirrors; send a rotation";
+  *why = "its matrix contains a reflection; send a rotation";
   if (supine_triple(rotation, rotation + 3, rotation + 6) < 0.0) {
     return SUPINE_STREAM_REFUSED;
   }
-  double down[3]; /* in the tracker's axes */
+  double down[3]; /* direction of gravity in tracker axes */
   apply_transpose(rotation, setup->down, down);
   const supine_stream_verdict verdict = supine_stream_gravity_down(setup, down, gravity, why);
-  if (verdict != SUPINE_STREAM_EXACT || (uneven <= slack && fabs(sqrt(square) - 1.0) <= slack)) {
+  if (verdict != SUPINE_STREAM_EXACT ||
+      (uneven <= slack && fabs(sqrt(squared_scale) - 1.0) <= slack)) {
     return verdict;
   }
-  *why = uneven <= slack ? "its matrix scales" : "its matrix shears slightly";
+  *why = uneven <= slack ? "its scale is not 1" : "its matrix contains slight stretch or shear";
   return SUPINE_STREAM_REPAIRED;
 }
 
@@ -78,9 +79,9 @@ supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why) {
   double rotation[9];
-  double square = 0.0; /* of the quaternion's length */
+  double squared_length = 0.0;
   for (int i = 0; i < 4; ++i) {
-    square += quaternion[i] * quaternion[i];
+    squared_length += quaternion[i] * quaternion[i];
   }
   *why = "its quaternion is zero or not finite; send a rotation";
   if (!supine_stream_rotation(quaternion, rotation)) {
@@ -88,10 +89,10 @@ supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup
   }
   const supine_stream_verdict verdict =
       supine_stream_gravity_rotation(setup, rotation, gravity, why);
-  if (verdict != SUPINE_STREAM_EXACT || fabs(sqrt(square) - 1.0) <= slack) {
+  if (verdict != SUPINE_STREAM_EXACT || fabs(sqrt(squared_length) - 1.0) <= slack) {
     return verdict;
   }
-  *why = "its quaternion is not of length 1";
+  *why = "the length of its quaternion is not 1";
   return SUPINE_STREAM_REPAIRED;
 }
 
@@ -107,7 +108,7 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
   for (int i = 0; i < 3; ++i) {
     turned[i] = supine_dot(setup->body + 3 * i, unit);
   }
-  (void)supine_normalise(turned, gravity); /* removes rounding */
+  (void)supine_normalise(turned, gravity); /* removes rounding errors of the length */
   *why = NULL;
   return SUPINE_STREAM_EXACT;
 }

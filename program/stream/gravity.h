@@ -2,58 +2,59 @@
 /** @file
  * Compute the direction of gravity in body axes from the messages of a tracker or tilt sensor.
  *
- *     gravity = B R^T down        R: v_world = R v_tracker,  B: v_body = B v_tracker
+ *     gravity = B R^T down,  where v_world = R v_tracker and v_body = B v_tracker
  *
- * Body axes are DICOM LPS. A turn about `down` changes nothing. */
+ * Body axes are DICOM LPS. Rotating the tracker about `down` does not change the result. */
 #ifndef SUPINE_STREAM_GRAVITY_H
 #define SUPINE_STREAM_GRAVITY_H
 
 #include <stdbool.h>
 
-/** Axes of the tracker. */
+/** How the tracker's axes relate to gravity and to the body. */
 typedef struct supine_stream_setup {
-  double down[3]; /**< direction of gravity in the tracker's world; unit */
-  double body[9]; /**< rotation B from tracker to body axes, by rows */
+  double down[3]; /**< unit vector, direction of gravity in world axes */
+  double body[9]; /**< rotation B from tracker axes to body axes, row by row */
 } supine_stream_setup;
 
-/** Return the default setup: z of the world points up, and the marker's axes are the body's. */
+/** Return the default setup: the world's z axis points up, and tracker axes equal body axes. */
 supine_stream_setup supine_stream_setup_default(void);
 
-/** Convert a quaternion W, X, Y, Z of any length to a rotation matrix, by rows; return false where
- * it is zero or not finite. */
+/** Convert a quaternion (w, x, y, z) of any length to a rotation matrix, row by row; return false
+ * if the quaternion is zero or not finite. */
 bool supine_stream_rotation(const double quaternion[4], double rotation[9]);
 
 /** Quality of a received pose. */
 typedef enum supine_stream_verdict {
   SUPINE_STREAM_EXACT = 0,
-  SUPINE_STREAM_REPAIRED, /**< not a rotation, but near enough to use */
-  SUPINE_STREAM_REFUSED   /**< `gravity` is unchanged */
+  SUPINE_STREAM_REPAIRED, /**< not a rotation, but close enough to one to be used */
+  SUPINE_STREAM_REFUSED   /**< unusable; `gravity` keeps its value */
 } supine_stream_verdict;
 
-/** Compute gravity from a matrix R. A matrix within 0.001 of a rotation is exact. One that is
- * scaled evenly, or stretched unevenly by at most a tenth, is used as repaired: the direction is
- * then within 3 degrees. A matrix that is not finite, singular, mirrored or sheared is refused.
+/** Compute the direction of gravity from the matrix R, row by row. A matrix within 0.001 of a
+ * rotation is exact. One with another scale, or with stretch or shear of at most a tenth, is
+ * repaired; the direction then errs by less than 13 degrees. A matrix that is not finite, is
+ * singular, contains a reflection, or has more stretch or shear is refused.
  * @param why  set to the reason if the pose is repaired or refused, else to NULL */
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why);
 
-/** Compute gravity from a quaternion W, X, Y, Z of any length but 0; a length that differs from 1
- * by more than 0.001 counts as repaired. */
+/** Compute the direction of gravity from a quaternion (w, x, y, z). One that is zero or not finite
+ * is refused; one whose length differs from 1 by more than 0.001 is repaired. */
 supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why);
 
-/** Compute gravity from its direction in the tracker's axes, of any length but 0. */
+/** Convert a direction of gravity, of any length but 0, from tracker axes to body axes. */
 supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setup,
                                                  const double down[3], double gravity[3],
                                                  const char **why);
 
-/** Turn `smooth` towards `gravity`, by the share 1 - exp(-step / seconds) of the angle between
- * them: a first-order lag, which follows a steady turn `seconds` late.
+/** Rotate `smooth` towards `gravity` by the fraction 1 - exp(-step / seconds) of the angle between
+ * them. This first-order low-pass filter follows a steady rotation with a delay of `seconds`.
  * @param step     time since the last call, s
  * @param seconds  time constant; 0: `smooth` becomes `gravity`
- * @return the remaining angle, radians */
+ * @return the angle that remains between the two, radians */
 double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
                                     double smooth[3]);
 

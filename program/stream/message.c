@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read messages from untrusted bytes; write headers, points, and the beginning of each content. */
+/* Read messages from untrusted bytes; write headers, floats, and the first fields of each type. */
 #include <ctype.h>
 #include <endian.h>
 #include <string.h>
@@ -46,7 +46,7 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
 void supine_stream_header_write(const supine_stream_header *header,
                                 unsigned char bytes[SUPINE_STREAM_HEADER]) {
   put(bytes, 2, header->version);
-  memcpy(bytes + 2, header->type, sizeof header->type - 1); /* padded with zeros */
+  memcpy(bytes + 2, header->type, sizeof header->type - 1); /* with zeros after the text */
   memcpy(bytes + 14, header->device, sizeof header->device - 1);
   put(bytes + 34, 8, header->stamp);
   put(bytes + 42, 8, header->size);
@@ -62,7 +62,7 @@ size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes) {
 
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes) {
-  memset(bytes, 0, 40); /* no vertices, lines, polygons */
+  memset(bytes, 0, 40); /* zeros: no vertices, lines or polygons */
   put(bytes, 4, points);
   put(bytes + 28, 4, strips);
   put(bytes + 32, 4, size);
@@ -71,10 +71,10 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 }
 
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
-  static const char text[] =
-      "expected_error_mm"; /* its length with the NUL is even, as the protocol requires */
-  _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "type, components, count, name");
-  put(bytes, 2, 1); /* a scalar of one component */
+  /* The protocol requires an even length, here that of the text with its NUL. */
+  static const char text[] = "expected_error_mm";
+  _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "size of type, count and name");
+  put(bytes, 2, 1); /* type 0, a scalar; 1 component */
   put(bytes + 2, 4, points);
   memcpy(bytes + 6, text, sizeof text);
   return SUPINE_STREAM_ATTRIBUTE;
@@ -89,9 +89,7 @@ SUPINE_CLONES void supine_stream_encode_floats(size_t count, float *values) {
   }
 }
 
-/* --- reading ---------------------------------------------------------------------------------- */
-
-/* The unread part of a body. Reading beyond its end returns zeros and sets `overrun`. */
+/* Unread part of a body. Reading beyond its end returns zeros and sets `overrun`. */
 typedef struct cursor {
   const unsigned char *at;
   size_t left;
@@ -129,7 +127,7 @@ static double real64(cursor *c) {
   return value;
 }
 
-/* Read a quaternion, which is X, Y, Z, W on the wire. */
+/* Read a quaternion, received as x, y, z, w, into w, x, y, z. */
 static void quaternion(cursor *c, supine_stream_message *m) {
   m->kind = SUPINE_STREAM_QUATERNION;
   for (int i = 1; i < 4; ++i) {
@@ -151,8 +149,8 @@ static void transform(cursor *c, const char *device, int ours, supine_stream_mes
   }
 }
 
-/* Layout of a point, in bytes: name 64, group 32, colour 4, position 12, diameter 4, owner 20. */
-enum { POINT_NAME = 64, POINT_PLACE = 100, POINT_SIZE = 136 };
+/* A point: name (64 bytes), group (32), colour (4), position (12), diameter (4), owner (20). */
+enum { POINT_NAME_SIZE = 64, POINT_POSITION_OFFSET = 100, POINT_SIZE = 136 };
 
 static void points(cursor *c, supine_stream_message *m) {
   m->kind = SUPINE_STREAM_POINT_LIST;
@@ -164,23 +162,23 @@ static void points(cursor *c, supine_stream_message *m) {
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]) {
   const unsigned char *at = message->points + POINT_SIZE * point;
-  cursor place = {at + POINT_PLACE, 12, 0};
-  memcpy(name, at, POINT_NAME);
-  name[POINT_NAME] = '\0';
+  cursor place = {at + POINT_POSITION_OFFSET, 12, 0};
+  memcpy(name, at, POINT_NAME_SIZE);
+  name[POINT_NAME_SIZE] = '\0';
   for (int i = 0; i < 3; ++i) {
     position[i] = real32(&place);
   }
 }
 
-/* Read the quaternion of the instrument `device`; if `device` is NULL or the sender of the message,
- * that of the last instrument. */
+/* Read the quaternion of the instrument named `device`. If `device` is NULL or names the sender of
+ * the message, read the quaternion of the last instrument. */
 static void instruments(cursor *c, const char *device, const supine_stream_header *header,
                         supine_stream_message *m) {
   const int all = device == NULL || strcmp(header->device, device) == 0;
   while (c->left != 0 && c->overrun == 0) {
     char name[21] = {0};
     memcpy(name, pass(c, 20), 20);
-    (void)pass(c, 2 + 12); /* type, reserved, position */
+    (void)pass(c, 2 + 12); /* skip type, a reserved byte and position */
     if (all || strcmp(name, device) == 0) {
       quaternion(c, m);
     } else {
@@ -189,14 +187,14 @@ static void instruments(cursor *c, const char *device, const supine_stream_heade
   }
 }
 
-/* Read an array of `expected` floats; ignore arrays of another length or type. */
+/* Read an array of `expected` 32-bit or 64-bit floats; ignore other lengths and types. */
 static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, uint64_t expected) {
   const uint64_t type = whole(c, 1);
   const uint64_t dimension = whole(c, 1);
   uint64_t count = 1;
   for (uint64_t i = 0; i < dimension; ++i) {
     const uint64_t size = whole(c, 2);
-    count = count > SUPINE_STREAM_BODY_MAX ? count : count * size; /* cannot overflow */
+    count = count > SUPINE_STREAM_BODY_MAX ? count : count * size; /* too small to overflow */
   }
   if (count != expected || (type != 10 && type != 11)) {
     return;
@@ -208,7 +206,7 @@ static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, 
 }
 
 static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind) {
-  (void)pass(c, 2); /* encoding: valid text is ASCII, which is the same in all */
+  (void)pass(c, 2); /* skip the encoding: valid text is ASCII in every encoding */
   const size_t length = (size_t)whole(c, 2);
   const unsigned char *text = pass(c, length);
   if (c->overrun == 0 && length < sizeof m->text) {
@@ -233,7 +231,7 @@ int supine_stream_message_is_known(const supine_stream_header *header) {
   return type_of(header) != TYPES;
 }
 
-/* Remove extension and metadata from a body of version 2; return 0 if their sizes are wrong. */
+/* Skip the extension and cut off the metadata of a body; return 0 if their sizes are wrong. */
 static int unwrap(cursor *c) {
   const size_t all = c->left;
   const uint64_t extension = whole(c, 2);
@@ -253,8 +251,8 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
   *message = (supine_stream_message){0};
   const size_t size = (size_t)header->size;
   if (supine_stream_crc64(0, body, size) != header->crc) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: the checksum is wrong: send it again",
-                            header->type);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s: the checksum is wrong: send the message again", header->type);
   }
   cursor c = {body, size, 0};
   if (header->version == 2 && !unwrap(&c)) {
@@ -278,7 +276,7 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
     transform(&c, header->device, ours, message);
   } else if (type == POINT) {
     points(&c, message);
-  } else if (type == POSITION && ours && size > 12) { /* 12 bytes hold no orientation */
+  } else if (type == POSITION && ours && size > 12) { /* 12 bytes hold no rotation */
     (void)pass(&c, 12);
     quaternion(&c, message);
   } else if (type == NDARRAY && ours) {

@@ -12,21 +12,21 @@
 
 #include "program/stream/peer.h"
 
-/* Largest body that is skipped, such as an image, in bytes; a larger one is an error. */
+/* Largest body that is skipped, such as an image, bytes; a larger body is an error. */
 static const uint64_t body_max = 256u << 20;
 
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_content content, double now,
                                        supine_error *error) {
   const int yes = 1;
-  const unsigned timeout = 20000; /* ms */
+  const unsigned timeout_ms = 20000;
   unsigned char *body = malloc(SUPINE_STREAM_BODY_MAX);
   if (body == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   (void)setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   (void)setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof yes);
-  (void)setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout, sizeof timeout);
+  (void)setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
   *peer = (supine_stream_peer){
       .socket = socket, .connecting = connecting, .emptied = now, .body = body, .content = content};
   return SUPINE_OK;
@@ -41,7 +41,7 @@ void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *fram
   *peer = (supine_stream_peer){.socket = -1};
 }
 
-/* Receive up to `size` bytes; return their number, 0 if none are there, -1 if the peer is gone. */
+/* Receive up to `size` bytes; return their number: 0 if none are available, -1 if disconnected. */
 static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
   const ssize_t got = recv(socket, bytes, size, MSG_DONTWAIT);
   return got > 0                                                                  ? got
@@ -49,7 +49,7 @@ static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
                                                                                   : -1;
 }
 
-/* Parse a complete header, and choose whether to read or skip its body. */
+/* Parse a complete header, and decide whether to skip the body; return false if it is invalid. */
 static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error *error) {
   if (supine_stream_header_read(peer->header_bytes, &peer->header, error) != SUPINE_OK) {
     return false;
@@ -57,7 +57,7 @@ static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error
   const uint64_t size = peer->header.size;
   if (size > body_max) {
     (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
-                           "a message of %llu bytes: send at most 256 MiB",
+                           "a message has %llu bytes: send at most 256 MiB",
                            (unsigned long long)size);
     return false;
   }

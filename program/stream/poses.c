@@ -10,7 +10,7 @@
 
 static const char *const columns[] = {"seconds", "gravity_x", "gravity_y", "gravity_z"};
 
-/* Read a row into a pose. `before` is the time of the previous pose, or 0, in s. */
+/* Read a pose from a row. `before` is the time of the previous pose, s; 0 for the first pose. */
 static supine_status read_pose(const supine_csv *csv, double before, supine_stream_pose *pose,
                                supine_error *error) {
   double number[4];
@@ -23,14 +23,14 @@ static supine_status read_pose(const supine_csv *csv, double before, supine_stre
   const double length = supine_length(number + 1);
   if (!(number[0] >= before)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: %g s comes after %g s: times begin at 0 or later and must not "
-                            "decrease",
+                            "%s:%zu: the time %g s is before %g s: times begin at 0 s or later "
+                            "and must not decrease",
                             csv->path, csv->line, number[0], before);
   }
   if (!(length > 1e-9) || !isfinite(length)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: gravity is zero or not finite: give a direction, as 0,1,0 for "
-                            "supine",
+                            "%s:%zu: gravity is zero or not finite: give a direction, such as "
+                            "0,1,0 for supine",
                             csv->path, csv->line);
   }
   *pose =

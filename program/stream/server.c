@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the main loop: read messages, compute a frame for the newest pose, send it. */
+/* Run the main loop: read messages, compute a frame for the newest pose, send the frame. */
 #include <errno.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -15,33 +15,34 @@
 #include "program/stream/tracked_patient.h"
 #include "sh/base/clock.h"
 
-/* Intervals, s. */
+/* Intervals in seconds. */
 static const double frame_interval = 15e-3; /* between frames while the lungs move without poses */
 static const double send_interval = 20e-3;  /* between checks whether a socket's queue is empty */
 static const double connect_interval = 1.0; /* between attempts to connect or accept */
-static const double stop_interval = 0.1;    /* between checks whether to stop */
+static const double stop_interval = 0.1;    /* between calls of options->stop */
 
+/* All times are in seconds of supine_clock_seconds. */
 struct supine_stream_server {
   const supine_stream_options *options;
   supine_stream_counts counts;
   supine_stream_patient patient;
   supine_stream_frames *frames;
   supine_stream_frame *latest;
-  double frame_time; /* when `latest` was made, s of the clock */
-  int listener;      /* -1: none */
+  double frame_time; /* when `latest` was made */
+  int listener;      /* listening socket; -1: none */
   int port;
   supine_stream_address target;
-  double connect_at;              /* when to connect next, s of the clock; INFINITY: never */
-  double accept_at;               /* when to accept peers again, s of the clock */
-  supine_stream_peer *connected;  /* peer of --connect; NULL: none */
+  double connect_at;              /* when to connect next; INFINITY: never */
+  double accept_at;               /* when to accept peers again, after a failure */
+  supine_stream_peer *connected;  /* connected or connecting peer of --connect; NULL: none */
   supine_stream_peer *peer;       /* [options->peers] */
-  struct pollfd *polled;          /* [peers + 2] */
-  supine_stream_peer **owner;     /* [peers + 2] peer of each polled socket; NULL: none */
-  size_t replayed;                /* number of recorded poses followed so far */
-  double replay_begun;            /* when the replay began, s of the clock; < 0: not yet */
-  double waited;                  /* when poll() was last called, s of the clock */
-  double woke;                    /* when poll() last returned, s of the clock */
-  supine_stream_latency *latency; /* [2] of weights, of POLYDATA */
+  struct pollfd *polled;          /* [options->peers + 2] peers, listener, live page */
+  supine_stream_peer **owner;     /* [options->peers + 2] peer of each polled socket, or NULL */
+  size_t replayed;                /* number of recorded poses replayed so far */
+  double replay_begun;            /* when the replay began; < 0: not yet */
+  double waited;                  /* when ppoll() was last called */
+  double woke;                    /* when ppoll() last returned */
+  supine_stream_latency *latency; /* [2]: one of weights, one of points and surfaces */
 };
 
 /* Return whether the newest frame is to be sent to a peer. */
@@ -59,7 +60,7 @@ static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
   supine_stream_peer_end(peer, s->frames);
 }
 
-/* Find a slot for a socket; where none is free, close the socket and return NULL. */
+/* Initialise a peer in a free slot; if there is none, close the socket and return NULL. */
 static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool connecting) {
   supine_error error;
   for (size_t i = 0; i < s->options->peers; ++i) {
@@ -83,7 +84,7 @@ static void accept_peers(supine_stream_server *s) {
     const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket < 0) {
       if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
-        s->accept_at = s->woke + connect_interval; /* no descriptor is free, for example: wait */
+        s->accept_at = s->woke + connect_interval; /* an error such as too many open files */
       }
       return;
     }
@@ -97,7 +98,7 @@ static void connect_peer(supine_stream_server *s) {
   s->connect_at = s->connected == NULL ? s->woke + connect_interval : (double)INFINITY;
 }
 
-/* Handle a connecting socket that became writable: it is connected, or it failed. */
+/* Complete or abandon a connection whose socket became writable. */
 static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
   int failure = 0;
   socklen_t size = sizeof failure;
@@ -118,8 +119,9 @@ static void take_request(supine_stream_server *s, supine_stream_peer *peer, cons
       return;
     }
   }
-  supine_stream_patient_warn(
-      &s->patient, s->woke, "a peer requests '%s': send weights, points, surface or nothing", text);
+  supine_stream_patient_warn(&s->patient, s->woke,
+                             "request '%s' is unknown: give weights, points, surface or nothing",
+                             text);
 }
 
 static void receive(void *context, supine_stream_peer *peer) {
@@ -136,7 +138,7 @@ static void receive(void *context, supine_stream_peer *peer) {
     take_request(s, peer, message.text);
     return;
   }
-  /* If poll() did not wait, the message may have arrived at any time since the socket was empty. */
+  /* If ppoll() returned at once, the message may have come any time after the socket was empty. */
   const bool waited = s->woke - s->waited > 50e-6;
   supine_stream_patient_receive(&s->patient, &message, waited ? s->woke : peer->emptied,
                                 peer->header.stamp);
@@ -172,7 +174,7 @@ static void replay_poses(supine_stream_server *s) {
   }
 }
 
-/* Return when to make the next frame, s of the clock; INFINITY if the lungs do not move. */
+/* Return the time at which to make the next frame; INFINITY if the lungs do not move. */
 static double frame_due(const supine_stream_server *s) {
   const double soonest = s->latest == NULL ? 0.0 : s->frame_time + 1.0 / s->options->rate;
   if (s->patient.pending || s->latest == NULL) {
@@ -181,7 +183,7 @@ static double frame_due(const supine_stream_server *s) {
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* While poses arrive at this rate, they trigger the frames. */
+  /* Arriving messages trigger frames themselves; wait two intervals in case the messages stop. */
   const bool driven = s->woke - s->patient.received < 2.0 * frame_interval;
   return fmax(soonest, s->frame_time + (driven ? 2.0 : 1.0) * frame_interval);
 }
@@ -189,7 +191,7 @@ static double frame_due(const supine_stream_server *s) {
 static bool make_frame(supine_stream_server *s) {
   supine_stream_snapshot snapshot;
   supine_stream_patient_snapshot(&s->patient, s->woke, &snapshot);
-  supine_stream_frame_release(s->frames, s->latest); /* its memory, still in the cache, is reused */
+  supine_stream_frame_release(s->frames, s->latest); /* the next frame reuses its cached memory */
   s->latest = supine_stream_frame_acquire(s->frames, &snapshot);
   if (s->latest == NULL) {
     return false;
@@ -221,7 +223,7 @@ double supine_stream_latency_quantile(const supine_stream_latency *latency, doub
   return latency->worst;
 }
 
-/* Send a peer the rest of its frame, or the newest frame if it is ready. */
+/* Send a peer the rest of its frame, or the newest frame if the peer is ready for it. */
 static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
   if (needs_frame(s, peer) && supine_stream_peer_ready(peer)) {
     supine_stream_peer_give(peer, s->frames, s->latest);
@@ -256,7 +258,7 @@ static void send_peers(supine_stream_server *s) {
   }
 }
 
-/* Compute the timeout of ppoll(). */
+/* Compute how long ppoll() may wait in a run that ends at the time `end`. */
 static struct timespec find_timeout(const supine_stream_server *s, double end) {
   const supine_stream_poses *poses = s->options->replay;
   double next = fmin(fmin(s->woke + stop_interval, end), fmin(s->connect_at, frame_due(s)));
@@ -268,11 +270,11 @@ static struct timespec find_timeout(const supine_stream_server *s, double end) {
       next = fmin(next, s->woke + send_interval);
     }
   }
-  const double left = fmax(0.0, next - supine_clock_seconds()); /* stop_interval at most */
+  const double left = fmax(0.0, next - supine_clock_seconds()); /* at most stop_interval */
   return (struct timespec){0, (long)(1e9 * left)};
 }
 
-/* List the sockets for poll() and return their number. */
+/* List the sockets for ppoll() to watch, and return their number. */
 static nfds_t gather(supine_stream_server *s) {
   nfds_t count = 0;
   for (size_t i = 0; i < s->options->peers; ++i) {
@@ -293,7 +295,7 @@ static nfds_t gather(supine_stream_server *s) {
   return count;
 }
 
-/* Read from all sockets that poll() reported, and follow due poses of a replay. */
+/* Read from all sockets that ppoll() reported, and take the poses of a replay that are due. */
 static void receive_all(supine_stream_server *s, nfds_t count) {
   for (nfds_t i = 0; i + 2 < count; ++i) {
     if (s->polled[i].revents != 0) {

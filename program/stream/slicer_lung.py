@@ -22,7 +22,7 @@ DEVICE = "Patient"
 
 
 def rotation_of(matrix):
-    """Return the rows of the 3 x 3 rotation of a 4 x 4 matrix, given as 16 numbers by rows."""
+    """Return the rows of the 3 x 3 rotation in a 4 x 4 matrix, which is given as 16 numbers, row by row."""
     return [[matrix[4 * row + column] for column in range(3)] for row in range(3)]
 
 
@@ -90,7 +90,7 @@ class Follow:
 
 
 def show_points(vtk, model, points, triangles):
-    """Set the points of a model, and with the first frame its triangles."""
+    """Set the points of a model; with the first frame also set its triangles."""
     import numpy
     from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 

@@ -2,7 +2,7 @@
 """A peer of 'supine stream' in plain Python: OpenIGTLink over a socket, and the basis file.
 
     link = Link("localhost", 18944)
-    link.send_pose(rotation)               # 3 x 3, rows
+    link.send_pose(rotation)               # 3 x 3, row by row
     stamp, frame = link.newest(timeout=1)  # weights and gains, or points
 """
 import array as arrays
@@ -32,7 +32,7 @@ _TABLE = _crc_table()
 
 
 def crc64(data, crc=0):
-    """Return the CRC-64 of ECMA-182, most significant bit first, from 0."""
+    """Return the CRC-64 (ECMA-182, most significant bit first) of data that follows bytes with the CRC `crc`."""
     for byte in data:
         crc = ((crc << 8) & 0xFFFFFFFFFFFFFFFF) ^ _TABLE[(crc >> 56) ^ byte]
     return crc
@@ -183,7 +183,8 @@ class Link:
 
 
 class Basis:
-    """A scalar basis file, for peers that receive weights: x_j = p_j + A_j (w . c) d_j."""
+    """A basis file, for peers that receive weights w: x_j = p_j + A_j (w . c) d_j on each axis j. The file must
+    store one direction d of displacement for each vertex, with a coefficient c for each mode."""
 
     def __init__(self, path):
         with open(path, "rb") as file:
@@ -206,7 +207,7 @@ class Basis:
         return memoryview(self._data[begin:end]).cast(kind)
 
     def deform(self, frame):
-        """Return the positions, flat, of a frame: K weights, then the gains A of each lung on x, y, z."""
+        """Return the flat array of positions of a frame: K weights, then the gains A (x, y, z) of each lung."""
         weights, gains = frame[:self.modes], frame[self.modes:]
         positions = []
         for i, lung in enumerate(self.lung):

@@ -12,8 +12,8 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
                                            const supine_pv_breath *breath, supine_error *error) {
   const double start = 0.0;
   double above = 0.0;
-  const supine_status status =
-      supine_breath_evaluate(pv, breath, 1, &start, &above, NULL, error); /* checks the arguments */
+  /* Evaluate the breath once to check the arguments. */
+  const supine_status status = supine_breath_evaluate(pv, breath, 1, &start, &above, NULL, error);
   if (status == SUPINE_OK) {
     *volume = (supine_stream_volume){.breathes = true, .pv = *pv, .breath = *breath};
   }
@@ -34,8 +34,8 @@ supine_state supine_stream_volume_at(const supine_stream_volume *volume, const s
                                      const double gravity[3], double time) {
   double above = 0.0;
   if (volume->breathes) {
-    (void)supine_breath_evaluate(&volume->pv, &volume->breath, 1, &time, &above, NULL,
-                                 NULL); /* succeeded in supine_stream_volume_breathe */
+    /* This cannot fail: supine_stream_volume_breathe has checked the arguments. */
+    (void)supine_breath_evaluate(&volume->pv, &volume->breath, 1, &time, &above, NULL, NULL);
     return supine_breath_state(basis, gravity, above);
   }
   supine_state state = volume->fixed;
@@ -72,7 +72,7 @@ void supine_stream_patient_warn(supine_stream_patient *patient, double now, cons
   patient->options->warn(patient->options->context, text);
 }
 
-/* Mark a message as received, to be shown by the next frame. */
+/* Note when a message was received, and that the next frame must show it. */
 static void note_message(supine_stream_patient *p, double received) {
   p->pending = true;
   p->received = received;
@@ -81,7 +81,7 @@ static void note_message(supine_stream_patient *p, double received) {
 static void store_pose(supine_stream_patient *p, const double gravity[3], double received,
                        uint64_t stamp) {
   memcpy(p->gravity, gravity, sizeof p->gravity);
-  if (p->pose_received < 0.0) { /* first pose: nothing to smooth from */
+  if (p->counts->poses == 0) { /* the first pose is not smoothed */
     memcpy(p->smooth, gravity, sizeof p->smooth);
     p->smoothed = received;
     p->first_pose = received;
@@ -107,13 +107,13 @@ static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
   }
   if (verdict == SUPINE_STREAM_REPAIRED) {
     ++p->counts->repaired;
-    supine_stream_patient_warn(p, received, "a pose is not a rotation, but used: %s", why);
+    supine_stream_patient_warn(p, received, "a pose is repaired, as it is not a rotation: %s", why);
   }
   store_pose(p, gravity, received, stamp);
 }
 
-/* Store the position of an observed point, not-a-number if it is not seen; return false if no point
- * has that name. */
+/* Store the position of an observed point (not-a-number: the point is not seen); return false if no
+ * point has that name. */
 static bool store_position(supine_stream_patient *p, const char *name, const double position[3],
                            double received, uint64_t stamp) {
   supine_stream_observed *observed = p->options->observed;
@@ -184,7 +184,7 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
       note_message(patient, received);
     } else {
       supine_stream_patient_warn(patient, received,
-                                 "a volume is refused: it is not finite; send mL");
+                                 "a volume is refused: it is not finite; send a number of mL");
     }
     break;
   case SUPINE_STREAM_VOLUME_TEXT:
@@ -229,8 +229,8 @@ static double total_volume(const supine_basis *basis, const supine_pose *pose) {
   return sum;
 }
 
-/* Compute the gains of the current volume, or keep the last gains if it is out of reach; compute
- * the volumes that they give. */
+/* Compute the gains for the current volume, or keep the last gains if it is out of reach; then
+ * compute the volumes that result. */
 static void find_gains(supine_stream_patient *patient, double now,
                        supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;
@@ -255,7 +255,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   snapshot->above += snapshot->volume;
 }
 
-/* Fit the pose to the observed points, if any is seen; fit the volume too unless it is fixed. */
+/* Fit the pose to the points that are seen, if any; fit the volume too unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
                           supine_stream_snapshot *snapshot) {
   const supine_stream_volume *volume = patient->options->volume;
@@ -301,7 +301,7 @@ void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
                                    patient->options->smooth, patient->smooth);
   *snapshot = (supine_stream_snapshot){0};
   patient->smoothed = now;
-  patient->turning = angle > 1e-6; /* a smaller angle moves points by less than 1 um */
+  patient->turning = angle > 1e-6; /* a smaller angle displaces points by less than 1 um */
   memcpy(snapshot->gravity, patient->smooth, sizeof snapshot->gravity);
   snapshot->received = patient->pending ? patient->received : -1.0;
   snapshot->pose_received = patient->pose_received;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Serve the page and its WebSocket by libwebsockets, in another thread. */
+/* Serve the live page and its WebSocket with libwebsockets, in another thread. */
 #include <fcntl.h>
 #include <jansson.h>
 #include <libwebsockets.h>
@@ -26,47 +26,47 @@
   EACH(lws_, service) EACH(lws_, set_log_level) EACH(lws_, write)
 /* clang-format on */
 
-/* Functions of libwebsockets, loaded at run time: linking it would need OpenSSL and three event
- * loops. */
+/* Functions of libwebsockets. The library is loaded at run time: linking it would also require
+ * OpenSSL and three libraries of event loops. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
-/* Sizes in bytes: of a state as JSON, of the largest message received, of a part of the page. */
+/* Sizes, bytes. TEXT: a state as JSON; RECEIVED: the largest message; CHUNK: a part of the page. */
 enum { TEXT = 256, RECEIVED = 512, CHUNK = 65536 };
 
 struct supine_stream_web {
   supine_stream_site site;
   struct lws_context *context;
   int port;
-  int poses[2]; /* pipe of the poses received */
+  int poses[2]; /* pipe that carries received poses to the server's thread */
   pthread_t thread;
   bool running;
   atomic_bool ending;
   atomic_size_t viewers;
-  pthread_mutex_t lock; /* for the fields below */
+  pthread_mutex_t lock; /* protects the fields below */
   uint64_t number;      /* number of the state in `text`: 1, 2, ... */
   char text[TEXT];      /* state as JSON; age and the final brace are added when it is sent */
-  double pose_received; /* when the newest pose was received, s of the clock; < 0: none */
+  double pose_received; /* as in supine_stream_snapshot */
 };
 
-/* A pose in the pipe. */
+/* A received pose, as written to the pipe. */
 typedef struct web_pose {
   double gravity[3];
-  double received; /* s of the clock */
+  double received; /* time of receipt, s of supine_clock_seconds */
 } web_pose;
 
-/* A connection: of a browser that loads the page, or of a viewer. */
+/* State of a connection, to a browser that loads the page or to a viewer. */
 typedef struct session {
   size_t sent;     /* bytes of the page sent so far */
   uint64_t number; /* number of the last state sent */
-  bool counted;    /* included in `viewers` */
+  bool counted;    /* the connection is counted in `viewers` */
 } session;
 
 static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
 
-/* Return whether a WebSocket was opened by the page of this server, so that its Origin header names
- * this host, or by a program that is not a browser and sends no Origin. */
+/* Return whether to accept a WebSocket. Its Origin header must name this host, so that no other
+ * web site connects; programs other than browsers send no Origin and are accepted. */
 static bool is_ours(struct lws *wsi) {
   char origin[256] = "";
   char host[256] = "";
@@ -81,7 +81,7 @@ static bool is_ours(struct lws *wsi) {
   return from != NULL && strcmp(from + 3, host) == 0;
 }
 
-/* Store the pose in {"gravity":[x,y,z]}; ignore other messages. */
+/* Pass the pose of a message {"gravity":[x,y,z]} to the pipe; ignore other messages. */
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
@@ -93,12 +93,12 @@ static void receive(supine_stream_web *web, const char *bytes, size_t size) {
     good = json_is_number(value) && isfinite(taken.gravity[i]);
   }
   json_decref(pose);
-  if (good) { /* a full pipe loses this pose, but newer poses follow */
+  if (good) { /* if the pipe is full, the pose is lost, but newer ones follow */
     (void)!write(web->poses[1], &taken, sizeof taken);
   }
 }
 
-/* Send the newest state to a viewer unless it has it; return 0, or -1 to disconnect the viewer. */
+/* Send the newest state unless it was sent before; return 0, or -1 to disconnect the viewer. */
 static int send_state(supine_stream_web *web, struct lws *wsi, session *s) {
   enum { AGE = 32 };
   unsigned char bytes[LWS_PRE + TEXT + AGE];
@@ -135,12 +135,12 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
       (void)atomic_fetch_sub(&web->viewers, 1);
     }
     return 0;
-  case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* by supine_stream_web_send */
+  case LWS_CALLBACK_EVENT_WAIT_CANCELLED: /* caused by supine_stream_web_send */
     (void)lws.callback_on_writable_all_protocol(web->context, lws.get_protocol(wsi));
     return 0;
   case LWS_CALLBACK_SERVER_WRITEABLE:
     return send_state(web, wsi, s);
-  case LWS_CALLBACK_RECEIVE: /* messages in several parts are too long to be valid */
+  case LWS_CALLBACK_RECEIVE: /* a message in several fragments is too long to be valid */
     if (lws.is_first_fragment(wsi) != 0 && lws.is_final_fragment(wsi) != 0) {
       receive(web, in, size);
     }
@@ -233,11 +233,11 @@ supine_status supine_stream_web_create(const supine_stream_site *site, supine_st
   info.gid = -1;
   info.uid = -1;
   info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
-  /* With IPv6 enabled, libwebsockets would listen on every address instead of the IPv4 one. */
+  /* With IPv6 enabled, libwebsockets would listen on every address, not only at the given one. */
   if (strchr(info.iface, ':') == NULL) {
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   }
-  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* and connections that load the page */
+  info.fd_limit_per_thread = (unsigned)site->viewers + 64; /* 64: connections that load the page */
   if (site->certificate != NULL) {
     info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
     info.ssl_cert_filepath = site->certificate;

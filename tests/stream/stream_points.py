@@ -71,14 +71,17 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     seen = {r["name"]: [float(r[k]) + s for k, s in zip("xyz", SHIFT, strict=True)] for r in rows}
     server = subprocess.Popen([supine, "stream", at("lungs.safetensors"), "--listen", "0", "--seconds", "100",
-                               "--points", at("inside.safetensors"), "--send", "surface", "--device", "Patient"],
+                               "--points", at("inside.safetensors"), "--send", "surface", "--device", "Patient",
+                               "--record", at("poses.csv")],
                               stdout=subprocess.PIPE, text=True)
     try:
         port = int(re.match(r"listening on port (\d+)", server.stdout.readline())[1])
         for version in (1, 2):
             link = Link("127.0.0.1", port, version=version, check=True)
-            link.send_pose(LEFT, stamp=5)
             names = list(seen)
+            if version == 1:  # recorded times count from the first pose, not from an earlier point
+                answer(link, 4, lambda: link.send("TRANSFORM", names[0], transform(TURNED, seen[names[0]]), 4))
+            link.send_pose(LEFT, stamp=5)
             for name in names[:-1]:  # the rotation of a sensor is ignored
                 link.send("TRANSFORM", name, transform(TURNED, seen[name]), 6)
             last = names[-1]
@@ -94,5 +97,7 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
         said = server.communicate(timeout=30)[0]
     print(said, end="")
     assert server.returncode == 0
-    assert said.startswith("positions of observed points: 80\n"), said
+    assert said.startswith("positions of observed points: 81\n"), said
     assert "malformed messages: 2;" in said, said
+    with open(at("poses.csv"), encoding="ascii") as file:
+        assert float(next(csv.DictReader(file))["seconds"]) == 0
