@@ -20,7 +20,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
 /* PIECE: number of vertices computed together, so that they stay in the L1 cache. GRAIN: smallest
  * number of vertices for which a thread is worth starting. */
-enum { PIECE = 1024, GRAIN = 64 * PIECE, THREADS_MAX = 256, HUGE_PAGE = 1 << 21 /* bytes */ };
+enum { PIECE = 2048, GRAIN = 32 * PIECE, THREADS_MAX = 256, HUGE_PAGE = 1 << 21 /* bytes */ };
 
 struct supine_stream_frames {
   const supine_basis *basis;
