@@ -15,7 +15,8 @@ Expected differences from version 0.2.0:
   order. Displacements differ by one unit in the last place (3e-5 mm), hence about 1 % of the voxels
   of 16-bit noise by 1, and 5 of 65 million labels.
 - embed: the header's version and its place, and the checksum; in large grids also the last place of
-  one coefficient in 200,000, as the interpolation is factorised by Cholesky instead of LU."""
+  one coefficient in 200,000, as the interpolation is factorised by Cholesky instead of LU.
+- render: the processor draws instead of OpenGL, a grey shell shows opacity, and names changed."""
 import argparse
 import operator
 import os
