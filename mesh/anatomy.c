@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Find the axes, out of 48 possible ones, that fit the shape of lungs best.
+/* Find which of the 48 possible axes fit the shape of lungs best.
  *
  * Their score is the sum of four terms in the third moments of volume about a lung's centre,
  *
  *     m_abc = integral of a b c dV / (V sd_a sd_b sd_c)
  *
- * with x outwards from the midline. All were positive for nine lungs of five people and two
+ * with x outwards from the midline. All terms were positive for nine lungs of five people and two
  * synthetic lungs:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
@@ -36,7 +36,7 @@ static const double most_kurtosis = 1.8;
 static const double least_side = 0.12;
 
 typedef struct shape {
-  double volume, centre[3], deviation[3]; /* mm^3, mm, and standard deviations in mm */
+  double volume, centre[3], deviation[3]; /* volume, mm^3; centre and standard deviations, mm */
   double kurtosis[3];
   double third[3][3][3]; /* third moments m_abc */
 } shape;
@@ -58,8 +58,8 @@ static void add_point(const double p[3], double w, double sum[3], double square[
 /* Return the mean of x^4 over a tetrahedron whose corners have x = 0, a, b and c: the sum of all
  * monomials of degree 4 in a, b and c, divided by 35. */
 static double mean_fourth(double a, double b, double c) {
-  double ab = 1.0; /* ab, abc: sums of all monomials of degree n in a and b, and in a, b and c */
-  double abc = 1.0;
+  double ab = 1.0;  /* sum of all monomials of degree n in a and b */
+  double abc = 1.0; /* sum of all monomials of degree n in a, b and c */
   double power = 1.0;
   for (int n = 0; n < 4; ++n) {
     power *= a;
@@ -133,7 +133,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the volume's */
+  for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the centroid */
     s->volume = integrate(mesh, s->centre, sum, square, s->third, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {

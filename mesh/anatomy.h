@@ -6,15 +6,15 @@
 #include "mesh/mesh.h"
 
 typedef struct supine_mesh_anatomy {
-  supine_axes axes; /**< axes that the shape fits best, but LPS unless others fit clearly better */
+  supine_axes axes; /**< axes that the shape fits best; LPS unless other axes are clearly better */
   bool certain;     /**< whether no other axes fit nearly as well */
   int side;         /**< side of a single lung in LPS: +1 left, -1 right, 0 unknown */
   bool joined;      /**< whether a single surface seems to hold both lungs */
 } supine_mesh_anatomy;
 
 /** Find the axes from third moments of volume: a lung is narrow at the head, reaches deepest at the
- * back and is hollow towards the heart; the right lung is larger, and the left one gives way to the
- * heart.
+ * back and is hollow towards the heart; the right lung is larger, and the left lung gives way to
+ * the heart.
  * @param lungs  [count] one or two surfaces, each a lung */
 supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t count);
 

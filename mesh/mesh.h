@@ -23,17 +23,17 @@ typedef enum supine_axes {
   SUPINE_AXES_COUNT = 49
 } supine_axes;
 
-/** Parse three letters, such as "RAI"; false for anything else. */
+/** Parse three letters, such as "RAI"; return false for anything else. */
 bool supine_mesh_axes_parse(const char *letters, supine_axes *axes);
 /** Write the three letters of axes and a NUL; AUTO is LPS. */
 void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
-/** Find the signed permutation matrix that converts these axes to LPS; AUTO is LPS. */
+/** Find the signed permutation matrix that converts coordinates in `axes` to LPS; AUTO is LPS. */
 void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
 /** Convert a point or vector to LPS in place, and multiply it by `scale`. */
 void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
 /** Find the axes whose matrix is the product of the matrices of `then` and `first`. */
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
-/** Report whether axes are left-handed: converted to LPS, triangles then face the other way. */
+/** Return whether axes are left-handed: converted to LPS, triangles then face the other way. */
 bool supine_mesh_axes_mirrored(supine_axes axes);
 
 /** A triangle surface. Zero-initialise; release with supine_mesh_free. */
@@ -66,22 +66,21 @@ typedef struct supine_mesh_report {
  * runs in its own process, so files on which an importer crashes or exceeds its limits are
  * refused too. Positions are rounded to float32.
  *
- * @param path     file
  * @param options  NULL: defaults
  * @param mesh     zero-initialised; written only on success
  * @param report   optional
- * @retval SUPINE_ERROR_READ    missing, a folder, unreadable
- * @retval SUPINE_ERROR_FORMAT  empty, truncated or malformed, or no importer for it
- * @retval SUPINE_ERROR_MESH    no triangles, a coordinate that is not finite (vertex named)
- * @retval SUPINE_ERROR_ARGUMENT  millimetres_per_unit negative or not finite
+ * @retval SUPINE_ERROR_READ    the file is missing, a folder or unreadable
+ * @retval SUPINE_ERROR_FORMAT  the file is empty, truncated or malformed, or has no importer
+ * @retval SUPINE_ERROR_MESH    the file has no triangles, or a coordinate that is not finite
+ * @retval SUPINE_ERROR_ARGUMENT  millimetres_per_unit is negative or not finite
  * @retval SUPINE_ERROR_MEMORY
  * Thread-safe. */
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
-/** Report whether `side`, mm, is a possible longest side of the bounding box of lungs.
- * @param other  output: the unit other than mm in which this number is most likely, as a string
- *             literal; NULL if it is impossible in all of them */
+/** Return whether `side`, mm, is a possible longest side of the bounding box of lungs.
+ * @param other  output: the unit other than mm in which `side` is most likely, as a string
+ *             literal; NULL if `side` is impossible in every other unit */
 bool supine_mesh_unit_is_likely(double side, const char **other);
 /** Find the length in mm of "mm", "cm", "m", "um" or "in"; return false for any other name. */
 bool supine_mesh_unit_find(const char *name, double *millimetres);
@@ -100,17 +99,17 @@ typedef struct supine_topology {
   size_t non_manifold_edges; /**< edges shared by three or more triangles */
   size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
   size_t component_count;    /**< connected components, over shared vertices */
-  uint32_t *component;       /**< [vertex_count], numbered by first appearance */
+  uint32_t *component;       /**< [vertex_count] component of each vertex, in order of appearance */
   long euler_characteristic; /**< vertices - edges + triangles */
-  long genus;  /**< of a closed surface, (2 * component_count - euler_characteristic) / 2; -1 if the
-                  surface is not closed or this is no whole number >= 0 */
+  long genus; /**< genus (2 * component_count - euler_characteristic) / 2 of a closed surface; -1 if
+                 the surface is open or the formula gives no whole number >= 0 */
   bool closed; /**< whether every edge joins exactly two triangles of the same orientation */
 } supine_topology;
 
 /** Find edges and components, in linear time and memory except for sorting each vertex's edges.
  * @param topology  zero-initialised; written only on success
- * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or one out of range, or more
- *   than 2^31 - 1 vertices
+ * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or out of range, or there are
+ *   more than 2^31 - 1 vertices
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
@@ -148,28 +147,26 @@ typedef struct supine_mesh_save_options {
   supine_axes axes;    /**< axes of the file, written as its SPACE tag; AUTO: LPS */
   const double *from;  /**< optional [vertex_count, 3] starting points of displacements, mm: VTP
                             and PLY files then contain displacements and their magnitudes */
-  const char *comment; /**< optional, one line */
+  const char *comment; /**< optional note of one line */
   double millimetres_per_unit; /**< unit of positions and displacements; 0: 1 mm */
   const float *expected_error; /**< optional [vertex_count] in mm, whatever the file's unit: point
                                   data "expected_error_mm" of VTP and PLY */
   /** @{ For VTP only, all optional. */
   const float *normals;            /**< [vertex_count, 3] point data "Normals" */
   const unsigned char *lung;       /**< [vertex_count] index of the lung, point data "lung" */
-  const supine_mesh_field *fields; /**< [field_count] */
+  const supine_mesh_field *fields; /**< [field_count] numbers for the field data */
   size_t field_count;
-  double rounding; /**< lengths are rounded to multiples of the largest power of two, in the file's
-                      unit, that is not above this length in mm, and normals to 1/256; 0: not
-                      rounded */
+  double rounding; /**< largest step of rounded lengths, mm; the step is a power of two of the
+                      file's unit. Normals get steps of 1/256. 0: no rounding */
   /** @} */
 } supine_mesh_save_options;
 
 /** Write the surface in the format of the name's ending: .ply (binary), .obj, .stl (binary),
- * .vtp. The file appears whole or not at all: written to a temporary name beside it, then
- * renamed.
+ * .vtp. The file appears completely or not at all.
  * @param options  NULL: LPS, no displacement, no comment
- * @retval SUPINE_ERROR_ARGUMENT  another ending, or too large for the formats
- * @retval SUPINE_ERROR_MESH      a coordinate that is not finite (vertex named)
- * @retval SUPINE_ERROR_WRITE     no such folder, no permission, full disk */
+ * @retval SUPINE_ERROR_ARGUMENT  another ending, or the mesh is too large for the formats
+ * @retval SUPINE_ERROR_MESH      a coordinate is not finite
+ * @retval SUPINE_ERROR_WRITE     the folder is missing or not writable, or the disk is full */
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
@@ -196,7 +193,7 @@ supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error
 void supine_mesh_series_close(supine_mesh_series *series);
 
 /** The formats of supine_mesh_save, by ending; each has a function supine_mesh_save_NAME in
- * mesh/io. This is the only list of them. */
+ * mesh/io. This is the only list of formats. */
 #define SUPINE_MESH_FORMATS(FIRST, NEXT) FIRST(ply) NEXT(obj) NEXT(stl) NEXT(vtp)
 
 /** The endings as text: ".ply, .obj, .stl, .vtp". */
@@ -204,7 +201,7 @@ void supine_mesh_series_close(supine_mesh_series *series);
 #define SUPINE_MESH_ENDING(name) "." #name
 #define SUPINE_MESH_NEXT_ENDING(name) ", ." #name
 
-/** Report whether `path` ends in one of SUPINE_MESH_ENDINGS. */
+/** Return whether `path` ends in one of SUPINE_MESH_ENDINGS. */
 bool supine_mesh_save_supports(const char *path);
 
 #endif

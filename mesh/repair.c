@@ -22,7 +22,7 @@ static uint32_t opposite(const supine_mesh *mesh, const supine_mesh_side *s) {
   return mesh->triangles[s->at % 3 == 0 ? s->at + 2 : s->at - 1];
 }
 
-/* Mark triangles with the same three corners as an earlier one. */
+/* Mark triangles with the same three corners as an earlier triangle. */
 static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   for (size_t i = 0; i < count; i += supine_mesh_sides_of_edge(sides, i, count)) {
@@ -38,7 +38,7 @@ static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sid
   }
 }
 
-/* Mark triangles without an edge that exactly two triangles share; none if there are too many. */
+/* Mark triangles with no edge that exactly two triangles share, unless they exceed most_loose. */
 static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -77,7 +77,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
     root = l->parent[root];
   }
   *turned = sum;
-  while (l->parent[t] != root && t != root) { /* path compression */
+  while (l->parent[t] != root && t != root) { /* link the whole path to the root */
     const uint32_t next = l->parent[t];
     const uint8_t here = l->turned[t];
     l->parent[t] = root;
@@ -88,7 +88,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
   return root;
 }
 
-/* Link triangles across edges that belong to two of them; return false if they form a one-sided
+/* Link triangles across edges that belong to two triangles; return false if they form a one-sided
  * surface. Set `closed` to whether every edge belongs to an even number of triangles. */
 static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *sides, const links *l,
                            bool *closed) {
@@ -144,7 +144,7 @@ static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)
   return reversed;
 }
 
-/* Copy the vertices that several surfaces share, so that each has its own.
+/* Copy the vertices that several surfaces share, so that each surface has its own vertices.
  * @param separated  output: number of copies */
 static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t *separated) {
   const size_t corners = 3 * mesh->triangle_count;
@@ -153,7 +153,7 @@ static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t
   uint32_t *next = calloc(count + corners + 1, sizeof *next); /* next copy of a vertex; 0: none */
   supine_status status = owner == NULL || next == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
-    memset(owner, 0xFF, (count + corners) * sizeof *owner); /* UINT32_MAX: none yet */
+    memset(owner, 0xFF, (count + corners) * sizeof *owner); /* UINT32_MAX: no owner yet */
   }
   for (size_t i = 0; i < corners && status == SUPINE_OK; ++i) {
     uint8_t turned;
@@ -253,7 +253,7 @@ size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {
 }
 
 typedef struct piece {
-  double volume;  /* mm^3, positive if it faces outwards */
+  double volume;  /* volume, mm^3; negative if the component faces inwards */
   uint32_t first; /* first vertex of the component */
 } piece;
 

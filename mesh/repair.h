@@ -6,7 +6,7 @@
 #include "mesh/mesh.h"
 
 typedef struct supine_mesh_repair_report {
-  size_t duplicates; /**< dropped triangles with the corners of an earlier one */
+  size_t duplicates; /**< dropped triangles with the corners of an earlier triangle */
   size_t loose;      /**< dropped triangles without an edge that exactly two triangles share */
   size_t reversed;   /**< triangles reversed to face like most of their surface */
   size_t separated;  /**< vertices added where closed surfaces shared a vertex */

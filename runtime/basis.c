@@ -25,7 +25,7 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   (void)vsnprintf(detail, sizeof detail, format, arguments);
   va_end(arguments);
   return supine_error_set(c->error, SUPINE_ERROR_FORMAT,
-                          "%s: %s: make it again with 'supine precompute'", c->name, detail);
+                          "%s: %s: make the file again with 'supine precompute'", c->name, detail);
 }
 
 /* Check that all numbers are finite and below 2^30 in magnitude. No lung needs larger numbers, and
@@ -45,7 +45,7 @@ static bool finite_floats(const float *values, size_t count) {
 static bool finite_doubles(const double *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
-    bad += fabs(values[i]) < 0x1p30 ? 0 : 1; /* also counts NaN, which compares false */
+    bad += fabs(values[i]) < 0x1p30 ? 0 : 1; /* NaN also counts as bad, because it compares false */
   }
   return bad == 0;
 }
@@ -402,7 +402,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
       simd >= SUPINE_SIMD_COUNT) {
     return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT,
-                            "unknown storage %d or instruction set %d: see supine_basis_options",
+                            "unknown storage %d or instruction set %d: give values of the enums",
                             (int)storage, (int)simd);
   }
   basis->kernels = supine_kernels_choose(&simd);

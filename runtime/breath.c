@@ -13,7 +13,7 @@ enum { LIMB_PARTS = 32 };
 /* A limb and its integral, which is computed once for many pressures and volumes. */
 typedef struct integrated {
   supine_pv_curve curve;
-  double sum[LIMB_PARTS + 1]; /* I(x) of supine_breath_curve_evaluate at the ends of the parts */
+  double sum[LIMB_PARTS + 1]; /* integral of slope() from -1 to each end of a part */
 } integrated;
 
 const char *supine_breath_limb_name(supine_pv_limb limb) {
@@ -25,13 +25,13 @@ supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_err
   const double volumes = curve->volume[1] - curve->volume[0];
   if (!(pressures > 0.0) || !isfinite(pressures)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the limb's pressures must rise from %g to %g cmH2O",
+                            "the limb's pressures must rise, but go from %g to %g cmH2O",
                             curve->pressure[0], curve->pressure[1]);
   }
   if (!(volumes > 0.0) || !isfinite(volumes)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the limb's volumes must rise from %g to %g mL", curve->volume[0],
-                            curve->volume[1]);
+                            "the limb's volumes must rise, but go from %g to %g mL",
+                            curve->volume[0], curve->volume[1]);
   }
   for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
     if (!(fabs(curve->control[i]) <= SUPINE_PV_CONTROL_MAX)) {
@@ -43,8 +43,8 @@ supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_err
   return SUPINE_OK;
 }
 
-/* Compute exp(U(x)), the derivative of I(x) (supine_breath_curve_evaluate). Term n of U is c_n+1
- * times the integral of P_n from -1 to x, (P_n+1 - P_n-1) / (2 n + 1). */
+/* Compute exp(U(x)) of supine_breath_curve_evaluate. Term n of U is c_n+1 times the integral of the
+ * Legendre polynomial P_n from -1 to x, (P_n+1 - P_n-1) / (2 n + 1). */
 static double slope(const supine_pv_curve *curve, double x) {
   double before = 1.0;
   double here = x;
@@ -135,7 +135,7 @@ static supine_status limb_pressure(const integrated *of, double volume, double *
     double next = at + (volume - held) / compliance;
     const bool inside = next >= low && next <= high;
     if (miss <= within || high - low <= 1e-15 * fabs(at)) {
-      *pressure = inside ? next : at; /* `next` is known already and more accurate than `at` */
+      *pressure = inside ? next : at; /* the Newton step is known already */
       return SUPINE_OK;
     }
     /* Bisect the bracket if the Newton step leaves it or the last step did not halve the error. */
@@ -160,7 +160,7 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
   for (size_t j = 0; j < count; ++j) {
     if (!(pressures[j] >= curve->pressure[0] && pressures[j] <= curve->pressure[1])) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "pressure %g cmH2O is outside the limb's range, %g to %g cmH2O",
+                              "pressure %g cmH2O is outside the limb's range: give %g to %g cmH2O",
                               pressures[j], curve->pressure[0], curve->pressure[1]);
     }
     const double volume =
@@ -174,7 +174,7 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
-      /* Inhale limb: fitted to a + b / (1 + exp(-(P - 10) / 6)) with a and b for 0 to 6000 mL. */
+      /* Inhale limb, fitted to a sigmoid from 0 to 6000 mL: a + b / (1 + exp(-(P - 10) / 6)). */
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
@@ -207,7 +207,7 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   }
   if ((int)breath->course < 0 || breath->course >= SUPINE_PV_COURSE_COUNT) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "unknown pressure course %d: see supine_pv_course",
+                            "unknown pressure course %d: use supine_pv_course",
                             (int)breath->course);
   }
   return SUPINE_OK;
@@ -234,7 +234,7 @@ typedef struct loop {
   double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained up to the peak pressure, mL */
 } loop;
 
-/* Check both limbs, and that their ranges hold a pressure, which messages call `what`. */
+/* Check both limbs, and that the ranges of both hold a pressure. `what` names it in messages. */
 static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
@@ -270,12 +270,13 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   if (full > inhale->volume[1]) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "tidal volume %g mL is larger than the %g mL that the inhale limb "
-                            "gains above %g cmH2O",
+                            "gains above %g cmH2O: give a smaller one",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
   status = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak);
   if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "no pressure found for %g mL on the inhale limb", full);
+    return supine_error_set(error, status, "no pressure found for %g mL: check the inhale limb",
+                            full);
   }
   status = limb_holds(pv, "peak", cycle->peak, error);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {

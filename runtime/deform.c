@@ -23,7 +23,7 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
   return moved;
 }
 
-/* Evaluate vertices begin <= i < end of one tile, by way of a buffer for the whole tile. */
+/* Evaluate vertices begin <= i < end of one tile, through a buffer that holds the whole tile. */
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
@@ -53,7 +53,7 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
 /* Number of vertices of a rigid part that are evaluated at once. */
 enum { RIGID_BLOCK = 256 };
 
-/* Replace the positions of rigid parts among vertices begin <= i < end of a target, see rigid.h. */
+/* Move rigid parts among vertices begin <= i < end of a target by rigid motions (rigid.h). */
 static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   for (size_t part = 0; part < basis->rigid_count; ++part) {
@@ -123,7 +123,7 @@ void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xy
 
 void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
                          size_t begin, size_t end, float *xyz) {
-  enum { BLOCK_BYTES = 1 << 18 }; /* of tiles that stay in the cache for all poses */
+  enum { BLOCK_BYTES = 1 << 18 }; /* size of a block that stays in the cache */
   const size_t block = BLOCK_BYTES / basis->tiles.stride * TILE;
   const size_t apart = 3 * (end - begin);
   supine_target target = {.add_reference = true,

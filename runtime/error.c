@@ -17,8 +17,8 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
     scale = fmax(scale, fabs(pose->gains[i / 3][i % 3]));
   }
-  /* Packing, folding and the sum over K modes round the displacement K + 8 times; adding the
-   * reference position rounds each coordinate once more. */
+  /* Packing, scaling the weights and the sum over K modes round the displacement K + 8 times;
+   * adding the reference position rounds each coordinate once more. */
   const double rounding =
       ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
   return 1.001 * (scale * stored + basis->reference_error + rounding);

@@ -23,8 +23,8 @@ struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
   supine_safetensors *file;
-  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< `name_of` points to these names */
-  const char *name_of[SUPINE_LUNGS_MAX];        /**< info.lung_names points here */
+  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< NUL-terminated names of the lungs */
+  const char *name_of[SUPINE_LUNGS_MAX];        /**< pointers to `names`, for info.lung_names */
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
   supine_tiles lit;   /**< modes of the normals; lit.bytes is NULL without normals */
@@ -36,7 +36,7 @@ struct supine_basis {
   double mode_scale[SUPINE_MODES_MAX];
   /** Bounds on the packing error and the displacement of mode k at weight 1 and gain 1, mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
-  double reference_volume[SUPINE_LUNGS_MAX]; /**< info.reference_volume points here, mL */
+  double reference_volume[SUPINE_LUNGS_MAX]; /**< numbers of info.reference_volume, mL */
   const double *resting; /**< harmonics of the volume at rest less the reference volume, mL: [G, 9],
                             or [9] for all lungs together; NULL without rest */
   bool rest_by_lung;     /**< `resting` is [G, 9], and each lung has its own gains */
@@ -62,8 +62,8 @@ supine_status supine_basis_pack_normals(supine_basis *basis);
  *
  *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)
  *
- * where a and b are the gains of the next two axes, cyclically. If all axes have one gain (files of
- * versions 1 and 2), a w_k and b w_k are one monomial. */
+ * where a and b are the gains of the two axes after that of the coordinate, cyclically. If all axes
+ * have one gain (files of versions 1 and 2), a w_k and b w_k are one monomial. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;

@@ -130,7 +130,7 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
   }
 }
 
-/* Return whether every pivot of `factor` is well above the rounding error of its element of `a`. */
+/* Return whether all pivots of `factor` are well above rounding errors of the diagonal of `a`. */
 static bool determined(const double a[TERMS * TERMS], const double factor[TERMS * TERMS]) {
   for (size_t k = 0; k < TERMS; ++k) {
     const double pivot = factor[k * TERMS + k];
@@ -141,7 +141,7 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* Compute the terms, their covariance A^-1, and the `spread` of the columns' factors. */
+/* Compute the terms, their covariance A^-1, and supine_kriging.spread. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
   double inverse[TERMS][TERMS]; /* row k: column k of the inverse of `factor` */

@@ -35,7 +35,7 @@ typedef struct supine_kriging_model {
   double least;  /**< lower bound on |u|, mm; replaces every smaller |u| */
 } supine_kriging_model;
 
-/** Fitted to full breaths of 15 patients: sill 6 mm, length 90 mm, across 1/3, least 2 mm. */
+/** Model of full breaths of 15 patients: sill 6 mm, length 90 mm, across 1/3, least 2 mm. */
 extern const supine_kriging_model supine_kriging_default;
 
 typedef struct supine_kriging_point {
@@ -65,8 +65,8 @@ typedef struct supine_kriging {
   double terms[SUPINE_KRIGING_TERMS]; /**< fitted terms t, b and r; 0 for absent terms */
   /** Covariance of the terms; 0 for absent terms. */
   double covariance[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
-  /** The same covariance for the columns 1, v and p - c, summed over the axes: where the columns
-   * have the values m, the terms add the variance m' spread m, mm^2. */
+  /** Covariance of the factors of the columns 1, v and p - c, summed over the axes: where the
+   * columns have the values m, the terms add the variance m' spread m, mm^2. */
   double spread[SUPINE_KRIGING_TERMS][SUPINE_KRIGING_TERMS];
   double log_likelihood; /**< restricted log likelihood of the residuals, without constant parts */
 } supine_kriging;

@@ -7,15 +7,15 @@
 #include "runtime/rigid.h"
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
-               "the limits differ");
+               "the largest numbers of points differ");
 
 /* Prior standard deviation of the volume as a fraction of the reference volume: 0.3 of the
  * difference between rest (0.43 of the reference volume) and full inflation. */
 static const double prior_spread = 0.17;
 static const double outlier_limit = 3.0; /* residual above which a point is an outlier, in sigma */
 static const double outlier_noise = 300; /* noise that replaces the noise of an outlier, mm */
-static const double volume_step = 1;     /* the search ends when the volume changes by less, mL */
-static const double angle_step = 1e-4; /* the search ends when the rotation changes by less, rad */
+static const double volume_step = 1;     /* change of the volume that ends the search, mL */
+static const double angle_step = 1e-4;   /* change of the rotation that ends the search, rad */
 /* Ratio of the sill to the constant of the expected error: 6 mm to 4.5 mm. The constant is smaller,
  * as it was measured after the best translation. */
 static const double sill_of_error = 4.0 / 3;
@@ -174,18 +174,18 @@ static void find_residuals(workspace *s) {
     for (size_t i = 0; i < 3; ++i) {
       d[i] = s->task->observed[j].position[i] - s->fit->origin[i];
     }
-    for (size_t i = 0; i < 3; ++i) { /* transposed rotation times d */
+    for (size_t i = 0; i < 3; ++i) { /* multiply d by the transposed rotation */
       s->points[j].residual[i] = found->rotation[i] * d[0] + found->rotation[3 + i] * d[1] +
                                  found->rotation[6 + i] * d[2] - s->law[3 * j + i];
     }
   }
 }
 
-/* Start the search from the rotation that best fits the law's positions to the observed ones. */
+/* Start the search from the rotation that best fits the law's to the observed positions. */
 static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
-  const double *c = s->fit->origin; /* difference of the means: the rotation is the identity */
+  const double *c = s->fit->origin; /* difference of the means, as nothing is rotated yet */
   double mean[3] = {0};
   const size_t n = s->task->count;
   for (size_t j = 0; j < 3 * n; ++j) {
@@ -274,7 +274,7 @@ static supine_status iterate(workspace *s, supine_error *error) {
   }
 }
 
-/* Compare each observed point with its prediction by all others.
+/* Compare each observed point with its prediction by all other points.
  * @return the point with the largest ratio of residual to sigma, or the number of points if no
  *         ratio exceeds outlier_limit */
 static size_t find_worst(workspace *s, supine_locate_residual *residuals) {

@@ -5,12 +5,12 @@
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
-/* Poses of the located state (at, fuller with more volume) and of the scan, and constants. */
+/* Poses of the scan and of the located state (at; with more volume: fuller), and constants. */
 typedef struct poses {
   supine_pose at, scan, fuller;
   double constant; /* smaller of the expected error's constant and the RMS displacement (at least 2
                       mm), mm */
-  double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
+  double per_step; /* ratio of the prior standard deviation of the volume to the step to `fuller` */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,

@@ -9,7 +9,7 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of 1, which fixed_narrow can hold */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of the number 1; fixed_narrow can hold it */
   FLOAT_FRACTION_BITS = 23
 };
 
@@ -123,7 +123,7 @@ static void choose_units(supine_basis *basis, work *w) {
   for (size_t k = 0; k < basis->info.mode_count; ++k) {
     const int bits = word_bits(&basis->tiles, k);
     w->mode[k] = 1;
-    if (flush(top[k]) > 0 && compact) { /* the largest coefficient fills its bits of a word */
+    if (flush(top[k]) > 0 && compact) { /* the largest coefficient fills all of its bits */
       w->mode[k] = (double)top[k] / (0x1p31 - ldexp(1, 32 - bits));
     }
     basis->mode_scale[k] = w->mode[k] * w->direction;

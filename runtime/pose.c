@@ -115,7 +115,7 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
     return SUPINE_OK;
   default:
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "unknown kind of volume %d: see supine_volume_kind", (int)volume->kind);
+                            "unknown kind of volume %d: use supine_volume_kind", (int)volume->kind);
   }
 }
 

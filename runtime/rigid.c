@@ -16,9 +16,9 @@ void supine_rigid_rotation(const double h[3][3], double rotation[9]) {
     shift += m[k / 4][k % 4] * m[k / 4][k % 4];
   }
   shift = sqrt(shift);
-  /* Begin near the identity: points on a line do not determine the rotation about it. */
+  /* Begin near the identity: points on a line do not determine the rotation about that line. */
   double q[4] = {1, 0.03, 0.02, 0.01};
-  for (int step = 0; step < 200; ++step) { /* power iteration */
+  for (int step = 0; step < 200; ++step) { /* find the eigenvector by power iteration */
     double next[4];
     double square = 0;
     for (size_t a = 0; a < 4; ++a) {

@@ -28,8 +28,8 @@ void supine_rigid_finish(supine_rigid_motion *motion);
 /** Compute coordinate `axis` of the position, mm, to which the motion takes p. */
 double supine_rigid_move(const supine_rigid_motion *motion, const float *p, size_t axis);
 
-/** Replace the positions [N, 3] of each rigid part in `xyz`, mm, by the rigid motion of its
- * reference positions that fits them best. */
+/** Replace the positions [N, 3] of each rigid part in `xyz`, mm, by the rigid motion of
+ * its reference positions that fits the replaced positions best. */
 void supine_rigid_restore(const supine_basis *basis, float *xyz);
 
 #endif

@@ -173,7 +173,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* not the colon after a posture */
+  if (equals != NULL && colon != NULL && colon > equals) { /* no posture before the colon */
     colon = NULL;
   }
   if (colon == NULL) {
@@ -230,7 +230,7 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
       return;
     }
   }
-  if (g[0] == 0) { /* tilted from supine or prone, whichever is nearer */
+  if (g[0] == 0) { /* a posture tilted from supine or prone, whichever is nearer */
     const double degrees = atan2(g[2], fabs(g[1])) * (180 / 3.14159265358979323846);
     add(out, "%s%+.9g", g[1] >= 0 ? "supine" : "prone", g[1] >= 0 ? degrees : -degrees);
     return;

@@ -7,8 +7,8 @@
 //
 // Attributes come from supine_gl_pack and supine_gl_pack_normals, the uniforms from supine_gl_weights
 // and supine_gl_normal_weights (supine/runtime.h). reference.w is the index of the lung and selects its gains, so
-// that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions, its normal
-// 3 Q of each in addition.
+// that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions; its normal
+// costs 3 Q multiplications and 3 Q additions.
 
 #ifndef SUPINE_LUNGS
 #define SUPINE_LUNGS 2

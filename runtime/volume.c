@@ -65,7 +65,7 @@ static double cubic_turn(const double c[3], double side) {
 }
 
 /* Find the s between `low` and `high` at which the cubic is `volume`, by Newton's method; bisect if
- * a step leaves the bracket. The cubic must be monotone between them. */
+ * a step leaves the bracket. The cubic must be monotone in this range. */
 static double cubic_solve(const double c[3], double volume, double low, double high) {
   const bool rising = cubic_at(c, high) > cubic_at(c, low);
   double s = volume / c[0];
@@ -101,7 +101,7 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
   if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2]) || c[0] == 0) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                             "a change of the reference surface's volume by %g mL is out of "
-                            "reach: in this posture no gain changes the volume",
+                            "reach: no gain changes the volume in this posture; choose another",
                             volume);
   }
   const double side = volume / c[0] > 0 ? 1 : -1;
@@ -111,7 +111,7 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     if (fabs(reach) < fabs(volume)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "a change of the reference surface's volume by %g mL is out of "
-                              "reach: the surface folds at a change of %g mL",
+                              "reach: the surface folds at a change of %g mL; choose a smaller one",
                               volume, reach);
     }
   } else {
@@ -123,7 +123,7 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     if (!isfinite(far)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "a change of the reference surface's volume by %g mL is out of "
-                              "reach: in this posture no gain changes the volume",
+                              "reach: no gain changes the volume in this posture; choose another",
                               volume);
     }
   }
@@ -183,7 +183,7 @@ static supine_status follow_path(const supine_volume_form *form, const double be
     if (!(side * held > side * before)) {
       return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "a change of the reference surface's volume by %g mL is out of "
-                              "reach: the surface folds at a change of %g mL",
+                              "reach: the surface folds at a change of %g mL; choose a smaller one",
                               volume, before);
     }
   }

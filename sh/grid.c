@@ -50,7 +50,7 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
   if (made->z == NULL || made->weight == NULL || table == NULL) {
     goto cleanup;
   }
-  for (size_t j = 0; j < latitudes; ++j) { /* the nodes of GSL ascend, those of the grid descend */
+  for (size_t j = 0; j < latitudes; ++j) { /* GSL's nodes ascend, the grid's nodes descend */
     const size_t south = latitudes - 1 - j;
     (void)gsl_integration_glfixed_point(-1, 1, j, &made->z[south], &made->weight[south], table);
   }

@@ -22,7 +22,7 @@ static void find_normal(const double *vertices, const uint32_t *corner, size_t c
   }
 }
 
-/* Report whether all triangles of the fan from corner `start` face along `normal`. */
+/* Return whether all triangles of the fan from corner `start` face along `normal`. */
 static bool is_fan(const double *vertices, const uint32_t *corner, size_t count, size_t start,
                    const double normal[3]) {
   bool fan = true;

@@ -31,7 +31,7 @@ typedef enum supine_image_voxel {
 typedef struct supine_image {
   size_t size[3];
   double origin[3];  /**< centre of voxel (0, 0, 0), mm, LPS */
-  double step[3][3]; /**< from a voxel to the next along each axis, mm, LPS; linearly independent */
+  double step[3][3]; /**< vector from a voxel to the next on each axis, mm, LPS; independent */
   supine_image_voxel voxel;
   size_t channels; /**< numbers per voxel: 1 when read from a file, 3 in a displacement field */
   void *values;
@@ -41,20 +41,19 @@ typedef struct supine_image {
   bool frames_differ;       /**< NIfTI: qform and sform differ by half a voxel or more somewhere */
 } supine_image;
 
-/** Report whether the name ends in .nrrd, .nii, .nii.gz or .mha. */
+/** Return whether the name ends in .nrrd, .nii, .nii.gz or .mha. */
 bool supine_image_supports(const char *path);
 
-/** Report whether the name ends like an image's, readable or not (.mhd, .nhdr, .mgz, .dcm, ...). */
+/** Return whether the name ends like an image's, readable or not (.mhd, .nhdr, .mgz, .dcm, ...). */
 bool supine_image_is_named(const char *path);
 
 /** Read an image of one number per voxel. If a NIfTI header gives a slope and an intercept, the
  * voxels are scaled and stored as F32.
  * @param image  zero-initialised; written only on success
- * @retval SUPINE_ERROR_READ    missing or unreadable
- * @retval SUPINE_ERROR_FORMAT  an unsupported ending; truncated or malformed; more voxels than the
- *             file can hold; not three dimensions, or several numbers per voxel; an unsupported
- *             type of voxels; no orientation in the header, or axes that are not independent; an
- *             NRRD header that names other files
+ * @retval SUPINE_ERROR_READ    the file is missing or unreadable
+ * @retval SUPINE_ERROR_FORMAT  the file has an unsupported ending or type of voxels, is truncated
+ * or malformed, states more voxels than it can hold, does not have three dimensions and one number
+ * per voxel, has dependent axes or no orientation, or refers to other files
  * @retval SUPINE_ERROR_MEMORY
  * Memory: the voxels, at most 1,032 times the file's size (the most that gzip expands). */
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error);
@@ -62,9 +61,10 @@ void supine_image_free(supine_image *image);
 
 /** Write an image in the format of its name's ending; .nrrd, .nii.gz and .mha are compressed. The
  * file appears completely or not at all. Three channels are a displacement, in mm and LPS in every
- * format, as ITK and ANTs read it.
+ * format, as ITK and ANTs expect.
  * @param note  optional: one line for the header
- * @retval SUPINE_ERROR_ARGUMENT  an unsupported ending; too large or too many channels for NIfTI-1
+ * @retval SUPINE_ERROR_ARGUMENT  the ending is not supported, or the image is too large or has too
+ *             many channels for NIfTI-1
  * @retval SUPINE_ERROR_WRITE, SUPINE_ERROR_MEMORY */
 supine_status supine_image_write(const char *path, const supine_image *image, const char *note,
                                  supine_error *error);
@@ -79,7 +79,7 @@ void supine_image_gather(const supine_image *image, size_t from, const size_t *i
 /** Store `count` numbers at values[begin] and after; integer types are rounded and clipped. */
 void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
-/** Interpret the header's coordinates in `axes`, not in the axes it names; AUTO: no change. */
+/** Interpret the header's coordinates in `axes` instead of the header's axes; AUTO: no change. */
 void supine_image_set_axes(supine_image *image, supine_axes axes);
 
 /** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */

@@ -11,7 +11,7 @@
 
 #include "mesh/io/image_formats.h"
 
-/* Endings, with their readers and writers. */
+/* The formats: endings, readers and writers. */
 static const struct {
   const char *ending;
   image_describe *describe;
@@ -45,7 +45,7 @@ bool supine_image_is_named(const char *path) {
   return is;
 }
 
-/* Report whether the frame is finite and its steps are independent: the volume they span must
+/* Return whether the frame is finite and its steps are independent: the volume they span must
  * exceed a thousandth of the product of their lengths. */
 static bool is_frame(const supine_image *image) {
   double lengths = 1.0;
@@ -67,7 +67,7 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   if (!supine_image_supports(path)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert "
-                            "others, for example with 3D Slicer",
+                            "other formats, for example with 3D Slicer",
                             path);
   }
   if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {

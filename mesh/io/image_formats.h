@@ -14,9 +14,9 @@ typedef struct image_storage {
   int64_t skip;   /* bytes before the voxels in the unpacked stream */
   bool packed;    /* compressed by zlib or gzip */
   bool text;      /* voxels are decimal numbers */
-  bool big;       /* most significant byte first */
+  bool big;       /* the most significant byte comes first */
   int integer;    /* 64-bit integers, read as F64: 1 signed, -1 unsigned; 0: another type */
-  double slope, intercept; /* scale of the numbers; slope 0: not scaled */
+  double slope, intercept; /* voxel = slope x number + intercept; slope 0: not scaled */
 } image_storage;
 
 /* Read the header, and fill `storage` and the image except its voxels.

@@ -32,7 +32,7 @@ typedef struct assimp {
   FUNCTIONS(SUPINE_LIBRARY_MEMBER)
 } assimp;
 
-/* Limits of an importer, far above what it needs for a lung. */
+/* Limits of an importer, far above what importers need for a lung. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
 /* Result of the child process; the vertices and triangles follow it in the stream. */
@@ -145,7 +145,7 @@ static void confine(size_t bytes) {
 #endif
   static const int signals[] = {SIGINT, SIGTERM, SIGXCPU, SIGXFSZ, SIGALRM, SIGSEGV, SIGABRT};
   for (size_t i = 0; i < sizeof signals / sizeof *signals; ++i) {
-    (void)signal(signals[i], SIG_DFL); /* the parent's handlers delete its output files */
+    (void)signal(signals[i], SIG_DFL); /* inherited handlers would delete the parent's outputs */
   }
   (void)alarm(10 * (unsigned)seconds); /* ends the process if it blocks */
   (void)freopen("/dev/null", "w", stderr);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* MetaImage with its voxels in the same file (.mha), as ITK, elastix and plastimatch write it:
- * lines "Key = value", the last of which is ElementDataFile, then the voxels. Its axes are LPS. */
+ * lines "Key = value", the last of which is ElementDataFile, then the voxels. Axes are LPS. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -36,7 +36,7 @@ typedef struct header {
   size_t length; /* bytes before the voxels */
 } header;
 
-/* Find the last value of any of up to three keys (unused ones: ""); return "" if there is none. */
+/* Find the last value of any of up to three keys (unused: ""); return "" if there is none. */
 static const char *value_of(const header *h, const char *key, const char *second,
                             const char *third) {
   const char *value = "";
@@ -53,7 +53,7 @@ static bool is_true(const char *value) {
   return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
 }
 
-/* Parse `count` numbers. An empty text leaves `values` unchanged; a malformed one returns false. */
+/* Parse `count` numbers. If `text` is empty, change nothing; if it is malformed, return false. */
 static bool numbers(const char *text, double *values, size_t count) {
   bool good = true;
   for (size_t i = 0; i < count && good && *text != '\0'; ++i) {
@@ -65,7 +65,7 @@ static bool numbers(const char *text, double *values, size_t count) {
   return good;
 }
 
-/* Split the lines of `text`, which is modified; return NULL or the error. */
+/* Split the lines of `text`, which is modified; return NULL, or a message on failure. */
 static const char *read_header(char *text, header *h) {
   *h = (header){0};
   for (char *line = text; h->count == 0 || strcmp(h->key[h->count - 1], "ElementDataFile") != 0;) {
@@ -93,7 +93,7 @@ static const char *read_header(char *text, header *h) {
   return NULL;
 }
 
-/* Check that the voxels are binary numbers in this file; return NULL or the error. */
+/* Check that the voxels are binary numbers in this file; return NULL, or a message on failure. */
 static const char *check(const header *h) {
   const char *object = value_of(h, "ObjectType", "", "");
   const char *binary = value_of(h, "BinaryData", "", "");
@@ -104,12 +104,12 @@ static const char *check(const header *h) {
     return "the voxels are in another file; save header and voxels in one .mha";
   }
   if (*binary != '\0' && !is_true(binary)) {
-    return "voxels as text are not read; save them as binary";
+    return "its voxels are text; save them as binary numbers";
   }
   return NULL;
 }
 
-/* Find size, frame and type; return NULL or the error. */
+/* Find size, frame and type; return NULL, or a message on failure. */
 static const char *describe(const header *h, supine_image *image, size_t *type_index) {
   const char *name = value_of(h, "ElementType", "", "");
   double dimensions = 0.0;
@@ -131,7 +131,8 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
     return "a list of its header has too few numbers; save it again";
   }
   if (channels != 1.0 || (n == 4 && size[3] != 1.0)) {
-    return channels != 1.0 ? "several numbers per voxel; save one" : "several volumes; save one";
+    return channels != 1.0 ? "it has several numbers per voxel; save one per voxel"
+                           : "it has several volumes; save one of them";
   }
   size_t type = 0;
   while (type < TYPES && strcmp(name, types[type].name) != 0) {
@@ -156,7 +157,7 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
       framed = framed || matrix[a * n + k] != 0.0;
     }
   }
-  for (size_t a = 0; !framed && a < 3; ++a) { /* without a matrix the axes are those of LPS */
+  for (size_t a = 0; !framed && a < 3; ++a) { /* without a matrix, the axes are x, y and z */
     image->step[a][a] = spacing[a];
   }
   return NULL;

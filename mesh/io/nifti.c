@@ -14,7 +14,7 @@
 static const int types[SUPINE_VOXEL_COUNT] = {DT_INT8,  DT_UINT8,  DT_INT16,   DT_UINT16,
                                               DT_INT32, DT_UINT32, DT_FLOAT32, DT_FLOAT64};
 
-/* Report whether qform and sform place a corner of the image half a voxel or more apart. */
+/* Return whether qform and sform place a corner of the image half a voxel or more apart. */
 static bool forms_differ(const nifti_image *nifti) {
   const double size[3] = {(double)nifti->nx, (double)nifti->ny, (double)nifti->nz};
   const double voxel = fmin(fabs(nifti->dx), fmin(fabs(nifti->dy), fabs(nifti->dz)));
@@ -140,9 +140,9 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
   memcpy(header, &h, sizeof h);
 }
 
-/* Store each component of the vectors contiguously; NULL if out of memory. The vectors stay in LPS:
- * ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the first
- * component of NIFTI_INTENT_DISPVECT. */
+/* Copy the vectors, with each component stored contiguously; return NULL if out of memory. The
+ * vectors stay in LPS: ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads
+ * only the first component of NIFTI_INTENT_DISPVECT. */
 static float *planes(const supine_image *image) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   float *made = malloc(3 * count * sizeof *made);

@@ -43,13 +43,13 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                            supine_image *image, image_storage *storage, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its voxels are in another file; save both as one", path);
+                            "%s: its voxels are in another file; save both in one file", path);
   }
   if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
         nrrd->dim != 3 ? "%s: dimension %u; give an image with one number per voxel and three axes"
-                       : "%s: the header has no space directions for its %u axes",
+                       : "%s: the header has no space directions for its %u axes; write them",
         path, nrrd->dim);
   }
   double turn = 0.0;
@@ -63,7 +63,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   default:
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "%s: its space is neither left-posterior-superior nor "
-                            "right-anterior-superior; write it in one of them",
+                            "right-anterior-superior; convert the image to one of them",
                             path);
   }
   storage->packed = io->encoding == *teem.nrrdEncodingGzip;

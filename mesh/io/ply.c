@@ -55,7 +55,7 @@ static bool add_element(ply *in, mesh_text name, mesh_text count) {
   element *added = &in->elements[in->element_count];
   *added = (element){.kind = (kind)find_name(name, kinds), .first_property = in->property_count};
   for (size_t e = 0; added->kind != OTHER && e < in->element_count; ++e) {
-    if (in->elements[e].kind == added->kind) { /* ambiguous: two elements of one kind */
+    if (in->elements[e].kind == added->kind) { /* two elements of one kind are ambiguous */
       return false;
     }
   }
@@ -148,7 +148,7 @@ static supine_status check_header(const ply *in) {
   static const unsigned needed = 1U << X | 1U << Y | 1U << Z | 1U << CORNERS;
   const char *path = in->file->path;
   for (size_t e = 0; e < in->element_count; ++e) {
-    if (in->elements[e].property_count == 0) { /* items of 0 bytes: any count would fit */
+    if (in->elements[e].property_count == 0) { /* items of this element would have 0 bytes */
       return supine_error_set(
           in->error, SUPINE_ERROR_FORMAT,
           "%s: element %zu of the PLY header has no property; save the mesh again", path, e + 1);
@@ -166,7 +166,7 @@ static supine_status check_header(const ply *in) {
                    path);
 }
 
-/* Read the next number; false if it is missing or malformed. */
+/* Read the next number; return false if it is missing or malformed. */
 static bool take(ply *in, const mesh_type *type, double *value) {
   if (in->encoding != ASCII) {
     if ((size_t)(in->text.end - in->text.at) < type->size) {
@@ -231,7 +231,7 @@ static supine_status take_items(ply *in, const element *of) {
   supine_status status = SUPINE_OK;
   for (uint64_t i = 0; status == SUPINE_OK && i < of->count; ++i) {
     if (in->encoding == ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
-      return cut_short(in, of, i); /* each item needs a line */
+      return cut_short(in, of, i); /* each item has a line of its own */
     }
     for (size_t p = 0; p < of->property_count && status == SUPINE_OK; ++p) {
       const property *item = &in->properties[of->first_property + p];
@@ -250,10 +250,10 @@ static supine_status take_items(ply *in, const element *of) {
 
 /* Allocate the vertices that the header announces, at most as many as the file can hold. */
 static supine_status make_room(const ply *in, const element *of, supine_mesh *mesh) {
-  uint64_t least = 0; /* fewest bytes per item */
+  uint64_t least = 0; /* smallest size of an item, bytes */
   for (size_t p = 0; p < of->property_count; ++p) {
     const property *item = &in->properties[of->first_property + p];
-    least += in->encoding == ASCII ? 2 /* a digit and a blank */
+    least += in->encoding == ASCII ? 2 /* the least is a digit and a blank */
              : item->count != NULL ? item->count->size
                                    : item->type->size;
   }

@@ -51,7 +51,7 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
   if (p->names[p->count] == NULL) {
     return no_memory(r);
   }
-  for (char *c = p->names[p->count]; *c != '\0'; ++c) { /* names are stored one per line */
+  for (char *c = p->names[p->count]; *c != '\0'; ++c) { /* a name must be one line of text */
     *c = (unsigned char)*c < ' ' ? ' ' : *c;
   }
   ++p->count;

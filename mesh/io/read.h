@@ -17,16 +17,16 @@ typedef struct mesh_text {
   const unsigned char *end;
 } mesh_text;
 
-/** Remove the next line from `text`, and return it without its LF or CRLF; false at the end. */
+/** Remove the next line from `text`; write it without LF or CRLF. Return false at the end. */
 bool supine_mesh_text_line(mesh_text *text, mesh_text *line);
-/** Remove the next word between blanks from `text`; false at the end. */
+/** Remove the next word between blanks from `text`; return false at the end. */
 bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
-/** Report whether the word is `expected`, ignoring case. */
+/** Return whether the word is `expected`, ignoring case. */
 bool supine_mesh_text_is(mesh_text word, const char *expected);
 /** Parse decimal digits; return false for anything else, or for a value near or above 2^63. */
 bool supine_mesh_text_count(mesh_text word, uint64_t *value);
-/** Remove the next word from `text` and parse it with strtod; false if there is none or it is not a
- * number. A NUL must follow the text. */
+/** Remove the next word from `text` and parse it with strtod; return false if it is missing or
+ * not a number. A NUL must follow the text. */
 bool supine_mesh_text_number(mesh_text *text, double *value);
 /** Parse three numbers, rounded to single precision. */
 bool supine_mesh_text_position(mesh_text *text, double position[3]);
@@ -34,7 +34,7 @@ bool supine_mesh_text_position(mesh_text *text, double position[3]);
 /** A type of binary numbers. */
 typedef struct mesh_type {
   const char *name;
-  unsigned size; /**< in bytes */
+  unsigned size; /**< size of a number, bytes */
   bool is_signed;
   bool is_real;
 } mesh_type;
@@ -60,7 +60,7 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 /* ---- faces.c: faces added to a mesh that has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< most corners of a face, as cutting takes quadratic time */
+  MESH_CORNERS_MAX = 1024, /**< limit for a face, as cutting takes quadratic time */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
@@ -75,7 +75,7 @@ typedef struct mesh_faces {
 
 /** Cut a face into triangles, and add them. If `count` exceeds MESH_CORNERS_MAX, so that the face
  * is refused, `corners` may be shorter.
- * @retval SUPINE_ERROR_FORMAT  a corner that is not a vertex, too many corners */
+ * @retval SUPINE_ERROR_FORMAT  a corner is not a vertex, or there are too many corners */
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 
@@ -92,7 +92,7 @@ mesh_reader supine_mesh_read_stl;
 mesh_reader supine_mesh_read_obj;
 /** Read any other format that assimp knows. */
 mesh_reader supine_mesh_import;
-/** Report whether assimp is installed and imports this ending. */
+/** Return whether assimp is installed and imports this ending. */
 bool supine_mesh_import_knows(const char *ending);
 
 /* ---- weld.c ---- */

@@ -168,7 +168,7 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
       array->put(file, i * each + k, &at);
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
-    file->sizes[3 + i] = /* 0 if out of memory */
+    file->sizes[3 + i] = /* 0 tells that memory ran out */
         compressor == NULL
             ? 0
             : libdeflate_zlib_compress(compressor, raw, (size_t)(at - raw),
@@ -400,7 +400,7 @@ supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *e
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
   vtp_foot(series->output.file);
-  (void)fseeko(series->output.file, 0, SEEK_SET); /* succeeded in supine_mesh_series_open */
+  (void)fseeko(series->output.file, 0, SEEK_SET); /* checked in supine_mesh_series_open */
   vtp_head(&series->file, series->output.file);
   return supine_output_commit(&series->output, error);
 }

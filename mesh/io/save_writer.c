@@ -6,7 +6,7 @@
 
 #include "mesh/io/save.h"
 
-/* Report whether float32 holds a value, so that the file can be loaded again. */
+/* Return whether float32 holds a value, so that the file can be loaded again. */
 static bool fits(double x) {
   return fabs(x) <= (double)FLT_MAX;
 }
@@ -66,7 +66,7 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
   supine_mesh_unit_name(unit, writer->unit);
 }
 
-/* Round to the writer's grid, if it has one. */
+/* Round a length to a multiple of writer->quantum, unless that is 0. */
 static double rounded(const mesh_writer *writer, double length) {
   return writer->quantum > 0.0 ? rint(length / writer->quantum) * writer->quantum : length;
 }

@@ -12,7 +12,7 @@
 
 enum { PIECE = 1 << 16, ANY_HEADER = 32 };
 
-/* Unpack a stream: skip `skip` bytes, keep the next `size` in `values`, check all checksums. */
+/* Unpack a stream: skip `skip` bytes, keep the next `size` in `values`, and check checksums. */
 static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size) {
   unsigned char packed[PIECE];
   unsigned char discarded[PIECE]; /* bytes that are not stored */
@@ -32,7 +32,7 @@ static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_
     z.avail_out = given;
     result = inflate(&z, Z_NO_FLUSH); /* returns Z_BUF_ERROR at the end of the file */
     from += given - z.avail_out;
-    if (result == Z_STREAM_END && from < end) { /* another stream follows */
+    if (result == Z_STREAM_END && from < end) { /* another compressed stream follows */
       result = inflateReset(&z);
     }
   }
@@ -83,7 +83,7 @@ static supine_status rescale(const char *path, const image_storage *storage, sup
   return SUPINE_OK;
 }
 
-/* Read numbers as text. */
+/* Read voxels that are written as decimal numbers. */
 static bool read_text(FILE *file, supine_image *image, size_t count) {
   double value = 0.0;
   size_t i = 0;
@@ -96,7 +96,7 @@ static bool read_text(FILE *file, supine_image *image, size_t count) {
 supine_status supine_image_read_voxels(const char *path, size_t file_size,
                                        const image_storage *storage, supine_image *image,
                                        supine_error *error) {
-  static const double gzip_ratio = 1032.0; /* most bytes that one byte expands to */
+  static const double gzip_ratio = 1032.0; /* largest ratio of unpacked to packed size */
   const size_t each = supine_image_voxel_size(image->voxel);
   const double bytes =
       (double)image->size[0] * (double)image->size[1] * (double)image->size[2] * (double)each;

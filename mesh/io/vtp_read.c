@@ -28,7 +28,7 @@ static supine_status malformed(const vtp_file *v, const char *what, supine_error
   return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", v->file->path, what);
 }
 
-/* Find the first element of this name between `from` and `to`; false if there is none. */
+/* Find the first element called `name` between `from` and `to`; return false if there is none. */
 static bool find_element(const char *from, const char *to, const char *name, element *found) {
   const size_t length = strlen(name);
   for (const char *at = from; at < to && (at = memchr(at, '<', (size_t)(to - at))) != NULL; ++at) {
@@ -45,7 +45,7 @@ static bool find_element(const char *from, const char *to, const char *name, ele
   return false;
 }
 
-/* Copy the value of an attribute, truncated to `size` bytes; false if there is none. */
+/* Copy the value of an attribute, truncated to `size` bytes; return false if there is none. */
 static bool attribute(const element *e, const char *name, char *value, size_t size) {
   const size_t length = strlen(name);
   for (const char *at = e->at; at + length + 2 < e->end; ++at) {
@@ -107,7 +107,7 @@ static size_t base64(const char *at, const char *end, unsigned char *bytes) {
 }
 
 /* Unpack the bytes of an array into out [wanted]. An uncompressed array is its size, then the
- * numbers. A compressed one is the number of blocks, the size of a block, the size of a shorter
+ * numbers. A compressed array is the number of blocks, the size of a block, the size of a shorter
  * last block (0: none), the compressed size of each block, and the blocks. */
 static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, size_t wanted,
                    unsigned char *out) {
@@ -287,7 +287,7 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   return status;
 }
 
-/* Read the head: the array types and the piece. */
+/* Read the head of the file, and find its only piece. */
 static supine_status read_head(vtp_file *v, element *piece, supine_error *error) {
   element root;
   element appended;
@@ -303,7 +303,7 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   v->header_size = is_attribute(&root, "header_type", "UInt64") ? 8 : 4;
   v->compressed = attribute(&root, "compressor", compressor, sizeof compressor);
   if (v->compressed && strcmp(compressor, "vtkZLibDataCompressor") != 0) {
-    return malformed(v, "it is not compressed by zlib; save it as PLY", error);
+    return malformed(v, "its arrays are not compressed by zlib; save it as PLY", error);
   }
   if (find_element(root.body, v->end, "AppendedData", &appended)) {
     const char *mark = memchr(appended.body, '_', (size_t)(v->end - appended.body));
@@ -312,7 +312,7 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   }
   const char *limit = v->appended != NULL ? v->appended : v->end;
   if (!find_element(root.body, limit, "Piece", piece)) {
-    return malformed(v, "no Piece; save it again", error);
+    return malformed(v, "no Piece; save the surface again", error);
   }
   if (find_element(piece->body, limit, "Piece", &second)) {
     return malformed(v, "it has several pieces; save it as one", error);
@@ -361,10 +361,10 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     return malformed(&v, "its numbers of points and polygons are invalid; save it again", error);
   }
   if (count[2] > 0) {
-    return malformed(&v, "strips of triangles are not read; save triangles", error);
+    return malformed(&v, "it has strips of triangles; save single triangles", error);
   }
   if (count[0] > 0 && !find_array(&v, &piece, "Points", NULL, &points)) {
-    return malformed(&v, "no array of points; save it again", error);
+    return malformed(&v, "no array of points; save the surface again", error);
   }
   if (count[0] > 0) {
     status = take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error);
@@ -373,7 +373,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     }
     mesh->vertex_count = count[0];
   }
-  for (size_t i = 0; i < 3 * count[0]; ++i) { /* in single precision, as from all formats */
+  for (size_t i = 0; i < 3 * count[0]; ++i) { /* round to single precision, as for all formats */
     mesh->vertices[i] = (double)(float)mesh->vertices[i];
   }
   mesh_faces faces = {.path = file->path, .mesh = mesh};

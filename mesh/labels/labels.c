@@ -35,7 +35,7 @@ static supine_status advance(work *w, double fraction, supine_error *error) {
                                 "interrupted: nothing was written");
 }
 
-/* Report whether two images have the same size, and the same corners within 0.01 voxels. */
+/* Return whether two images have the same size, and the same corners within 0.01 voxels. */
 static bool same_frame(const supine_image *a, const supine_image *b) {
   if (memcmp(a->size, b->size, sizeof a->size) != 0) {
     return false;
@@ -114,7 +114,7 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
   return SUPINE_OK;
 }
 
-/* Report whether a lung's box reaches a face of the image, where the lung is cut off. */
+/* Return whether a lung's box reaches a face of the image, where the lung is cut off. */
 static bool is_cut(const work *w, const labels_mask *lung, size_t margin) {
   bool cut = false;
   for (int a = 0; a < 3; ++a) {

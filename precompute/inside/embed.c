@@ -247,7 +247,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Report whether metadata with this key describes the surface, but not its content. */
+/* Return whether metadata with this key describes the surface, but not its content. */
 static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};

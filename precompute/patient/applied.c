@@ -20,7 +20,7 @@ static const double damped_below = 0.1;
 static void find_spread_force(supine_patient_matching *m, const supine_patient *patient,
                               double *spread) {
   supine_patient law = *patient;
-  double damping = 0.0; /* mm^2 */
+  double damping = 0.0; /* added to squared lengths of directions, mm^2 */
   double d[3];
   law.centre_count = 0;
   for (size_t v = 0; v < m->count; ++v) {
@@ -45,7 +45,7 @@ static void add_blocks(const supine_patient_matching *m, const double *force,
                        double *means, double products[ALL * ALL]) {
   memset(means, 0, (ALL + 1) * blocks * sizeof *means);
   for (size_t v = 0; v < m->count; ++v) {
-    double *mean = means + (ALL + 1) * m->rows[v].block; /* its last element: the area */
+    double *mean = means + (ALL + 1) * m->rows[v].block; /* the last element is the area */
     const supine_patient_place place = supine_patient_find_vertex(m->rest, v);
     cblas_daxpy(COLUMNS, vertex_area[v], place.force, 1, mean, 1);
     mean[HEIGHT] += vertex_area[v] * supine_dot(gravity, m->rest->mesh.vertices + 3 * v);
@@ -64,8 +64,8 @@ static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
   return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
 }
 
-/* Fit (18) to the force of the blocks by least squares; return false if they do not determine it.
- */
+/* Fit (18) to the force of the blocks by least squares; return false if the blocks do not
+ * determine it. */
 static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied *applied) {
   double matrix[ALL * ALL];
   double k[COLUMNS];

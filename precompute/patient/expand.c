@@ -18,7 +18,7 @@ enum {
   ROUNDS = 5         /* rounds of fitting and matching */
 };
 
-/* Prior standard deviation of the expandability from that of a neighbouring region, and from 1. */
+/* Prior standard deviation of the difference of expandability between neighbours, and from 1. */
 static const double neighbour_deviation = 0.3;
 static const double region_deviation = 1.0;
 
@@ -28,7 +28,7 @@ static const double rows_per_error = 10.0; /* number of rows with a common error
 /* Largest distance of neighbouring centres over the smallest distance of any two centres. */
 static const double neighbour_ratio = 1.7;
 
-/* Largest held-out error with the regions, over that of uniform tissue, at which they are kept. */
+/* Regions are kept if their held-out error is below this multiple of that of uniform tissue. */
 static const double kept_ratio = 0.95;
 
 /* Find the vertex of a side that is farthest from all centres, and its distance, mm. */

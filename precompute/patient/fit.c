@@ -30,7 +30,7 @@ static const double band_component = 1.96;
 static const double near_surface = 1.3;
 
 /* Sums over rows of weighted squared residuals and expected variances, mm^2, and of weights;
- * numbers of points, and of those within the band. */
+ * numbers of points, and of points within the band. */
 typedef struct squares {
   double residual[SCORES], expected, weight, points, within;
 } squares;
@@ -45,7 +45,7 @@ typedef struct study {
   supine_status failed[ITEMS];
 } study;
 
-/* Compute the derivatives of axis . (t + M x) by t and M; x is the place's offset in 100 mm. */
+/* Compute the derivatives x of axis . (t + M p) by t and M; p is the place's offset, in 100 mm. */
 static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   for (size_t a = 0; a < 3; ++a) {
     x[a] = row->axis[a];
@@ -55,7 +55,7 @@ static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   }
 }
 
-/* Fit the displacement t or t + M x to rows. `map` is t, mm, then M by rows; 0 if the fit fails. */
+/* Fit the displacement t or t + M p to rows. `map` is t, mm, then M by rows; 0 if the fit fails. */
 static void affine_fit(const supine_patient_row *rows, size_t count, bool translation,
                        double map[AFFINE]) {
   double matrix[AFFINE * AFFINE] = {0.0};
@@ -70,14 +70,14 @@ static void affine_fit(const supine_patient_row *rows, size_t count, bool transl
     trace += rows[i].weight * cblas_ddot(AFFINE, x, 1, x, 1);
   }
   for (size_t a = 0; a < AFFINE; ++a) {
-    matrix[a * AFFINE + a] += 1e-9 * trace; /* regularisation */
+    matrix[a * AFFINE + a] += 1e-9 * trace; /* makes the matrix positive definite */
   }
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', size, 1, matrix, AFFINE, map, AFFINE) != 0) {
     memset(map, 0, AFFINE * sizeof *map);
   }
 }
 
-/* Return the displacement by the map along a row, less the measured one, mm. */
+/* Return the displacement by the map along a row, less the measured displacement, mm. */
 static double affine_residual(const double map[AFFINE], const supine_patient_row *row) {
   double x[AFFINE];
   affine_design(row, x);
@@ -94,7 +94,7 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   const bool able = fold_of != NULL && random != NULL;
   if (able) {
     gsl_rng_set(random, 1000 + seed);
-    for (size_t b = 0; b < blocks; ++b) { /* shuffle */
+    for (size_t b = 0; b < blocks; ++b) { /* shuffle the folds of the blocks */
       const size_t other = gsl_rng_uniform_int(random, b + 1);
       fold_of[b] = fold_of[other];
       fold_of[other] = b % FOLDS;
@@ -281,7 +281,6 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
   return status;
 }
 
-/* Seven parameters: the data, the options and the outputs of the fit. */
 supine_status supine_patient_fit(const supine_patient_fit_options *options,
                                  supine_patient_row *rows, size_t single, size_t triples,
                                  supine_patient *patient, supine_patient_fit_report *report,

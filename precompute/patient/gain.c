@@ -11,9 +11,9 @@
 #include "sh/base/vec3.h"
 
 static const double gain_least = 0.01, gain_most = 2.0; /* range of accepted gains */
-static const double same_posture = 0.05;                /* unit vectors 3 degrees apart */
+static const double same_posture = 0.05;  /* distance of unit vectors 3 degrees apart */
 static const double converged = 1e-4;     /* change of scales and gain that ends the rounds */
-static const double not_converged = 1e-2; /* change in the last round that is an error */
+static const double not_converged = 1e-2; /* change in the last round above which the fit fails */
 static const double force_least = 0.2;    /* lower bound on the fitted force */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, GAIN = 5, UNKNOWNS = 6 };
 
@@ -27,11 +27,11 @@ typedef struct field {
  * lung has its own scale s, because it has its own volume in the further posture. */
 typedef struct work {
   const supine_patient_record *record;
-  bool fits_translation; /* t is fitted */
+  bool fits_translation; /* fit the translation t */
   double gains[2][3];    /* gains of the fuller and the emptier state (supine_patient_path) */
   supine_patient_matching matching; /* matches and rows; blocks are eighths of the lungs */
-  field *field;                     /* [rows] */
-  double x[UNKNOWNS];               /* s of the left and the right lung, t, gain */
+  field *field;                     /* [rows] fitted law at each row */
+  double x[UNKNOWNS];               /* scales s of the left and the right lung, t, gain */
 } work;
 
 /* Fit the unknowns by linear least squares about the present scales; return the RMS residual, mm.
@@ -123,7 +123,7 @@ static void find_motion(work *w, const double gravity[3]) {
     m->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
                        (place.box[2] > 0.5 ? 1U : 0U);
     if (m->state != NULL && !w->record->from_surface) {
-      /* The law was fitted in the box of landmarks, which differs from that of the surface. */
+      /* The law was fitted in the box of landmarks, which differs from the box of the surface. */
       place = supine_patient_find(&patient->frame, m->rest->mesh.vertices + 3 * m->match[i].vertex,
                                   place.side);
     }

@@ -21,13 +21,13 @@ enum {
 
 static const double size_deviation = 0.3; /* prior standard deviation of SCALE */
 static const double converged = 1e-10;    /* relative decrease of the squares that ends a fit */
-static const double damping_most = 1e10;  /* largest damping; above it a fit ends */
+static const double damping_most = 1e10;  /* damping above which a fit ends */
 static const double expandability_least = 0.02;
 
 /* Bounds on the exponents, and on the slopes c7 to c9, above which the force would change sign. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* Prior standard deviations of c1, c3, c5 (relative); logarithms of c2, c4, c6; c7 to c9. */
+/* Prior standard deviations of c1, c3, c5 (relative), of log c2, c4, c6, and of c7 to c9. */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
@@ -369,7 +369,7 @@ static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
 
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share) {
   const lapack_int terms = (lapack_int)krige->terms;
-  for (size_t r = 0; r < krige->options.region_count; ++r) { /* 1 - (normal^-1 precision)[r, r] */
+  for (size_t r = 0; r < krige->options.region_count; ++r) {
     double x[TERMS_MAX] = {0.0};
     memcpy(x + TERMS, krige->options.precision + r * krige->options.region_count,
            krige->options.region_count * sizeof *x);

@@ -54,15 +54,15 @@ typedef struct supine_patient_fit_options {
   bool size_only;      /* fit only the size of the deep law and the motion */
   double gravity[3];   /* unit vector in the emptier state; 0,0,0: supine */
   double path_span[3]; /* difference between the two states' gains (supine_patient_deep) */
-  double sill;         /* factor on the covariance of g; 0: the most likely one */
-  double noise;        /* factor on the noise of the rows; 0: the most likely one */
+  double sill;         /* factor on the covariance of g; 0: the most likely factor */
+  double noise;        /* factor on the noise of the rows; 0: the most likely factor */
   /* Number of regions whose expandability a_k is fitted, and the prior precision of a - 1
    * [regions, regions]. The force at a row is the sum over k of a_k response_k. */
   size_t region_count;
   const double *precision;
 } supine_patient_fit_options;
 
-/* A fit and its working space. */
+/* A fit and its work space. */
 typedef struct supine_patient_krige {
   const supine_patient_row *rows;
   size_t count;
@@ -74,7 +74,7 @@ typedef struct supine_patient_krige {
   supine_patient_power uncorrected_law; /* law fitted without g */
   supine_patient_power law;
   double scaled_sill;            /* sill, scaled to the fitted size of the law */
-  supine_patient_centre *centre; /* [count] kernel of each row; its weight is not set */
+  supine_patient_centre *centre; /* [count] kernel of each row, without its weight */
   double *factor; /* [count, count] Cholesky factor of the covariance of the rows; NULL without g */
   double *design; /* [count, terms + 1] derivatives and residual of each row, whitened */
   double *weight; /* [count] weight of each row's kernel */
@@ -86,8 +86,8 @@ typedef struct supine_patient_krige {
 } supine_patient_krige;
 
 /* Fit the size of the deep law, which gives the prior mean, then the law and g. With a sill of at
- * least 1, SUPINE_PATIENT_DEEP changes only the size of the deep law; with a smaller one, the prior
- * standard deviation of its constants is 30 %. SUPINE_PATIENT_PAPER has a wide prior. Rows of
+ * least 1, SUPINE_PATIENT_DEEP changes only the size of the deep law; with a smaller sill, the
+ * prior standard deviation of its constants is 30 %. SUPINE_PATIENT_PAPER has a wide prior. Rows of
  * weight 0 do not count.
  * @param rows   [count], must outlive the fit
  * @param krige  release with supine_patient_krige_free, also after a failure
@@ -99,7 +99,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
 void supine_patient_krige_free(supine_patient_krige *krige);
 
 /* Compute the share [regions] of each region's expandability that the rows determine, the diagonal
- * of the resolution matrix. The prior determines the remainder. */
+ * of the resolution matrix 1 - normal^-1 precision. The prior determines the remainder. */
 void supine_patient_krige_resolution(const supine_patient_krige *krige, double *share);
 
 /* Compute the standard errors of c1 to c9; 0 for constants that are not fitted. */

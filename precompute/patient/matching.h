@@ -11,7 +11,7 @@
 typedef struct supine_patient_match {
   size_t vertex;      /* index in the reference surface */
   double position[3]; /* position displaced by the present law, mm */
-  double distance;    /* distance of `position` from the other surface along its normal, mm */
+  double distance;    /* distance of `position` from the other surface along the normal there, mm */
   supine_inside_place nearest; /* nearest point of the other surface */
 } supine_patient_match;
 
@@ -25,9 +25,9 @@ typedef struct supine_patient_matching {
   double *rest_normals;          /* [N, 3] unit normals of the reference surface */
   double *state_normals;         /* [state vertices, 3] unit normals of the other surface */
   size_t count;                  /* number of chosen vertices */
-  supine_patient_match *match;   /* [count] */
-  supine_patient_row *rows;      /* [count + landmark_row_count] */
-  double *space;                 /* [count] working space */
+  supine_patient_match *match;   /* [count] chosen vertices and their matches */
+  supine_patient_row *rows;      /* [count + landmark_row_count] rows of the fit */
+  double *space;                 /* [count] work space */
   double matched;                /* share of the vertices whose match has a compatible normal */
   double rms;                    /* weighted RMS distance of the matches, mm */
   const supine_patient *patient; /* law that last displaced the vertices */

@@ -12,8 +12,8 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between faces of a surface's box and of a state's box, over the width of the
- * latter, which was found from landmarks [0] or from a surface [1]. */
+/* Largest distance between the faces of a surface's box and of a state's box, over the width of the
+ * state's box; [0] if that box is of landmarks, [1] if it is of a surface. */
 static const double apart_most[2] = {0.45, 0.2};
 
 /* Lower bound on a force that a displacement is divided by; the mean force is 1. */
@@ -22,7 +22,7 @@ static const double force_least = 0.2;
 /* Smallest distance of the two states on the path; if nearer, they count as full and rest. */
 static const double part_least = 0.02;
 
-/* Plausible range of the volume at rest over the full volume. */
+/* Plausible range of the ratio of the volume at rest to the full volume. */
 static const double share_least = 0.15, share_most = 0.95;
 
 /* Compute the full volume implied by one of the two states, mL; 0 if unknown. */
@@ -82,11 +82,11 @@ typedef struct work {
   const supine_patient_record *record;
   supine_lungs lungs;   /* estimate of the lungs in the fuller state */
   const double *scan;   /* [N, 3] vertices of the scan if it is the emptier state, else NULL */
-  double *ratio;        /* [N] spread force over (18) */
-  double *displacement; /* [N, 3] between the states, mm */
+  double *ratio;        /* [N] spread force divided by the force (18) */
+  double *displacement; /* [N, 3] displacement between the states, mm */
 } work;
 
-/* Compute the displacement of vertices between the states, and positions in the fuller one. */
+/* Compute the displacement of vertices between the states, and positions in the fuller state. */
 static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const work *w = context;
@@ -265,8 +265,8 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
                                 "the patient's law was fitted between %c = %.0f and %.0f mm, but "
-                                "the surface reaches from %.0f to %.0f: give both in one frame "
-                                "and unit, of one person",
+                                "the surface reaches from %.0f to %.0f: check that frame, unit "
+                                "and person are the same",
                                 "xyz"[k], low[*state][k], high[*state][k], lungs -> minimum[k],
                                 lungs -> maximum[k]);
 }

@@ -15,15 +15,15 @@
 enum {
   COLUMNS = 12,
   COORDINATES = 6,
-  PAIRS_LEAST = 12 /* three times as many as an affine map needs */
+  PAIRS_LEAST = 12 /* smallest number of pairs: three times that of an affine map */
 };
 
 static const double flat_least = 1.0; /* smallest RMS distance of points from a plane, mm */
 static const double displacement_least = 0.05; /* smallest RMS displacement, mm */
 static const double rotation_most = 25.0;      /* largest rotation between two scans, degrees */
-static const double apart_most = 0.5; /* largest distance between the states, over their spread */
-static const double box_overlap_least = 0.5; /* smallest overlap of boxes, over the larger one */
-static const double residual_most = 0.7; /* largest residual of the affine map, over the spread */
+static const double apart_most = 0.5; /* largest ratio of the states' distance to their spread */
+static const double box_overlap_least = 0.5; /* smallest overlap, as a fraction of the larger box */
+static const double residual_most = 0.7; /* largest ratio of the affine residual to the spread */
 
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
                                              "im1_x", "im1_y", "im1_z", "im2_x", "im2_y", "im2_z"};
@@ -128,11 +128,11 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
   if (kind == SUPINE_PATIENT_MAP_RIGID) {
     supine_rigid_rotation((const double(*)[3])cross, map->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    for (size_t k = 0; k < 9; ++k) { /* by columns: LAPACKE would copy rows */
+    for (size_t k = 0; k < 9; ++k) { /* by columns, because LAPACKE would copy a matrix by rows */
       map->m[k] = cross[k % 3][k / 3];
     }
     determined = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
-    /* Diagonal k is sqrt(count) times the RMS distance from the span of the axes before k. */
+    /* Element (k, k) is sqrt(count) times the RMS distance from the span of the axes before k. */
     for (size_t k = 0; k < 3; ++k) {
       determined = determined && scatter[k][k] >= flat_least * sqrt((double)count);
     }

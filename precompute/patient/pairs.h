@@ -42,7 +42,7 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error);
 
-/** A prediction and its baselines: maps from one state to the other. */
+/** Maps from one state to the other: the prediction of a law, its baselines, and a rigid map. */
 typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_PREDICTED = 0,
   SUPINE_PATIENT_MAP_NONE,

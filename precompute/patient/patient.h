@@ -20,12 +20,12 @@
 #include "precompute/physics/force.h"
 
 typedef enum supine_patient_law {
-  SUPINE_PATIENT_DEEP = 0, /**< the deep law of model.h, or constants near its own (krige.h) */
+  SUPINE_PATIENT_DEEP = 0, /**< the deep law of model.h, or a law near to it (krige.h) */
   SUPINE_PATIENT_PAPER,    /**< all nine constants are fitted */
   SUPINE_PATIENT_LAW_COUNT
 } supine_patient_law;
 
-/** "deep", "paper". */
+/** Names of the laws, "deep" and "paper". */
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
 /** Motion of the body between the scans; each value is its number of fitted unknowns. */
@@ -68,7 +68,7 @@ typedef struct supine_patient {
   supine_patient_law law;
   supine_patient_frame frame;
   supine_patient_power power;
-  size_t centre_count; /**< 0: no correction */
+  size_t centre_count; /**< number of kernels; 0: no correction */
   supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
 } supine_patient;
 
@@ -97,7 +97,7 @@ supine_patient_frame supine_patient_frame_of_lungs(const supine_lungs *lungs);
 /** Return the side of a vertex's lung: +1 left, -1 right. */
 int supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 
-/** Find a vertex's place in the box of these lungs. */
+/** Find a vertex's place in the box of the lungs. */
 supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex);
 
 /** Express the deep law by nine constants.
@@ -135,7 +135,7 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
 void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
                                    double side, double spread, double at[3], double u[3]);
 
-/** Move points [count, 3] of the emptier state to their positions in the fuller one, mm. */
+/** Move points [count, 3] of the emptier state to their positions in the fuller state, mm. */
 void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points);
 
 /** Split the force (18) into a part that follows gravity, with factor `gain`, and a part that is

@@ -22,7 +22,7 @@ enum {
 typedef struct numbers {
   const char *group; /* key of the object that has `key`; NULL: the root */
   const char *key;
-  size_t count;  /* 1: a number; more: an array */
+  size_t count;  /* number of values; 1: a number, more: an array */
   size_t offset; /* position in the record, bytes */
   bool optional; /* may be missing, and is left out if all numbers are 0 */
 } numbers;

@@ -12,7 +12,7 @@ enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_S
 /** The fit to a further state of the same lungs. */
 typedef struct supine_patient_further {
   supine_state state;
-  bool fits_gain; /**< the gain is fitted, because the posture differs from the fitted one */
+  bool fits_gain; /**< the gain is fitted, because the posture differs from the fitted posture */
   double
       scale[2]; /**< factors on the displacement from full inflation to rest, left and right lung */
   double residual;              /**< RMS residual, mm; along the normals for a surface */
@@ -29,13 +29,13 @@ typedef struct supine_patient_further {
  *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
 typedef struct supine_patient_region {
   double side;      /**< lung: 1 left, -1 right */
-  double value;     /**< a_k > 0 */
-  double centre[3]; /**< mm, in the reference surface */
-  double radius;    /**< mm, > 0 */
+  double value;     /**< expandability a_k, > 0 */
+  double centre[3]; /**< centre in the reference surface, mm */
+  double radius;    /**< radius, mm, > 0 */
   double seen;      /**< share of a_k that the surfaces determine, 0 to 1 */
 } supine_patient_region;
 
-/** The regions of the left lung, then of the right one; none: uniform tissue. */
+/** The regions of the left lung, then of the right lung; none: uniform tissue. */
 typedef struct supine_patient_stiffness {
   size_t count;
   supine_patient_region region[SUPINE_PATIENT_REGIONS_MAX];
@@ -64,8 +64,8 @@ typedef struct supine_patient_applied {
   double blocks;      /**< number of blocks; 0: the force was not computed */
   double correlation; /**< correlation of force and height along gravity */
   double slopes[3];   /**< c7 to c9 of (18) fitted to f */
-  double residual;    /**< RMS residual of (18) over the force at the box's centre */
-  double spread;      /**< standard deviation of f over the force at the box's centre */
+  double residual;    /**< RMS residual of (18), divided by the force at the box's centre */
+  double spread;      /**< standard deviation of f, divided by the force at the box's centre */
 } supine_patient_applied;
 
 /** Result of matching two surfaces. */
@@ -79,13 +79,13 @@ typedef struct supine_patient_surface_report {
 typedef struct supine_patient_record {
   char name[SUPINE_PATIENT_TEXT];
   supine_patient patient;
-  supine_force_law force; /**< (18) with its dependence on gravity */
+  supine_force_law force; /**< force (18) with its dependence on gravity */
   supine_state state[2];  /**< the fuller and the emptier state */
   double volume[2];       /**< volumes of the two states, mL; 0: unknown */
   double emptier[2][3];   /**< minimum and maximum of the emptier state's box, mm */
   bool from_surface;      /**< the boxes are those of surfaces, else of landmarks */
   supine_patient_fit_report report;
-  supine_patient_stiffness stiffness; /**< no regions: uniform tissue */
+  supine_patient_stiffness stiffness; /**< regions of expandability; none: uniform tissue */
   supine_patient_surface_report surface;
   supine_patient_expand_report expand;
   supine_patient_applied applied;
@@ -109,7 +109,7 @@ char *supine_patient_text(const supine_patient_record *record, const char *made_
 
 /** Read a record from a file.
  * @retval SUPINE_ERROR_READ    the file cannot be opened
- * @retval SUPINE_ERROR_FORMAT  a key is missing or invalid (named) */
+ * @retval SUPINE_ERROR_FORMAT  a key is missing or invalid */
 supine_status supine_patient_read(const char *path, supine_patient_record *record,
                                   supine_error *error);
 
@@ -133,7 +133,7 @@ supine_status supine_patient_model(const supine_patient_record *record,
 
 /** Find by its box which of the two states a surface shows.
  * @param state  written: 0 the fuller, 1 the emptier
- * @retval SUPINE_ERROR_MESH  neither: the surface lies elsewhere, or is that of the other lung */
+ * @retval SUPINE_ERROR_MESH  the surface lies elsewhere, or is the other lung */
 supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
                                          supine_error *error);
@@ -190,7 +190,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
  * @param scans_moved  also fit a translation t_j between the scans
  * @param further  in: the state; out: the fit
  * @retval SUPINE_ERROR_MESH    too few compatible points
- * @retval SUPINE_ERROR_MEMORY, those of the solve */
+ * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,
                                       const supine_patient_pairs *pairs, const supine_mesh *surface,
                                       bool scans_moved, supine_patient_further *further,

@@ -31,7 +31,7 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
-  enum { CELLS = 64 }; /* along each axis, 2.5 m in all */
+  enum { CELLS = 64 }; /* number of cells along each axis, 2.5 m in all */
   size_t blocks = 0;
   double origin[3] = {0.0};
   /* index of the block of each cell, plus 1; 0: none yet */
@@ -65,7 +65,7 @@ double supine_patient_power_design(const supine_patient_power *law, const supine
   double along[3]; /* displacement for a force of 1 and c1, c3, c5 of 1 mm */
   double motion[3];
   double turned[3];
-  double unit_force = 0.0; /* displacement along the row for a force of 1, mm */
+  double unit_force = 0.0; /* displacement along the row's axis for a force of 1, mm */
   supine_patient_power unit = *law;
   unit.c[0] = unit.c[2] = unit.c[4] = 1.0;
   supine_patient_direction(&unit, &row->place, 1.0, along);

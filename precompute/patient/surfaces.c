@@ -8,8 +8,8 @@
 #include "precompute/patient/matching.h"
 
 enum {
-  VERTICES_MAX = 600,  /* enough for kriging with a correlation length of 90 mm */
-  EXPANDED_MAX = 2000, /* enough for regions of expandability about 45 mm apart */
+  VERTICES_MAX = 600,  /* dense enough for kriging with a correlation length of 90 mm */
+  EXPANDED_MAX = 2000, /* dense enough for regions of expandability 45 mm apart */
   ROUNDS_MAX = 60
 };
 
@@ -18,9 +18,9 @@ static const double size_converged = 0.5; /* RMS change that ends the fit of siz
 
 /* Lower bound on the robust scale, mm. Smaller residuals are left to kriging. */
 static const double scale_least = 1.0;
-static const double same_state = 0.02; /* largest RMS distance of equal surfaces, mm */
+static const double same_state = 0.02; /* RMS distance below which surfaces are equal, mm */
 
-/* Initialise the rows by mapping the box of the lungs to that of the other state. */
+/* Initialise the rows by mapping the box of the lungs to the box of the other state. */
 static void start_rows(supine_patient_matching *m) {
   const double *low = m->rest->minimum;
   double to[2][3];
@@ -155,7 +155,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
     m.landmark_row_count = 3 * landmark_count;
     for (size_t i = 0; i < m.landmark_row_count;
-         ++i) { /* together they weigh as much as the surface */
+         ++i) { /* all landmarks together weigh as much as the surface */
       m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
     }
   }

@@ -62,9 +62,8 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
   free(area);
   return total > 0 && isfinite(total)
              ? SUPINE_OK
-             : supine_error_set(
-                   error, SUPINE_ERROR_MESH,
-                   "the area of the surface is 0 or not finite: no average over it exists");
+             : supine_error_set(error, SUPINE_ERROR_MESH,
+                                "the area of the surface is 0 or not finite: repair the mesh");
 }
 
 /* Add `weight` times c c^T to the upper triangle of `gram` [count, count]. */
@@ -162,7 +161,8 @@ static double product(const double *gram, const double *q, const double *p, size
   return sum;
 }
 
-/* Compute q [G, 3, K]: gain times weight of a pose, less the same for `from` unless it is NULL. */
+/* Compute q [G, 3, K], the products of gains and weights of a pose. Unless `from` is NULL, subtract
+ * the products of the pose `from`. */
 static void products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
@@ -209,7 +209,7 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* Compute the length of vertex i's displacement, mm, from its lung's q [3, K] of products_of. */
+/* Compute the length of vertex i's displacement, mm, from the products q [3, K] of its lung. */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];
@@ -238,9 +238,9 @@ void supine_compare_distances(const supine_compare *compare, const supine_pose *
   }
 }
 
-/* Find the smallest distance that at least `target` of the area does not exceed. Floats that are
- * not negative sort as their bits do: three histograms of the area, each with 2^11 bins, determine
- * the upper, middle and lower bits of the result. */
+/* Find the smallest distance that at least `target` of the area does not exceed. Non-negative
+ * floats have the same order as their bits, so three histograms of the area, each with 2^11 bins,
+ * determine the upper, middle and lower bits of the result. */
 static double percentile(const supine_compare *compare, const float *distance, double target) {
   enum { ROUNDS = 3, BITS = 11, BINS = 1 << BITS };
   const size_t n = compare->basis->info.vertex_count;
@@ -282,7 +282,7 @@ void supine_compare_statistics(const supine_compare *compare, const float *dista
   for (size_t i = 0; i < compare->basis->info.vertex_count; ++i) {
     const double share = (double)compare->share[i];
     const double d = (double)distance[i];
-    area += share; /* the sum is 1 up to rounding */
+    area += share; /* becomes 1, up to rounding */
     sum += share * d;
     square += share * d * d;
     largest = distance[i] > largest ? distance[i] : largest;

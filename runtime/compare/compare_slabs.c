@@ -32,7 +32,7 @@ typedef struct outline {
 
 /* The slabs, and the cuts of one lung at the levels between them. */
 typedef struct cutter {
-  const float *from;                  /* [N, 3] positions before the breath */
+  const float *from;                  /* [N, 3] positions before the breath, mm */
   double down[3];                     /* unit vector along gravity */
   size_t count;                       /* number of slabs */
   double level[SUPINE_SLABS_MAX + 1]; /* top of each slab, and bottom of the last, mm */
@@ -135,7 +135,7 @@ static void add_triangle(cutter *c, const polygon *triangle, supine_slab *slabs)
 
 /* Close the slabs above and below a cut by triangles from the mean of its outline to each edge. */
 static void close_cut(const outline *cut, supine_slab *above, supine_slab *below) {
-  double volume[TIMES]; /* volume of the cone from the origin to these triangles, mL */
+  double volume[TIMES]; /* volume between the origin and the closing triangles, mL */
   for (int time = 0; time < TIMES && cut->length > 0; ++time) {
     volume[time] = 1e-3 / 6 * supine_dot(cut->middle[time], cut->area[time]) / cut->length;
   }
@@ -180,7 +180,7 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
   }
   if (!basis->info.has_volume) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                            "the surface is open and encloses no volume");
+                            "the surface is open and encloses no volume: close the mesh first");
   }
   double lowest = -INFINITY;
   double highest = INFINITY;

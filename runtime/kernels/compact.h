@@ -3,8 +3,8 @@
  * Compact numbers: two or three numbers in a word of 32 bits, or three in two words.
  *
  * To read a number, shift its word left until the number has the uppermost bits, and convert the
- * whole word as a signed integer. The bits below belong to other numbers. They are known when the
- * number is packed, and it is chosen so that the whole word is as near as possible to the value. */
+ * whole word as a signed integer. The lower bits belong to other numbers, which are packed first;
+ * then the number is chosen so that the whole word is as near as possible to the value. */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
 
@@ -25,8 +25,8 @@ static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
 
-/** Return the word nearest to `value`, or the smallest word for NaN, whose lowest `bits` bits are
- * those of `low`. */
+/** Return the word that is nearest to `value` and has the lowest `bits` bits of `low`; for NaN, the
+ * smallest such word. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
@@ -56,7 +56,7 @@ static inline uint32_t normal_narrow(double first, double second, double third) 
 }
 
 /** Return the unit of normal_narrow, as a multiple of the unit of the file's 16-bit numbers: the
- * largest of those, 32767, becomes 255 x 2^23, the largest value of 9 bits. */
+ * largest number, 32767, becomes 255 x 2^23, the largest value of 9 bits. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }

@@ -73,8 +73,8 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Constants for which the compiler specialises a loop, which writes positions if `modes` is known.
- */
+/* Constants for which the compiler specialises a loop. If `modes` is not 0, the loop writes only
+ * positions. */
 typedef struct form {
   supine_storage storage;
   size_t modes; /* number of modes; 0: any number */
@@ -119,7 +119,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   return *even;
 }
 
-/* Load the 48 numbers of directions or reference positions; compact ones in packed units. */
+/* Load the 48 numbers of directions or reference positions; compact numbers keep their unit. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
   for (size_t j = 0; j < PIECES && !compact; ++j) {
@@ -279,7 +279,7 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_
 static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
                    const supine_target *target) {
   const bool registers = LANES == 16 && target->add_reference;
-  if (registers && tiles->modes == 4) { /* the number of modes of the default law */
+  if (registers && tiles->modes == 4) { /* the default law has 4 modes */
     deform_storage(tiles, folded, first, count, target, 4);
   } else if (registers && tiles->modes == KNOWN_MODES) {
     deform_storage(tiles, folded, first, count, target, KNOWN_MODES);
@@ -288,7 +288,7 @@ static void deform(const supine_tiles *tiles, const float *folded, size_t first,
   }
 }
 
-/* Compute one coordinate of unnormalised normals, in a partial sum for each mode of a word. */
+/* Compute one coordinate of unnormalised normals, in partial sums for the three modes of a word. */
 INLINE vf dot_normal(const unsigned char *at, const float *w, size_t words) {
   vf sum[3] = {{0}, {0}, {0}};
   for (size_t j = 0; j < words; ++j, at += 64) {
@@ -313,8 +313,8 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
       for (size_t axis = 0; axis < 3; ++axis) {
         v[axis] = dot_normal(tile + axis * axis_bytes + q * sizeof(vf), w, words);
       }
-      /* The smallest normal float is added so that a normal of 0 does not become NaN. One Newton
-       * step doubles the number of correct bits of the estimate. */
+      /* FLT_MIN is added so that a zero vector does not become NaN. One Newton step doubles the
+       * number of correct bits of the estimate. */
       const vf square = FMA(v[0], v[0], FMA(v[1], v[1], v[2] * v[2])) + 0x1p-126F;
       const vf guess = RSQRT(square);
       const vf error = FMA(-(square * guess), guess, splat(1));

@@ -7,14 +7,14 @@
 
 /* An array that is written in order; if `stream`, with stores that bypass the caches. Such a store
  * must fill an aligned cache line. If the array is not aligned, a line is joined from the end of
- * one vector and the beginning of the next. */
+ * one vector and the beginning of the next vector. */
 typedef struct writer {
-  __m512 last;  /* the vector that was put last */
+  __m512 last;  /* last vector given to writer_put() */
   __m512i join; /* permutation that selects a line from (last, next) */
   float *to;
   size_t offset; /* number of floats from the last line boundary to `to` */
   bool stream;
-  bool shared; /* the next line begins before the array */
+  bool shared; /* the next line to store begins before the array */
 } writer;
 
 static inline __attribute__((always_inline)) writer writer_open(const supine_target *target) {
@@ -42,7 +42,7 @@ static inline __attribute__((always_inline)) void writer_put(writer *w, __m512 n
   w->to += 16;
 }
 
-/* Store the end of the last vector, which does not fill a line. */
+/* Store the end of the last vector, which fills only a part of a line. */
 static inline __attribute__((always_inline)) void writer_close(const writer *w) {
   if (w->stream && w->offset != 0) {
     _mm512_mask_storeu_ps(w->to - 16, (__mmask16)(0xFFFFU << (16 - w->offset)), w->last);

@@ -44,7 +44,7 @@ static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return how many words of a vertex hold three coefficients each. They hold its last modes. */
+/** Return the number of words of a vertex that hold three coefficients each, of the last modes. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Build the run-time library with CMake, and put it into the package.
 
-If the environment variable SUPINE_LIBRARY names a shared library built from the same sources, use that one."""
+If the environment variable SUPINE_LIBRARY names a shared library built from the same sources, use
+that library."""
 import glob
 import os
 import re

@@ -20,8 +20,8 @@ struct supine_safetensors {
   size_t size;
   supine_platform_file mapping; /**< mapping that holds `bytes`; zero if the caller owns them */
   char *header;                 /**< a copy of the header, in which strings are decoded */
-  supine_tensor *tensors;       /**< sorted by the position of their data */
-  void **copies;                /**< aligned copies of misaligned tensors; NULL for the others */
+  supine_tensor *tensors;       /**< tensors, sorted by the position of their data */
+  void **copies;                /**< aligned copy of each misaligned tensor, else NULL */
   size_t tensor_count;
   supine_metadata *metadata;
   size_t metadata_count;

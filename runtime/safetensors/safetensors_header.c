@@ -130,7 +130,7 @@ static char *take_escape(parser *p, char *to) {
 static const char *take_string(parser *p) {
   expect(p, '"');
   char *const begin = p->at;
-  char *to = begin; /* never passes p->at, as an escape is longer than its decoded text */
+  char *to = begin; /* never overtakes p->at, as an escape is longer than its decoded text */
   while (p->status == SUPINE_OK && *p->at != '"') {
     const size_t length = supine_utf8_length(p->at, (size_t)(p->end - p->at));
     if (*p->at == '\\') {

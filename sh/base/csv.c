@@ -21,7 +21,7 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Return the next line that is not blank or a comment, trimmed; NULL at the end or on failure. */
+/* Return the next line, trimmed, except blank lines and comments; NULL at the end or on failure. */
 static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
   *status = SUPINE_OK;
   for (;;) {
@@ -191,7 +191,7 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
   char *text = csv->field[csv->column[column]];
   char *end = NULL;
   char *comma = csv->separator == ';' ? strchr(text, ',') : NULL;
-  if (comma != NULL) { /* a decimal comma, as in spreadsheets with ';' */
+  if (comma != NULL) { /* with ';' between fields, a comma is a decimal comma */
     *comma = '.';
   }
   *number = strtod(text, &end);

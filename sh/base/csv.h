@@ -23,7 +23,7 @@ typedef struct supine_csv {
   size_t field_count;
   char *field[SUPINE_CSV_FIELDS_MAX];   /* fields of the current row */
   size_t column_count;                  /* number of fields of the header */
-  size_t column[SUPINE_CSV_FIELDS_MAX]; /* field of each expected column, or SIZE_MAX */
+  size_t column[SUPINE_CSV_FIELDS_MAX]; /* index of each expected column in `field`, or SIZE_MAX */
 } supine_csv;
 
 /* Open a file and read its header. Of the `count` expected columns in `names`, the first `required`

@@ -29,7 +29,7 @@ static void evaluate_order(size_t band, size_t m, double z, double top, double r
   for (size_t l = m;; ++l) {
     double *centre = y + l * l + l;
     centre[-(ptrdiff_t)m] = q * im;
-    centre[m] = q * re; /* replaces the previous term if m = 0 */
+    centre[m] = q * re; /* if m = 0, replaces the sine term above */
     if (l == band) {
       return;
     }

@@ -78,7 +78,7 @@ char *supine_path_beside(const char *path, const char *name) {
 
 /* Resolve symbolic links in the last part of a path, which need not exist. */
 static char *follow_links(const char *path) {
-  enum { LINKS_MAX = 40 }; /* the limit of the Linux kernel */
+  enum { LINKS_MAX = 40 }; /* largest number of links that Linux follows */
   char *at = strdup(path);
   for (int i = 0; at != NULL && i < LINKS_MAX; ++i) {
     char link[PATH_MAX];

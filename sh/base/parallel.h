@@ -16,7 +16,7 @@ size_t supine_thread_count(void);
 /** Return whether the environment variable SUPINE_THREADS is unset or valid. */
 bool supine_thread_count_is_valid(void);
 
-/** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait for all.
+/** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait.
  *
  * @param count    number of items
  * @param grain    smallest number of items for a thread, at least 1; small counts use fewer threads

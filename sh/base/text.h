@@ -18,7 +18,7 @@ char *supine_text_make_utf8(char *text);
 
 /** Return whether a name ends in `ending` (".csv") with at least one character before it. */
 bool supine_text_ends_in(const char *name, const char *ending);
-/** Do the same as supine_text_ends_in, ignoring case. */
+/** Return whether a name ends in `ending`, ignoring case, with at least one character before it. */
 bool supine_text_ends_in_any_case(const char *name, const char *ending);
 
 #endif

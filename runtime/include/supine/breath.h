@@ -92,14 +92,14 @@ SUPINE_API const supine_pv *supine_breath_normal(void);
 SUPINE_API supine_status supine_breath_curve_check(const supine_pv_curve *curve,
                                                    supine_error *error);
 
-/** Compute the volume V(P) and the compliance dV/dP of a limb. Its equation has the solution
+/** Compute the volume V(P) and the compliance dV/dP of a limb. The solution of its equation is
  *
  *     V(x) = V_low + (V_high - V_low) I(x) / I(1)        I(x) = integral from -1 to x of exp(U)
  *     U(x) = integral from -1 to x of u
  *          = c_1 (x + 1) + sum over n of c_n+1 (P_n+1 - P_n-1) / (2 n + 1)
  *
- * with I by Gauss-Legendre quadrature, 16 points in each of 32 parts of the range. Cost: 512
- * exponentials, and 16 for each pressure.
+ * I is computed by Gauss-Legendre quadrature, with 16 points in each of 32 parts of the range.
+ * Cost: 512 exponentials, and 16 for each pressure.
  *
  * @param pressures    [count] cmH2O within the limb's range, in any order
  * @param volumes      [count] mL, written; may be NULL

@@ -12,9 +12,9 @@
  * an assumed volume at rest.
  *
  * With observed points, kriging corrects the positions, and expected errors shrink near the points.
- * With three points or more and no unknown rotation, they never exceed sigma, computed with |u| and
- * its RMS of at least 2 mm and, for an unknown volume, with 0.17 V_full in place of 0.05 V_full.
- * Fewer points do not determine the translation well enough. */
+ * With three points or more and no fitted rotation, expected errors never exceed the sigma that
+ * results if |u| and its RMS are at least 2 mm and, for an unknown volume, 0.17 V_full replaces
+ * 0.05 V_full. Fewer points do not determine the translation well enough. */
 #ifndef SUPINE_LOCATE_H
 #define SUPINE_LOCATE_H
 
@@ -51,7 +51,7 @@ enum { SUPINE_LOCATE_POINTS_MAX = 300 };
 
 /** One observed point: a vertex of a basis, usually one that 'supine embed' made. */
 typedef struct supine_observation {
-  size_t vertex;      /**< index in supine_locate_task.inside */
+  size_t vertex;      /**< index in the basis supine_locate_task.inside */
   double position[3]; /**< observed position, mm, in a frame that may be translated from the frame
                          of the basis and, in a rigid task, rotated */
   double noise;       /**< standard deviation on each axis, mm, above 0; if unknown, give 2 */

@@ -46,7 +46,7 @@ typedef struct supine_basis supine_basis;
 
 /** How an open basis keeps coefficients, directions and reference positions in memory. */
 typedef enum supine_storage {
-  SUPINE_STORAGE_AUTO = 0, /**< the smallest of the others with an error of at most 0.005 mm */
+  SUPINE_STORAGE_AUTO = 0, /**< the smallest storage with an error of at most 0.005 mm */
   SUPINE_STORAGE_EXACT,    /**< float32, as in the file */
   SUPINE_STORAGE_INT16,    /**< 16-bit coefficients with a scale for each mode; coordinates of
                               directions and reference positions of 21 or 22 bits */
@@ -92,24 +92,24 @@ typedef struct supine_basis_info {
    * faces, edges and corners of a cube) 500 mL above the reference surface or, on an open surface,
    * where the largest displacement is 20 mm. supine_basis_error returns the bound for any pose. */
   double storage_error;
-  const char *const *lung_names; /**< [G] such as "left"; "0", "1", ... for lungs without a name */
-  const float *bounds;           /**< [G, 2, 3] lowest and highest corner of each lung's box, mm */
-  const float *vertices;         /**< [N, 3] reference positions p, mm, LPS */
-  const uint32_t *triangles;     /**< [M, 3] vertices of each triangle */
-  const float *direction;        /**< [N, 3] directions d, mm; NULL if `vector` */
-  const float *coefficients;     /**< [N, K] coefficients c; [N, 3, K] in mm if `vector` */
-  const double *modes;           /**< [K, (L + 1)^2] coefficients of the weights in harmonics */
-  const double *volume_linear; /**< [G, A, K] linear volume forms, mL (supine_volume_contract), with
-                                  volume_axes A; NULL without volumes */
+  const char *const *lung_names;  /**< [G] such as "left"; "0", "1", ... for lungs without a name */
+  const float *bounds;            /**< [G, 2, 3] lowest and highest corner of each lung's box, mm */
+  const float *vertices;          /**< [N, 3] reference positions p, mm, LPS */
+  const uint32_t *triangles;      /**< [M, 3] vertices of each triangle */
+  const float *direction;         /**< [N, 3] directions d, mm; NULL if `vector` */
+  const float *coefficients;      /**< [N, K] coefficients c; [N, 3, K] in mm if `vector` */
+  const double *modes;            /**< [K, (L + 1)^2] coefficients of the weights in harmonics */
+  const double *volume_linear;    /**< [G, A, K] linear volume forms, mL (supine_volume_contract),
+                                     A: volume_axes; NULL without volumes */
   const double *volume_quadratic; /**< [G, A, K, K] quadratic volume forms, mL; or NULL */
   const double *volume_cubic;     /**< [G, K, K, K] cubic volume forms, mL; or NULL */
   /** The memory that an evaluation reads: tiles of 16 vertices, each of 16 times bytes_per_vertex.
    * Use it only to measure memory traffic, as the layout changes between versions. */
   const void *packed;
   size_t normal_count;    /**< number Q of modes of the normals; 0 without normals */
-  const int16_t *normals; /**< [N, 3, Q] modes n of the normals, see supine_deform_lit */
-  /** [G, Q, 3, T] V of supine_basis_normal_weights, where T is 1 + 2 K + K (K + 1) / 2; in files of
-   * versions 1 and 2 [G, Q, (K + 1)(K + 2) / 2]. */
+  const int16_t *normals; /**< [N, 3, Q] modes n of the normals (supine_deform_lit) */
+  /** [G, Q, 3, T] V of supine_basis_normal_weights, where T is 1 + 2 K + K (K + 1) / 2; in files
+   * of versions 1 and 2 [G, Q, (K + 1)(K + 2) / 2]. */
   const double *normal_weights;
   const double *reference_volume; /**< [G] volume of each lung of the reference surface, gas and
                                        tissue, mL; 0 without volumes */
@@ -123,8 +123,8 @@ typedef struct supine_basis_info {
 
 /** Weights and gains of one state. */
 typedef struct supine_pose {
-  double weights[SUPINE_MODES_MAX];  /**< w_k of each mode */
-  double gains[SUPINE_LUNGS_MAX][3]; /**< A_j of each lung; all 0: the reference surface */
+  double weights[SUPINE_MODES_MAX];  /**< weight w_k of each mode */
+  double gains[SUPINE_LUNGS_MAX][3]; /**< gains A_j of each lung; all 0: the reference surface */
 } supine_pose;
 
 /** Open a basis from a file, or from `size` bytes in memory, which must outlive the basis: check
@@ -270,7 +270,7 @@ SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_po
  * Each step rounds a coordinate by at most 2^-24 of its value. These errors add up, so begin each
  * breath from supine_deform.
  *
- * [Santhanam2008]  see supine/breath.h */
+ * [Santhanam2008]  full reference in supine/breath.h */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
 /** Compute the weights v of the normals' modes for each lung. Component c of a normal is quadratic

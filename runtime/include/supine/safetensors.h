@@ -46,8 +46,8 @@ typedef enum supine_dtype {
 /** Largest number of axes of a tensor. */
 enum { SUPINE_TENSOR_RANK_MAX = 4 };
 
-/** One tensor, row-major. A tensor that is written belongs to the caller; one that is read points
- * into the memory of the file, with `data` aligned to the element size. */
+/** One tensor, row-major. A tensor that is written belongs to the caller. A tensor that is read
+ * points into the memory of the file, with `data` aligned to the element size. */
 typedef struct supine_tensor {
   const char *name;
   supine_dtype dtype;
@@ -75,8 +75,8 @@ typedef struct supine_safetensors supine_safetensors;
 SUPINE_API supine_status supine_safetensors_open(const char *path, supine_safetensors **file,
                                                  supine_error *error);
 
-/** Open a file in memory. The caller keeps its bytes unchanged until the file is closed. They need
- * no alignment, as misaligned tensors are copied. Statuses: as supine_safetensors_open.
+/** Open a file in memory. The caller must not change its bytes until the file is closed. The bytes
+ * need no alignment, as misaligned tensors are copied. Statuses: as supine_safetensors_open.
  * @param name  name of the file in messages */
 SUPINE_API supine_status supine_safetensors_open_memory(const void *bytes, size_t size,
                                                         const char *name, supine_safetensors **file,

@@ -49,7 +49,7 @@ enum { SUPINE_STATE_LUNGS_MAX = 2, SUPINE_STATE_NAME_SIZE = 16 };
 typedef struct supine_state {
   double gravity[3];    /**< unit vector in body axes (LPS) that points where things fall */
   supine_volume volume; /**< volume of all lungs together; unused if lungs are named */
-  size_t lung_count;    /**< number of lungs named below; 0: none */
+  size_t lung_count;    /**< number of lungs with volumes of their own; 0: none */
   struct {
     char name[SUPINE_STATE_NAME_SIZE];
     supine_volume volume;

@@ -49,7 +49,7 @@ SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const d
 
 /** Find the scale s at which cubic[0] s + cubic[1] s^2 + cubic[2] s^3 is `volume`, mL, in the
  * interval around 0 in which this polynomial is monotone.
- * @retval SUPINE_ERROR_NUMERICAL  there is none: the surface folds before it holds the volume, or
+ * @retval SUPINE_ERROR_NUMERICAL  no such scale: the surface folds before it holds the volume, or
  *                                 the volume does not change with the scale */
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                              supine_error *error);
@@ -72,7 +72,7 @@ SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ra
  * @param rest    volume at rest less F, mL; unused if the bend is 0
  * @param volume  volume to hold less F, mL
  * @param gains   [3], written
- * @retval SUPINE_ERROR_NUMERICAL  there are none: the surface folds before it holds the volume, or
+ * @retval SUPINE_ERROR_NUMERICAL  no such gains: the surface folds before it holds the volume, or
  *                                 the volume does not change with the gains */
 SUPINE_API supine_status supine_volume_form_gains(const supine_volume_form *form,
                                                   const double bend[3], double rest, double volume,

@@ -106,7 +106,7 @@ def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale
     rest_pressure  pressure at the end of an exhalation, cmH2O
     course         course of the pressure, "cosine" or "ramp", or "flow" for a constant flow
     pv             [2, 9], for inhalation and exhalation: P_low, P_high (cmH2O), V_low, V_high (mL) and c1 to c5, as
-                   `supine pv fit` finds them; by default those of a normal adult
+                   `supine pv fit` finds them; by default the limbs of a normal adult
     """
     times = np.asarray(times, np.float64)
     flat = np.ascontiguousarray(times).ravel()
@@ -327,7 +327,7 @@ class Basis:
         return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
 
     def gains(self, pose: Pose) -> Doubles:
-        """Return a view of the gains [G, 3] of a pose: for each lung those along x, y and z."""
+        """Return a view of the gains [G, 3] of a pose: for each lung the gains along x, y and z."""
         return np.ctypeslib.as_array(pose.gains)[:len(self.lungs)]
 
     def volumes(self, pose: Pose) -> Doubles:

@@ -58,7 +58,7 @@ def _write_mesh(path: str, vertices: ArrayLike, faces: ArrayLike) -> None:
         raise ValueError(f"faces must be integers [M, 3], not {corners.dtype} {list(corners.shape)}")
     records = np.empty(len(corners), [("count", "u1"), ("corner", "<i4", 3)])
     records["count"] = 3
-    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # out of range stays out of range: the program reports it
+    records["corner"] = np.clip(corners, -1, 2**31 - 1)  # the program reports indices out of range
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n"
                    b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
@@ -87,7 +87,7 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
     while True:
         try:
             byte = os.read(terminal, 4096)
-        except OSError:  # the program closed its end
+        except OSError:  # the program closed its end of the terminal
             byte = b""
         *lines, line = re.split(b"[\r\n]+", line + byte.replace(b"\x1b[K", b""))
         for text in (each.decode(errors="replace") for each in lines + ([] if byte else [line])):
