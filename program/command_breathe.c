@@ -18,7 +18,7 @@
 
 static const char name[] = "breathe";
 
-static const double budget = 15e-3; /* time allowed per frame, s */
+static const double budget = 15e-3; /* compute time allowed per frame, s */
 
 typedef struct request {
   supine_orientation orientation;
@@ -29,61 +29,64 @@ typedef struct request {
   const char *path;
   bool allow_folds, as_scanned;
   supine_from from;
-  double fps, seconds; /* 0: not given */
+  double fps, seconds; /* frames per second; duration, s, or 0 if not given */
 } request;
 
-static const char *const courses[] = {"cosine", "ramp", "flow", NULL}; /* as supine_pv_course */
+/* Names of the values of supine_pv_course. */
+static const char *const courses[] = {"cosine", "ramp", "flow", NULL};
 
 static const supine_option table[] = {
     {"output", 'o', "OUT",
-     "NAME.vtp: one file for ParaView, whose time is the index of the frame; positions are rounded "
-     "to "
-     "1/256 mm, with normals, lungs, gravity and volumes. NAME.safetensors: positions [T,N,3], "
-     "triangles [M,3], time [T] in s, volume [T,G] in mL and gravity [T,3]",
+     "NAME.vtp: one file for ParaView, with normals, lungs, gravity and volumes; its time is the "
+     "index of the frame, and positions are rounded to 1/256 mm. NAME.safetensors, for T frames, N "
+     "vertices, M triangles and G lungs: positions [T,N,3] in mm, triangles [M,3], time [T] in s, "
+     "volume [T,G] in mL and gravity [T,3]",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".vtp or .safetensors"},
     {"turn", 0, "FROM:TO:SECONDS",
-     "turn gravity from one posture to another at constant speed, as supine:left:10s; between "
-     "opposite postures, over the left side. The volume at rest follows the posture",
+     "turn gravity from one posture to another at constant speed, such as supine:left:10s. Between "
+     "opposite postures gravity passes the left side, or the back if it starts along the body or "
+     "at a side. The volume at rest follows the posture",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
-     "tidal volume of both lungs, above rest in the posture (above the scan where rest is "
-     "unknown); default 500",
+     "tidal volume of both lungs, above rest in the posture (above the scan if rest is unknown); "
+     "default 500",
      SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
-    {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
+    {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
-    {"inhale", 0, "SHARE", "share of the breath that is inhalation, between 0 and 1; default 1/3",
+    {"inhale", 0, "SHARE",
+     "share of the breath's duration for inhaling, between 0 and 1; default 1/3",
      SUPINE_FILLS(request, breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
      .wants = "a share between 0 and 1", .more = true},
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default: a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
-    {"rest-pressure", 0, "P", "cmH2O at the end of an exhalation; default 5",
-     SUPINE_FILLS(request, breath.rest_pressure), .wants = "cmH2O", .more = true},
+    {"rest-pressure", 0, "P", "pressure at the end of an exhalation, in cmH2O; default 5",
+     SUPINE_FILLS(request, breath.rest_pressure), .wants = "a number of cmH2O", .more = true},
     {"course", 0, "NAME",
-     "course of the breath: cosine (default) or ramp of the pressure; flow: constant flow in and "
-     "out",
+     "cosine (default): pressure follows a cosine; ramp: pressure is linear in time; flow: the "
+     "flows in and out are constant",
      SUPINE_FILLS(request, breath.course), .choices = courses, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
     {"fps", 0, "N", "frames per second", SUPINE_FILLS(request, fps), SUPINE_ABOVE_ZERO,
      .standard = "66.66"},
-    {"seconds", 0, "S", "duration; default: the turn, or one breath",
+    {"seconds", 0, "S", "duration in s; default: that of the turn, or one breath",
      SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
 
-/* Compute the values that depend on several options, and the number of frames. */
+/* Check that the options fit each other, set the turn, and compute the number of frames. */
 static supine_status complete(request *wanted, size_t *count, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
   supine_pv_breath *breath = &wanted->breath;
   if (wanted->as_scanned && supine_text_ends_in_any_case(wanted->path, ".safetensors")) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--as-scanned is for VTP files only: leave it out, as safetensors are "
-                            "in LPS and mm");
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "--as-scanned is for VTP files only: leave it out, as safetensors are in LPS and mm");
   }
   if (wanted->turns && wanted->orientation.given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
@@ -102,27 +105,27 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
   *count = (size_t)fmin(frames, FRAMES_MAX);
   return frames <= FRAMES_MAX
              ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "%g s at %g frames a second is more than %d frames: lower "
-                                "--seconds or --fps",
-                                seconds, wanted->fps, FRAMES_MAX);
+             : supine_error_set(
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "%g s at %g frames a second is more than %d frames: lower --seconds or --fps",
+                   seconds, wanted->fps, FRAMES_MAX);
 }
 
 /* A breath, and the memory for its surfaces. */
 typedef struct playing {
   const request *wanted;
   supine_basis *basis;
-  size_t count, lungs; /* T, G */
-  double *time;        /* [T] s */
-  double *above;       /* [T] volume of all lungs together, mL above rest or the scan */
-  double *gravity;     /* [T, 3] */
-  double *volumes;     /* [T, G] gas and tissue, mL */
-  supine_mesh mesh;    /* for VTP: vertices of the current frame, triangles of the basis */
-  float *normals;      /* [N, 3] for VTP */
-  float *positions;  /* [N, 3] of the current frame; for safetensors [T, N, 3] of all follow, mm */
-  double *seconds;   /* [T] time that each frame took to compute */
-  double *origin;    /* [N, 3] positions that displacements start from, mm */
-  char comment[512]; /* of the VTP file */
+  size_t count, lungs; /* numbers of frames, T, and of lungs, G */
+  double *time;        /* [T] time of each frame, s */
+  double *above;       /* [T] volume above rest, or above the scan if rest is unknown, mL */
+  double *gravity;     /* [T, 3] unit vectors along gravity */
+  double *volumes;     /* [T, G] volume of gas and tissue in each lung, mL */
+  supine_mesh mesh;    /* triangles; for VTP, also the positions of the current frame */
+  float *normals;      /* [N, 3] normals of the current frame, for VTP */
+  float *positions;    /* mm: [N, 3] current frame; for safetensors, [T, N, 3] all frames follow */
+  double *seconds;     /* [T] compute time of each frame, s */
+  double *origin;      /* [N, 3] positions that displacements start from, mm */
+  char comment[512];   /* comment in the VTP file */
 } playing;
 
 static void end(playing *p) {
@@ -135,7 +138,7 @@ static void end(playing *p) {
   supine_basis_close(p->basis);
 }
 
-/* Allocate the memory for `count` frames. */
+/* Allocate memory for `count` frames; a VTP series keeps the positions of one frame only. */
 static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->count = count;
@@ -163,7 +166,6 @@ static supine_status begin_frames(playing *p, size_t count, bool series, supine_
                                 4e-9 * (double)frame * (double)kept);
 }
 
-/* Compute the pose of frame t. */
 static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, supine_error *error) {
   const supine_state state = supine_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
   return supine_basis_pose(p->basis, &state, pose, error);
@@ -189,7 +191,7 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
   return status;
 }
 
-/* Print the volumes, and the time that frames took. */
+/* Print the range of the volumes and the compute time of frames. */
 static void report(const playing *p) {
   double least = INFINITY;
   double peak = 0.0;
@@ -210,7 +212,7 @@ static void report(const playing *p) {
 }
 
 /* Compute all frames.
- * @param series  gets each frame; NULL: `positions` keeps them */
+ * @param series  receives each frame; NULL: all frames are stored in p->positions */
 static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
   const size_t frame = 3 * p->mesh.vertex_count;
   supine_progress progress = supine_options_progress_begin(name);
@@ -218,7 +220,7 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
   for (size_t t = 0; t < p->count && status == SUPINE_OK; ++t) {
     supine_pose pose;
     const double start = supine_clock_seconds();
-    (void)find_pose(p, t, &pose, NULL); /* succeeded in find_volumes */
+    (void)find_pose(p, t, &pose, NULL); /* cannot fail: find_volumes has computed this pose */
     supine_deform(p->basis, &pose, p->positions);
     p->seconds[t] = supine_clock_seconds() - start;
     if (series != NULL) {
@@ -240,9 +242,9 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
 }
 
 /* Compute the frames, and write them as VTP.
- * @param save  axes, unit and comment */
+ * @param save  with axes, unit and comment already set */
 static supine_status write_series(playing *p, supine_mesh_save_options save, supine_error *error) {
-  /* Half of this step, mm, is less than the storage error (supine_basis_info). */
+  /* Step of rounding, mm; half of it is less than the storage error (supine_basis_info). */
   static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
@@ -292,7 +294,7 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
              : status;
 }
 
-/* Check the surfaces with the smallest and the largest volume: warn, or fail if they fold. */
+/* Check that the surfaces of smallest and largest volume are plausible; warn or fail if not. */
 static supine_status check_ends(const playing *p, supine_error *error) {
   size_t least = 0;
   size_t most = 0;
@@ -312,7 +314,6 @@ static supine_status check_ends(const playing *p, supine_error *error) {
   return status;
 }
 
-/* Compute and write the breath. */
 static supine_status play(playing *p, size_t count, const char *made_by, supine_error *error) {
   const request *wanted = p->wanted;
   const bool tensors = supine_text_ends_in_any_case(wanted->path, ".safetensors");
@@ -377,10 +378,9 @@ const supine_command supine_command_breathe = {
     "compute a breath, in one posture or during a turn",
     .usage = "BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]",
     .about =
-        "Computes breathing lungs from a basis file, in one posture or during a turn, and "
-        "writes the surface of each frame. The volume follows the pressure-volume relation and is "
-        "exact in each frame. The compute time per frame is printed; a smooth display allows 15 "
-        "ms.",
+        "Computes breathing lungs from a basis file, in one posture or during a turn, and writes "
+        "the surface of each frame. The volume follows the pressure-volume relation and is exact "
+        "in each frame. The compute time per frame is printed; a smooth display allows 15 ms.",
     .options = table,
     .notes =
         "Examples:\n"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine compare: compare postures by displacement, and ventilation by height in each. */
+/* supine compare: compare displacements and ventilation by height between postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,7 +34,7 @@ typedef struct request {
   bool json;
   supine_volume_options volume;
   supine_from from;
-  double breath; /* mL */
+  double breath; /* tidal volume, mL */
 } request;
 
 static const supine_option table[] = {
@@ -45,24 +45,23 @@ static const supine_option table[] = {
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, breath), .standard = "500", SUPINE_ABOVE_ZERO},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
-    {"output", 'o', "FILE", ".html: a report of one file, with charts and pictures",
+    {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
 /* Displacements of all named structures in all postures. */
-typedef struct content_moves {
+typedef struct structures {
   const supine_basis *basis;
   const supine_posture_list *postures;
   supine_command_names names;
-  float *step;           /* [N, 3] displacement of each vertex in one posture */
-  double *moves;         /* [postures, names, 3] mm from the reference surface */
-  double *square_errors; /* [names] mean square expected errors between two postures, mm^2; 0:
-                            unknown */
-} content_moves;
+  float *displacement;   /* [N, 3] displacement of each vertex in one posture, mm */
+  double *mean;          /* [postures, names, 3] mean displacement from the reference surface, mm */
+  double *square_errors; /* [names] mean squared expected error, mm^2; 0: unknown */
+} structures;
 
-/* Average the `width` values of each vertex over the vertices of each name; 0 without vertices. */
-static void average(const content_moves *c, size_t width, const float *values, double *mean) {
+/* Average `width` values per vertex over the vertices of each name; 0 if a name has none. */
+static void average(const structures *c, size_t width, const float *values, double *mean) {
   const supine_command_names *names = &c->names;
   for (size_t part = 0; part < names->count; ++part) {
     const size_t begin = names->begin[part];
@@ -78,20 +77,20 @@ static void average(const content_moves *c, size_t width, const float *values, d
 }
 
 /* Compute the mean displacement of each name's vertices in posture i. */
-static supine_status find_moves(const content_moves *c, const supine_state *state, size_t i,
+static supine_status find_means(const structures *c, const supine_state *state, size_t i,
                                 supine_error *error) {
   supine_pose pose;
   const supine_status status = supine_basis_pose(c->basis, state, &pose, error);
   if (status == SUPINE_OK) {
     supine_displace_range(c->basis, &pose, 0, supine_basis_get_info(c->basis)->vertex_count,
-                          c->step);
-    average(c, 3, c->step, c->moves + 3 * i * c->names.count);
+                          c->displacement);
+    average(c, 3, c->displacement, c->mean + 3 * i * c->names.count);
   }
   return status;
 }
 
-/* Compute the mean square of the expected errors of each name's vertices. */
-static supine_status find_square_errors(const content_moves *c, const supine_state *to,
+/* Compute the mean squared expected error of each name's vertices between two states. */
+static supine_status find_square_errors(const structures *c, const supine_state *to,
                                         const supine_state *from, supine_error *error) {
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
   supine_expected expected = {0};
@@ -106,13 +105,13 @@ static supine_status find_square_errors(const content_moves *c, const supine_sta
   return status;
 }
 
-/* Add the displacements from one posture to another to a list. */
-static void add_pair(const content_moves *c, size_t from, size_t to, json_t *list) {
+/* Append the displacement of each name from one posture to another to a list. */
+static void add_pair(const structures *c, size_t from, size_t to, json_t *list) {
   for (size_t part = 0; part < c->names.count; ++part) {
     const char *const text[] = {c->postures->item[from].name, c->postures->item[to].name,
                                 c->names.text[part]};
-    const double *before = c->moves + 3 * (from * c->names.count + part);
-    const double *after = c->moves + 3 * (to * c->names.count + part);
+    const double *before = c->mean + 3 * (from * c->names.count + part);
+    const double *after = c->mean + 3 * (to * c->names.count + part);
     const double move[3] = {after[0] - before[0], after[1] - before[1], after[2] - before[2]};
     const double length = supine_length(move);
     const double sigma = sqrt(c->square_errors[part]);
@@ -123,15 +122,15 @@ static void add_pair(const content_moves *c, size_t from, size_t to, json_t *lis
   }
 }
 
-/* Compute the displacements between every two postures. */
-static supine_status find_pairs(const content_moves *c, const supine_state *volume, json_t *list,
+/* Append the displacements between every two postures to a list. */
+static supine_status find_pairs(const structures *c, const supine_state *volume, json_t *list,
                                 supine_error *error) {
   supine_state state[SUPINE_POSTURE_LIST_MAX];
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < c->postures->count && status == SUPINE_OK; ++i) {
     state[i] = *volume;
     memcpy(state[i].gravity, c->postures->item[i].gravity, sizeof state[i].gravity);
-    status = find_moves(c, &state[i], i, error);
+    status = find_means(c, &state[i], i, error);
   }
   for (size_t i = 0; i < c->postures->count; ++i) {
     for (size_t j = i + 1; j < c->postures->count && status == SUPINE_OK; ++j) {
@@ -146,14 +145,14 @@ static supine_status find_pairs(const content_moves *c, const supine_state *volu
 static supine_status compare_content(const supine_basis *basis, const supine_posture_list *postures,
                                      const supine_state *volume, bool json, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  content_moves c = {.basis = basis, .postures = postures};
+  structures c = {.basis = basis, .postures = postures};
   json_t *list = json_array();
   supine_status status = supine_command_names_open(basis, &c.names, error);
   if (status == SUPINE_OK) {
-    c.step = malloc(3 * n * sizeof *c.step);
-    c.moves = calloc(3 * postures->count * c.names.count, sizeof *c.moves);
+    c.displacement = malloc(3 * n * sizeof *c.displacement);
+    c.mean = calloc(3 * postures->count * c.names.count, sizeof *c.mean);
     c.square_errors = calloc(c.names.count, sizeof *c.square_errors);
-    if (c.step == NULL || c.moves == NULL || c.square_errors == NULL) {
+    if (c.displacement == NULL || c.mean == NULL || c.square_errors == NULL) {
       status = supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
     }
   }
@@ -164,8 +163,8 @@ static supine_status compare_content(const supine_basis *basis, const supine_pos
     supine_options_print(json_incref(list), json);
   }
   json_decref(list);
-  free(c.step);
-  free(c.moves);
+  free(c.displacement);
+  free(c.mean);
   free(c.square_errors);
   supine_command_names_close(&c.names);
   return status;
@@ -190,11 +189,11 @@ static supine_status compare(const char *path, const char *made_by, const supine
   if (status != SUPINE_OK) {
     return status;
   }
-  if (supine_basis_metadata(basis, "content") != NULL) { /* the basis is from 'supine embed' */
+  if (supine_basis_metadata(basis, "content") != NULL) { /* the basis was made by 'supine embed' */
     return wanted->html != NULL
                ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                  "%s holds structures inside the lungs, and -o needs the lungs: "
-                                  "give their basis, or leave -o out",
+                                  "%s holds structures inside the lungs, but -o needs the lungs: "
+                                  "give the basis of the lungs, or leave -o out",
                                   path)
                : compare_content(basis, &comparison.postures, &comparison.state, wanted->json,
                                  error);
@@ -225,23 +224,22 @@ const supine_command supine_command_compare = {
     name,
     "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
-    .about = "Reports how far the lungs move from supine at rest (or from --from) to each posture, "
-             "how much each lung holds, and which heights ventilate in a breath; then finds the "
-             "direction of gravity farthest from supine. For structures inside ('supine embed'), "
-             "reports how far and where each named part moves between every two postures.",
+    .about = "Reports displacements from supine at rest (or from --from) to each posture, the "
+             "volume of each lung, and ventilation by height in a breath; then finds the direction "
+             "of gravity with the largest displacement from supine. For structures inside ('supine "
+             "embed'), reports the displacement of each named part between every two postures.",
     .options = table,
-    .notes =
-        "Averages are over the surface's area; 95 % of the area moves no farther than the number "
-        "under '95 %'. Ventilation by height: the lungs before a breath are cut into ten slabs of "
-        "equal thickness across gravity. The gain of a slab is the volume that its part of the "
-        "surface and its two cut faces enclose after the breath, minus that before. The gains sum "
-        "to the volume of the breath; gain over volume is the regional expansion. For structures "
-        "inside, the displacement is the mean over a "
-        "part, mm to the left, to the back and to the head.\n"
-        "\n"
-        "Examples:\n"
-        "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
-        "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
+    .notes = "Statistics are weighted by the area of the surface; '95 %' is the 95th percentile. "
+             "Ventilation by height: the lungs before a breath are cut into ten slabs of equal "
+             "thickness across gravity. The gain of a slab is the volume that its part of the "
+             "surface and its two cut faces enclose after the breath, minus that before. The gains "
+             "sum to the volume of the breath. The regional expansion of a slab is its gain "
+             "divided by its volume before the breath. For structures inside, the displacement is "
+             "the mean over a part, in mm to the left, to the back and to the head.\n"
+             "\n"
+             "Examples:\n"
+             "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
+             "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

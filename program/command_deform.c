@@ -23,22 +23,23 @@ typedef struct request {
   supine_from from;
   bool as_scanned;
   supine_deform_content content;
-  const char *states; /* file of --states */
-  char *output;       /* output of a row of that file */
+  const char *states; /* CSV file of --states; NULL: one state */
+  char *output;       /* output file named by a row of --states, owned */
 } request;
 
 #define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
-     SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement and the expected error. Embedded "
-                         "points also go into .csv, images into .nrrd, .nii, .nii.gz or .mha",
+     SUPINE_MESH_ENDINGS
+     "; PLY and VTP files include displacements and expected errors. Embedded points can also be "
+     "written as .csv, moved images as .nrrd, .nii, .nii.gz or .mha",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS,
      .rivals = "output"},
     {"states", 0, "LIST",
-     "compute many states in one call, reading the basis and the image once: a CSV file with the "
-     "columns posture, volume and output. An output is a file beside the list: a surface, points, "
-     "a field, or the moved image of --image or --labels",
+     "CSV file of many states, with the columns posture, volume and output; the basis and the "
+     "image are read once. Each output is a surface, points, a field, or the moved image of "
+     "--image or --labels, named relative to the folder of LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
@@ -48,7 +49,7 @@ static const supine_option table[] = {
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
 
-/* Compute the surface of a pose, and its normals [N, 3] (NULL: not wanted). */
+/* Compute the surface of a pose and, unless `normals` is NULL, its normals [N, 3]. */
 static supine_status deformed_mesh(const supine_basis *basis, const supine_pose *pose,
                                    supine_mesh *mesh, float *normals) {
   const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
@@ -163,7 +164,7 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   const char *const volume = supine_csv_text(csv, 2);
   supine_state *state = &row->volume.state;
   supine_error reason;
-  state->gravity[1] = 1.0; /* supine, unless the row says otherwise */
+  state->gravity[1] = 1.0; /* default: supine */
   supine_status status = supine_state_parse(supine_csv_text(csv, 0), state, &reason);
   if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
     status = supine_state_parse_volume(volume, state, &reason);
@@ -186,8 +187,8 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
                              : supine_command_deform_content_check(&row->content, error);
 }
 
-/* Check that the output of the last row is no input and no other row's output, and can be
- * written. */
+/* Check that the output of the last row can be written, and is neither an input nor the output of
+ * another row. */
 static supine_status check_row(const char *basis, const request *rows, size_t count,
                                supine_error *error) {
   const request *row = &rows[count - 1];
@@ -201,14 +202,14 @@ static supine_status check_row(const char *basis, const request *rows, size_t co
   for (size_t i = 0; i + 1 < count && status == SUPINE_OK; ++i) {
     if (strcmp(rows[i].output, row->output) == 0) {
       status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "%s: two rows write %s: give each its own file", row->states,
+                                "%s: two rows write %s: give each row its own file", row->states,
                                 row->output);
     }
   }
   return status == SUPINE_OK ? supine_output_try(row->output, error) : status;
 }
 
-/* Make a request for each row of --states, all checked before any work. */
+/* Make a request for each row of --states, and check them all before any is computed. */
 static supine_status read_rows(const char *basis, const request *wanted, request **rows,
                                size_t *count, supine_error *error) {
   static const char *const columns[] = {"posture", "output", "volume"};
@@ -275,10 +276,9 @@ const supine_command supine_command_deform = {
     "deform a basis for a posture and a volume",
     .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE\n"
              "BASIS --states LIST",
-    .about = "Deforms the lungs of a basis file for any direction of gravity and any volume and "
-             "writes the surface, as the run-time library does in each frame. Each point carries "
-             "its expected error, expected_error_mm: " SUPINE_EXPECTED_MEANING
-             ". " SUPINE_EXPECTED_SUPPORT,
+    .about = "Deforms the lungs of a basis file to a posture and a volume, as the run-time library "
+             "does in each frame, and writes the surface. Each point carries its expected error, "
+             "expected_error_mm: " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT,
     .options = table,
     .notes =
         "Examples:\n"

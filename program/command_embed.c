@@ -18,15 +18,15 @@
 
 static const char name[] = "embed";
 
-/* Margin around the lungs, mm, in which 'supine deform' fades a field out. */
+/* Margin of a grid around the lungs, mm, in which 'supine deform' fades a field to 0. */
 static const double margin = 60.0;
 
 enum { LABELS_MOST = 64 };
 
-/* The value of --labels: labels to embed, and the names of their parts. */
+/* Labels to embed, and the names of their parts, as --labels gives them. */
 typedef struct label_list {
   bool given;
-  size_t count; /* 0: all */
+  size_t count; /* number of labels; 0: all labels of the map */
   unsigned label[LABELS_MOST];
   char name[LABELS_MOST][32];
 } label_list;
@@ -35,7 +35,7 @@ typedef struct request {
   const char *path;
   label_list labels;
   bool has_grid;
-  double grid; /* mm */
+  double grid; /* spacing of the nodes, mm */
   bool clamp;
   const char *rigid; /* names of rigid parts, or "all" */
   supine_mesh_load_options load;
@@ -72,27 +72,29 @@ static const supine_option table[] = {
     {"output", 'o', "FILE", "basis of the structures (.safetensors)", SUPINE_FILLS(request, path),
      .required = true, .file = SUPINE_FILE_OUT},
     {"grid", 0, "MM",
-     "spacing of the nodes of a grid over the lungs, for displacement fields; with an image as "
-     "CONTENT, its voxels at about that spacing",
+     "embed the nodes of a grid over the lungs, for displacement fields, at this spacing; if "
+     "CONTENT is an image, the nodes are voxels of the image, and the spacing is rounded to a "
+     "multiple of theirs",
      SUPINE_FILLS(request, grid), SUPINE_SAYS_GIVEN(request, has_grid), .standard = "4",
      SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {"labels", 0, "all|N[=NAME],...",
-     "take images as label maps, and embed the surface of each of these labels under its name, "
-     "beside points and meshes",
+     "read images as label maps, and embed the surface of each of these labels under its name; "
+     "points and meshes may be embedded with them",
      SUPINE_FILLS(request, labels), .read = read_labels,
-     .wants = "all, or at most 64 labels with names of up to 31 letters, as 7=nodule,8=vessels"},
+     .wants =
+         "all, or at most 64 labels with names of up to 31 letters, such as 7=nodule,8=vessels"},
     {"rigid", 0, "all|NAME,...",
-     "parts that keep their size and shape and turn with the tissue, as nodules and tumours do; "
-     "other parts deform",
+     "parts that keep their size and shape and rotate with the tissue, such as nodules and "
+     "tumours; other parts deform",
      SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
-     "move structures outside the lungs as the nearest point of the surface; default: extrapolate "
-     "the motion",
+     "move structures outside the lungs like the nearest point of the surface; default: "
+     "extrapolate the motion inside",
      SUPINE_FILLS(request, clamp)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
-/* Make the nodes of a regular grid, or of the voxels of an image. */
+/* Make the nodes of a regular grid; if there is an image, take them from its voxels. */
 static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
                                const char *image_path, supine_inside_content *content,
                                supine_error *error) {
@@ -172,9 +174,9 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
     (void)printf("; grid of %zu x %zu x %zu", content->grid.size[0], content->grid.size[1],
                  content->grid.size[2]);
   }
-  (void)printf("; %zu multiplications each at run time\n", 3 * info->mode_count + 3);
+  (void)printf("; %zu multiplications per vertex at run time\n", 3 * info->mode_count + 3);
   if (report->rigid > 0) {
-    (void)printf("rigid parts, moved and turned, never deformed: %zu\n", report->rigid);
+    (void)printf("rigid parts, which move and rotate but keep their shape: %zu\n", report->rigid);
   }
   if (shells->scan.gains[0][0] != 0.0) {
     (void)puts("positions were given in the scan; the file holds them at full inflation");
@@ -182,12 +184,12 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
   if (report->outside > 0 && !grid) {
     char text[64];
     part_name(content, report->farthest, text, sizeof text);
-    (void)printf("outside the lungs: %zu of %zu, by at most %.1f mm (%s); they move with %s\n",
+    (void)printf("outside the lungs: %zu of %zu, by at most %.1f mm (%s); motion %s\n",
                  report->outside, report->count, report->farthest_mm, text,
-                 wanted->clamp ? "the nearest point of the surface"
-                               : "the extrapolated motion inside, unless --clamp is given");
+                 wanted->clamp ? "taken from the nearest point of the surface"
+                               : "extrapolated from inside (--clamp changes this)");
     if (2 * report->outside > report->count && report->farthest_mm > 50.0) {
-      (void)printf("most are outside: if the content is in RAS, as from 3D Slicer or ITK-SNAP, "
+      (void)printf("most are outside: if the content is in RAS, as 3D Slicer and ITK-SNAP write, "
                    "add --axes RAS\n");
     }
   }
@@ -226,19 +228,20 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     image = image || supine_image_is_named(given->operand[i]);
   }
   if (given->count == 1 && !wanted->has_grid) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "nothing to embed: give points (.csv, .mrk.json), meshes or an "
-                            "image, or --grid MM");
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        "nothing to embed: give points (.csv, .mrk.json), meshes or an image, or --grid MM");
   }
   if (labels && (!image || wanted->has_grid)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            image ? "--labels embeds surfaces and --grid voxels: give one of them"
-                                  : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
+                            image
+                                ? "--labels embeds surfaces, --grid embeds nodes: give one of them"
+                                : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
   }
   if (!labels && given->count > 1 && (image ? given->count > 2 : wanted->has_grid)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a grid, or an image, needs a file of its own; --labels embeds the "
-                            "parts of a label map beside other content");
+                            "a grid or an image cannot be embedded with other content: embed it "
+                            "alone, or give --labels to embed the parts of a label map");
   }
   supine_status status =
       supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error);
@@ -254,13 +257,12 @@ const supine_command supine_command_embed = {
     "make points, meshes or a grid move with the lungs",
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
-    .about =
-        "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json "
-        "of 3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
-        "nodules), the parts of a label map, or the nodes of a regular grid or of the voxels of an "
-        "image (.nrrd, .nii, .nii.gz). Every command that reads a basis takes it.\n\nDisplacements "
-        "inside are interpolated from those of each lung's surface by biharmonic splines, which "
-        "are exact on the surface and for affine motion.",
+    .about = "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json of "
+             "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
+             "nodules), the parts of a label map, or the nodes of a regular grid or of the voxels "
+             "of an image (.nrrd, .nii, .nii.gz). Every command that reads a basis reads this file "
+             "too.\n\nDisplacements inside are interpolated from those of each lung's surface by "
+             "biharmonic splines, which are exact on the surface and for affine motion.",
     .options = table,
     .notes = "Examples:\n"
              "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"

@@ -14,35 +14,35 @@ typedef struct request {
   const char *path;
   const char *title;
   supine_from from;
-  bool glb_only; /* whether an option was given that only glTF has */
+  bool glb_only; /* an option was given that applies to .glb files only */
   const char *inside;
   export_glb_options glb;
 } request;
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
-     ".html: a page to explore the lungs in a browser: one file, no network; bases of up to 16 "
-     "modes\n"
-     ".glb: glTF 2.0 morph targets: any engine deforms the lungs",
+     ".html: a page to explore the lungs in a browser, in one file that needs no network, for "
+     "bases of up to 16 modes\n.glb: glTF 2.0 morph targets, with which any engine deforms the "
+     "lungs",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
     {"breath", 0, "ML",
-     "tidal volume of the breath played; up to it, the weights of morph targets stay within 0 and "
-     "1",
+     "tidal volume of the breath shown; up to this volume the weights of morph targets stay "
+     "between 0 and 1",
      SUPINE_FILLS(request, glb.breath), .standard = "500", SUPINE_ABOVE_ZERO,
      .wants = "millilitres above 0"},
     {.help = "For a page:"},
     {"inside", 0, "FILE",
-     "structures from 'supine embed' with the same basis, shown through the lungs; each part shows "
-     "its name and displacement at the pointer and in a table",
+     "structures made by 'supine embed' from the same basis, shown through the lungs; the page "
+     "shows the name and displacement of each part at the pointer and in a table",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
-    {"title", 0, "TEXT", "its title; default the name of the basis file",
+    {"title", 0, "TEXT", "title of the page; default: the name of the basis file",
      SUPINE_FILLS(request, title)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.help = "For glTF:"},
     {"plain", 0, NULL,
-     "float32 without compression, for engines that know neither EXT_meshopt_compression nor "
-     "KHR_mesh_quantization",
+     "write float32 without compression, for engines that support neither EXT_meshopt_compression "
+     "nor KHR_mesh_quantization",
      SUPINE_FILLS(request, glb.plain), SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
      "add animations: one breathes while gravity turns from supine over the left side to prone and "
@@ -111,7 +111,7 @@ static supine_status write_page(const export_source *source, const request *want
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
-  const bool page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0; /* else .glb */
+  const bool page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0;
   export_source source = {0};
   if (page && wanted->glb_only) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -138,19 +138,18 @@ const supine_command supine_command_export = {
     name,
     "write a basis as a page or as glTF morph targets",
     .usage = "BASIS -o lungs.html [OPTIONS]\nBASIS -o lungs.glb [OPTIONS]",
-    .about = "Writes a basis file in a form that other programs play; the ending of the "
-             "output's name selects it.",
+    .about = "Writes a basis file as a page for the browser or as a glTF model; the ending of the "
+             "output's name selects the format.",
     .options = table,
-    .notes =
-        "In a .glb file, each lung is a mesh with its own weights; the file's extras say how to "
-        "compute them from gravity and volume.\n"
-        "\n"
-        "Examples:\n"
-        "  supine export lungs.safetensors -o lungs.html\n"
-        "  supine export lungs.safetensors -o lungs.html --from scan\n"
-        "  supine export lungs.safetensors -o lungs.glb --animate\n"
-        "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
-        "  supine export lungs.safetensors -o lungs.glb --plain --breath 1000",
+    .notes = "In a .glb file, each lung is a mesh with its own weights; the file's extras say how "
+             "to compute them from gravity and volume.\n"
+             "\n"
+             "Examples:\n"
+             "  supine export lungs.safetensors -o lungs.html\n"
+             "  supine export lungs.safetensors -o lungs.html --from scan\n"
+             "  supine export lungs.safetensors -o lungs.glb --animate\n"
+             "  supine export lungs.safetensors --inside nodules.safetensors -o lungs.html\n"
+             "  supine export lungs.safetensors -o lungs.glb --plain --breath 1000",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

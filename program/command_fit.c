@@ -15,61 +15,59 @@
 
 static const char name[] = "fit";
 
-/* Options: scans or landmarks of a person, and the posture and volume of each. */
 typedef struct request {
   const char *path, *name;
   supine_landmark_options landmarks;
   bool has_law, expandability, json;
   int law;
-  supine_source_options source; /* options for loading surfaces */
+  supine_source_options source;
 
-  supine_state rest, state; /* states of the first and of the second scan */
-  size_t count;             /* number of further states */
+  supine_state first, second;           /* states of the first and of the second scan */
+  const char *first_path, *second_path; /* files of their surfaces; NULL: none */
+  size_t further_count;
   supine_state further[SUPINE_PATIENT_OTHERS_MAX];
   const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
-  const char *rest_path, *state_path; /* surfaces of the first and the second scan; NULL: none */
 } request;
 
-/* Scans and landmarks of the person. */
 typedef struct scan_data {
-  supine_lungs lungs[2]; /* in the fuller state, in the emptier one (once ordered) */
+  supine_lungs lungs[2]; /* the fuller and the emptier scan, once order_states has ordered them */
   supine_patient_pairs pairs;
-  bool swapped; /* the state named second is the fuller one */
+  bool swapped; /* the second scan is the fuller one */
 } scan_data;
 
 static void begin(void *chosen) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   request *wanted = chosen;
-  memcpy(wanted->rest.gravity, supine, sizeof supine);
-  wanted->rest.volume.kind = SUPINE_VOLUME_REST;
-  memcpy(wanted->state.gravity, supine, sizeof supine);
+  memcpy(wanted->first.gravity, supine, sizeof supine);
+  wanted->first.volume.kind = SUPINE_VOLUME_REST;
+  memcpy(wanted->second.gravity, supine, sizeof supine);
 }
 
-/* Read "supine", "prone:rest", "supine:rest+500" or "2600mL". */
+/* Read a state, such as "supine", "prone:rest", "supine:rest+500" or "2600mL". */
 static supine_status read_state(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
   const supine_status status = supine_state_parse(text, state, error);
   return status == SUPINE_OK && (state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0)
              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                 "'%s' is not a state here: give rest, full or a volume of both "
-                                "lungs, as 2600mL",
+                                "lungs, such as 2600mL",
                                 text)
              : status;
 }
 
-/* Read "prone:PAIRS.csv" or "prone:rest:PRONE.ply" into the whole request. */
+/* Append a further state, such as "prone:PAIRS.csv" or "prone:rest:PRONE.ply", to the request. */
 static supine_status read_further(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   const char *colon = strrchr(text, ':');
   char state[SUPINE_PATIENT_STATE_TEXT];
-  if (wanted->count == SUPINE_PATIENT_OTHERS_MAX || colon == NULL || colon[1] == '\0' ||
+  if (wanted->further_count == SUPINE_PATIENT_OTHERS_MAX || colon == NULL || colon[1] == '\0' ||
       (size_t)(colon - text) >= sizeof state) {
     return SUPINE_ERROR_ARGUMENT;
   }
   (void)snprintf(state, sizeof state, "%.*s", (int)(colon - text), text);
-  wanted->further_path[wanted->count] = colon + 1;
-  wanted->further[wanted->count].gravity[1] = 1.0;
-  return read_state(state, &wanted->further[wanted->count++], error);
+  wanted->further_path[wanted->further_count] = colon + 1;
+  wanted->further[wanted->further_count].gravity[1] = 1.0;
+  return read_state(state, &wanted->further[wanted->further_count++], error);
 }
 
 #define FILLS(member) SUPINE_FILLS(request, member)
@@ -79,38 +77,40 @@ static const supine_option table[] = {
      FILLS(path), .file = SUPINE_FILE_OUT},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"rest", 0, "STATE",
-     "state of the first scan: POSTURE, VOLUME or POSTURE:VOLUME, where VOLUME is rest or "
-     "full, either with +ML or -ML, or the volume measured in a CT, as 2600mL",
-     FILLS(rest), .read = read_state, .standard = "supine:rest"},
+     "state of the first scan: POSTURE, VOLUME or POSTURE:VOLUME, where VOLUME is rest or full, "
+     "either with +ML or -ML, or the volume of both lungs measured in a CT, such as 2600mL",
+     FILLS(first), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
-     "state of the second scan, in the same form; without a volume, that of the surfaces. "
+     "state of the second scan, in the same form; a missing volume is taken from the surfaces. "
      "Either scan may be the fuller one",
-     FILLS(state), .read = read_state, .standard = "supine"},
+     FILLS(second), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
-     "deep (default): only its size is fitted; paper: the law of Santhanam 2008, c1 to c9 "
-     "fitted. Kriging interpolates the residual of either",
+     "deep (default), of which only the size is fitted; or paper, the law of Santhanam 2008, of "
+     "which c1 to c9 are fitted. Kriging interpolates the residual of either law",
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
-    {"name", 0, "TEXT", "name of the person; default: the landmarks' file", FILLS(name),
-     .more = true},
+    {"name", 0, "TEXT",
+     "name of the person; default: the name of the file of landmarks, or of the second surface",
+     FILLS(name), .more = true},
     {"state", 0, "STATE:FILE",
-     "further state: its surface, or landmarks from the first scan (.csv); may be repeated, up "
-     "to 8. In a posture other than the fitted ones it determines the gravity-dependent part of "
-     "the force (the gain), else how far that breath went; the other constants of the law stay "
-     "those of the two states",
-     .read = read_further, .wants = "(at most 8) a state, as prone:rest, a colon and a file"},
+     "further state, and its surface or landmarks from the first scan (.csv); may be repeated, up "
+     "to 8 times. A state in a posture other than those of the scans determines the part of the "
+     "force that depends on gravity (the gain); for other states only the size of the displacement "
+     "is fitted. "
+     "The other constants are fitted to the two scans alone",
+     .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
-     FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline), .wants = "an x in mm",
-     .more = true},
+     FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
+     .wants = "a number of mm", .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"expandability", 0, NULL,
-     "for surfaces: fit the expandability of regions about 45 mm wide, with the paper law and "
-     "the force of the law deep, instead of kriging; report the regions that cannot be "
-     "determined; keep the result only where it lowers the held-out residual",
+     "for surfaces: instead of kriging, fit the expandability of regions about 45 mm wide, with "
+     "the paper law and the force of the deep law. The result is used only if it lowers the "
+     "held-out residual; regions that the scans do not determine are reported",
      FILLS(expandability), .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* Print the model without its long lists, which the file has. */
+/* Print the model; as text, without the lists of kriging centres and regions. */
 static supine_status print(const supine_patient_record *record, const char *made_by, bool json,
                            supine_error *error) {
   json_t *root = supine_patient_encode(record, made_by);
@@ -131,12 +131,12 @@ static void scan_data_free(scan_data *data) {
   supine_patient_pairs_free(&data->pairs);
 }
 
-/* Return the volume of lungs, mL; 0 without a surface. */
+/* Return the volume that the lungs' surface encloses, mL; 0 if there is no surface. */
 static double volume_of(const supine_lungs *lungs) {
   return lungs->mesh.vertex_count > 0 ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
 }
 
-/* Find the lung that each landmark lies in, by the surface of the first scan. */
+/* Assign each landmark to the lung whose surface is nearest in the first scan. */
 static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs *pairs,
                                 supine_error *error) {
   supine_inside_surface *tree = NULL;
@@ -170,21 +170,21 @@ static supine_status load_scans(const request *wanted, scan_data *data, supine_e
   if (wanted->landmarks.path != NULL) {
     status = load_pairs(wanted, wanted->landmarks.path, &data->pairs, error);
   }
-  if (status == SUPINE_OK && wanted->rest_path != NULL) {
-    status =
-        supine_command_load_lungs(name, wanted->rest_path, &wanted->source, &data->lungs[0], error);
-  }
-  if (status == SUPINE_OK && wanted->state_path != NULL) {
-    status = supine_command_load_lungs(name, wanted->state_path, &wanted->source, &data->lungs[1],
+  if (status == SUPINE_OK && wanted->first_path != NULL) {
+    status = supine_command_load_lungs(name, wanted->first_path, &wanted->source, &data->lungs[0],
                                        error);
   }
-  if (status == SUPINE_OK && wanted->rest_path != NULL && data->pairs.count > 0) {
+  if (status == SUPINE_OK && wanted->second_path != NULL) {
+    status = supine_command_load_lungs(name, wanted->second_path, &wanted->source, &data->lungs[1],
+                                       error);
+  }
+  if (status == SUPINE_OK && wanted->first_path != NULL && data->pairs.count > 0) {
     status = find_sides(&data->lungs[0], &data->pairs, error);
   }
   return status;
 }
 
-/* Return +1 where the second state was named as the fuller one, -1 the emptier one, 0 neither. */
+/* Compare the named states: return 1 if the second is fuller, -1 if the first is, 0 if unknown. */
 static int named_order(const supine_state *first, const supine_state *second) {
   const supine_volume *a = &first->volume;
   const supine_volume *b = &second->volume;
@@ -198,20 +198,20 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Find which of the two states is fuller, by the volumes of the surfaces or the spread of the
- * landmarks. If it is the second, exchange the surfaces and landmarks of the two. */
+/* Exchange the scans if the volumes of the surfaces, or the landmarks, show the second as fuller.
+ * */
 static supine_status order_states(const request *wanted, scan_data *data, supine_error *error) {
-  static const double doubt =
-      0.02; /* relative difference of volumes that is not yet a contradiction */
+  /* Largest relative difference of volumes that does not contradict the named states. */
+  static const double doubt = 0.02;
   const double volume[2] = {volume_of(&data->lungs[0]), volume_of(&data->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
                         : data->pairs.count > 0 ? supine_patient_pairs_growth(&data->pairs)
                                                 : 1.0;
-  const int named = named_order(&wanted->rest, &wanted->state);
+  const int named = named_order(&wanted->first, &wanted->second);
   if ((named > 0 && growth < 1.0 - doubt) || (named < 0 && growth > 1.0 + doubt)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the state named as the fuller one holds %.0f %% of the other: "
-                            "exchange --rest and --other, or give --reverse",
+                            "the state named as the fuller one has %.0f %% of the volume of the "
+                            "other: exchange --rest and --other, or give --reverse",
                             100.0 * (named > 0 ? growth : 1.0 / growth));
   }
   data->swapped = named > 0 || (named == 0 && growth > 1.0);
@@ -243,8 +243,8 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
-/* Fit a further state. Its landmarks start in the first scan: move them to the fuller state where
- * the first is the emptier one. */
+/* Fit a further state. Its landmarks start in the first scan; if that is the emptier one, they are
+ * moved to the fuller state. */
 static supine_status fit_further(const request *wanted, const scan_data *data, size_t which,
                                  const supine_lungs *from, supine_patient_record *record,
                                  supine_error *error) {
@@ -270,7 +270,7 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   return status;
 }
 
-/* Fit the gravity-dependent share of the force to the further states. */
+/* Fit the further states, and set the part of the force that depends on gravity from them. */
 static supine_status find_gain(const request *wanted, scan_data *data,
                                supine_patient_record *record, supine_error *error) {
   supine_lungs *from = &data->lungs[0];
@@ -280,15 +280,15 @@ static supine_status find_gain(const request *wanted, scan_data *data,
     supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_mesh_box(&from->mesh, from->minimum, from->maximum);
   }
-  for (size_t k = 0; k < wanted->count && status == SUPINE_OK; ++k) {
+  for (size_t k = 0; k < wanted->further_count && status == SUPINE_OK; ++k) {
     status = fit_further(wanted, data, k, from, record, error);
   }
   supine_patient_gain_set(record);
   return status;
 }
 
-/* Set the volume of a state without one to that of its surface: relative to the other state where
- * that is known, else absolute. */
+/* If state k has no volume, use that of its surface: relative to the other state if that is rest or
+ * full, else absolute. */
 static void complete_state(supine_patient_record *record, size_t k) {
   supine_volume *of = &record->state[k].volume;
   const supine_state *other = &record->state[1 - k];
@@ -306,9 +306,9 @@ static void complete_state(supine_patient_record *record, size_t k) {
 
 static void set_states(const request *wanted, const scan_data *data,
                        supine_patient_record *record) {
-  record->from_surface = wanted->state_path != NULL;
-  record->state[data->swapped ? 1 : 0] = wanted->rest;
-  record->state[data->swapped ? 0 : 1] = wanted->state;
+  record->from_surface = wanted->second_path != NULL;
+  record->state[data->swapped ? 1 : 0] = wanted->first;
+  record->state[data->swapped ? 0 : 1] = wanted->second;
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *volume = &record->state[k].volume;
     record->volume[k] = volume_of(&data->lungs[k]);
@@ -329,10 +329,10 @@ static void set_states(const request *wanted, const scan_data *data,
   }
 }
 
-/* Warn where the volume at rest that the two scans show differs from that of healthy people. */
+/* Warn if the volume at rest in the two scans differs from that of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  static const double apart_least =
-      0.07; /* share of full inflation; the standard deviation in healthy people is 0.04 */
+  /* Smallest reported difference, a share of full inflation; in healthy people the SD is 0.04. */
+  static const double apart_least = 0.07;
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
   supine_resting shown = usual;
@@ -342,23 +342,23 @@ static void warn_of_rest(const supine_patient_record *record) {
                            supine_reference_resting_total(&shown, g)};
   if (fabs(share[1] - share[0]) > apart_least) {
     supine_findings_add(&findings,
-                        "warning: at rest the lungs hold %.0f %% of full inflation by the two "
-                        "scans, where %.0f %% is assumed of healthy people. Is --rest right? "
-                        "'supine precompute --patient' takes what the scans show",
+                        "warning: at rest the lungs hold %.0f %% of full inflation in the two "
+                        "scans, but %.0f %% in healthy people: check --rest. 'supine precompute "
+                        "--patient' uses the volume in the scans",
                         100.0 * share[1], 100.0 * share[0]);
     supine_options_say_findings(name, &findings);
   }
 }
 
-/* Set the name, and the force with the gain of the law deep. */
+/* Set the name, and the force with the gain of the deep law. */
 static void set_name_and_force(const request *wanted, supine_patient_record *record) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
-  const char *source = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->state_path;
-  const char *slash = strrchr(source, '/');
+  const char *path = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->second_path;
+  const char *slash = strrchr(path, '/');
   (void)snprintf(record->name, sizeof record->name, "%s",
                  wanted->name != NULL ? wanted->name
                  : slash != NULL      ? slash + 1
-                                      : source);
+                                      : path);
   record->force =
       supine_patient_force(&record->patient.power, deep.force.gain, record->state[1].gravity);
 }
@@ -384,7 +384,7 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
     for (size_t k = 0; k < 3; ++k) {
       options.path_span[k] = gains[1][k] - gains[0][k];
     }
-    status = wanted->state_path != NULL
+    status = wanted->second_path != NULL
                  ? supine_patient_fit_surface(&data.lungs[0], &data.lungs[1].mesh, &data.pairs,
                                               &options, wanted->expandability, record, error)
                  : fit_landmarks(wanted, &data.pairs, &options, record, error);
@@ -397,21 +397,21 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
   return status;
 }
 
-/* Check the operands and options. */
+/* Take the operands, and check that they fit the options. */
 static supine_status check(request *wanted, const supine_arguments *given, supine_error *error) {
-  bool surfaces = false; /* further states as surfaces */
-  wanted->rest_path = given->count > 0 ? given->operand[0] : NULL;
-  wanted->state_path = given->count > 1 ? given->operand[1] : NULL;
-  for (size_t k = 0; k < wanted->count; ++k) {
-    surfaces = surfaces || !supine_text_ends_in(wanted->further_path[k], ".csv");
+  bool further_surfaces = false;
+  wanted->first_path = given->count > 0 ? given->operand[0] : NULL;
+  wanted->second_path = given->count > 1 ? given->operand[1] : NULL;
+  for (size_t k = 0; k < wanted->further_count; ++k) {
+    further_surfaces = further_surfaces || !supine_text_ends_in(wanted->further_path[k], ".csv");
   }
   const char *wrong =
-      wanted->landmarks.path == NULL && wanted->state_path == NULL
-          ? "nothing to fit to: give --landmarks, or the surfaces of both states, or all three"
-      : surfaces && wanted->rest_path == NULL
-          ? "a --state is a surface: name that of the first scan as well"
-      : wanted->expandability && wanted->state_path == NULL
-          ? "--expandability needs surfaces: give those of both states"
+      wanted->landmarks.path == NULL && wanted->second_path == NULL
+          ? "nothing to fit to: give --landmarks, the surfaces of both scans, or all three"
+      : further_surfaces && wanted->first_path == NULL
+          ? "--state names a surface: name the surface of the first scan too"
+      : wanted->expandability && wanted->second_path == NULL
+          ? "--expandability needs surfaces: give those of both scans"
       : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP
           ? "--expandability uses the paper law: leave --law out"
           : NULL;
@@ -420,7 +420,7 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
-  static supine_patient_record record; /* about 90 kB, too large for the stack */
+  static supine_patient_record record; /* static, as it is too large for the stack */
   supine_status status = check(wanted, given, error);
   if (status == SUPINE_OK) {
     status = fit(wanted, &record, error);
@@ -428,7 +428,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (status == SUPINE_OK) {
     status = print(&record, given->made_by, wanted->json, error);
   }
-  if (status == SUPINE_OK && wanted->path != NULL) { /* last: no failure follows */
+  /* Write last, so that a failure leaves no file. */
+  if (status == SUPINE_OK && wanted->path != NULL) {
     status = supine_patient_write(wanted->path, &record, given->made_by, error);
   }
   return status;
@@ -441,20 +442,21 @@ const supine_command supine_command_fit = {
              "SCAN SCAN [--state STATE:FILE]... -o patient.json [OPTIONS]",
     .about = "Fits a model to one person's lungs in two scans: a law of motion, and its residual "
              "interpolated by kriging. Reports the measured and the expected error at held-out "
-             "points. Landmarks determine most; surfaces alone do not show sliding along them, so "
-             "their expected error includes that seen in other patients. 'supine precompute "
-             "--patient' makes a basis from the model and either scan.",
+             "points. Landmarks determine the motion best; surfaces alone do not show sliding "
+             "along them, so their expected error includes the sliding seen in other patients. "
+             "'supine precompute --patient' makes a basis from the model and either scan.",
     .options = table,
     .notes =
-        "The residuals are those of no motion, a translation, an affine map, the law, and the law "
-        "corrected by kriging; held out in 5 folds of blocks of 40 mm, repeated 3 times. A small "
-        "distance between surfaces does not prove the motion inside: points have been off by 14 mm "
-        "where surfaces were 5 mm apart. The applied force is found from the displacement by the "
-        "inverse of the operator; its residual is what (18) of Santhanam 2008 does not explain.\n"
+        "Residuals are given for no motion, a translation, an affine map, the law, and the law "
+        "corrected by kriging. Held-out residuals are from cross-validation: 5 folds of blocks of "
+        "40 mm, repeated 3 times. A small distance between surfaces does not prove that the motion "
+        "inside is right: points erred by 14 mm where surfaces were 5 mm apart. The applied force "
+        "is found from the displacement by the inverse of the operator; its residual is what (18) "
+        "of Santhanam 2008 does not explain.\n"
         "\n"
         "Examples:\n"
-        "  supine fit --landmarks pairs.csv --translation --rest supine:rest "
-        "--other supine:full -o patient.json\n"
+        "  supine fit --landmarks pairs.csv --translation --rest supine:rest --other supine:full "
+        "-o patient.json\n"
         "  supine fit rest.ply full.ply --other supine:full --landmarks pairs.csv -o patient.json\n"
         "  supine fit rest.ply later.ply --other supine:rest+500 -o patient.json\n"
         "  supine fit rest.ply full.ply --other supine:full --state prone:rest:prone.ply --law "

@@ -11,8 +11,7 @@
 
 #include "program/options/basis_input.h"
 
-/* Compute the share of the squared displacement in each band, [band + 1]; 0 where the surface has
- * no area. */
+/* Compute the share of each band in the squared displacement; 0 if the surface has no area. */
 static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
   supine_compare *compare = NULL;
   const supine_status status = supine_compare_create(basis, &compare, error);
@@ -42,12 +41,12 @@ static const char *const facts[] = {"content",        "assumed",
                                     "lung_share",     "lesions",
                                     "reach_mm",       "made_by",
                                     "error_method",   "turned_over_percent"};
-/* Keys of the metadata that are printed in the object "error", without "error_". */
+/* Keys of the metadata that are printed in the object "error", without the prefix "error_". */
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rest_part",
                                      "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
 
-/* Add an entry of the metadata, where the basis has it; as a number where it is one. */
+/* Add an entry of the metadata, if the basis has it; as a number if the text is a number. */
 static void add_fact(json_t *object, const char *name, const supine_basis *basis, const char *key) {
   const char *text = supine_basis_metadata(basis, key);
   double value;
@@ -58,7 +57,7 @@ static void add_fact(json_t *object, const char *name, const supine_basis *basis
   }
 }
 
-/* Add the number of embedded vertices in each lung and outside, and of rigid parts. */
+/* Add the numbers of embedded vertices in each lung and outside the lungs, and of rigid parts. */
 static void add_content(json_t *root, const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *depth = supine_basis_tensor(basis, "depth");
@@ -83,8 +82,8 @@ static void add_content(json_t *root, const supine_basis *basis) {
   (void)json_object_set_new(root, "embedded", counts);
 }
 
-/* Add the expected errors of displacements from the scan to the default state, supine and prone.
- * @retval SUPINE_ERROR_MEMORY  other failures add nothing */
+/* Add the expected errors of displacements from the scan to the default volume, supine and prone,
+ * if they are known. Return SUPINE_OK or SUPINE_ERROR_MEMORY. */
 static supine_status add_expected(json_t *root, const supine_basis *basis, supine_error *error) {
   const supine_state scan = supine_basis_scan(basis);
   json_t *rows = json_array();
@@ -107,7 +106,7 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
   return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK;
 }
 
-/* Add the error with the first 1, 4, 9, ... harmonics, or with the first 1, 2, ... modes. */
+/* Add a list of errors, by highest band (error_harmonics) or by number of modes (error_modes). */
 static void add_errors(json_t *root, const supine_basis *basis, const char *key) {
   const supine_tensor *tensor = supine_basis_tensor(basis, key);
   const bool valid = tensor != NULL && tensor->dtype == SUPINE_F64 && tensor->rank == 1;
@@ -193,14 +192,14 @@ const supine_command supine_command_info = {
     "info",
     "describe a basis file and its accuracy",
     .usage = "BASIS [--json]",
-    .about =
-        "Describes a basis file: its lungs, its functions of orientation, the model it was made "
-        "with, and its accuracy.",
+    .about = "Describes a basis file: its lungs, its functions of orientation, the model it was "
+             "made with, and its accuracy.",
     .options = table,
     .notes =
         "The compression error is the difference from the full solve on held-out directions, in "
-        "percent of the RMS displacement and in mm. It is also listed for each highest band 0, 1, "
-        "2, ... and for the best 1, 2, 3, ... modes, as a share.\n"
+        "percent of the RMS displacement, and in mm at the stated volume. It is also listed as a "
+        "share of the RMS displacement, for the highest bands 0, 1, 2, ... and for the best 1, 2, "
+        "3, ... modes.\n"
         "Triangles that turn over are counted in the worst of six postures.\n"
         "The expected error is given for the displacement from the scan: " SUPINE_EXPECTED_MEANING
         ". " SUPINE_EXPECTED_SUPPORT "\n"

@@ -20,7 +20,7 @@ static const char name[] = "locate";
 typedef struct request {
   const char *output, *points;
   supine_orientation orientation;
-  supine_state state; /* its volume is the default where none was given */
+  supine_state state; /* a volume of kind SUPINE_VOLUME_DEFAULT is fitted */
   double noise;
   bool rigid, json;
 } request;
@@ -29,8 +29,8 @@ static const supine_option table[] = {
     {"points", 0, "FILE", "positions of the points in the scan, made by 'supine embed BASIS'",
      SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN, .required = true},
     {"output", 'o', "FILE",
-     ".vtp or .ply: the lungs' surface; .csv: everything in the file of --points. Both in the "
-     "frame of the observations, with the expected error of each point",
+     ".vtp or .ply: the surface of the lungs; .csv: all structures in the file of --points. "
+     "Positions are in the frame of the observations, and each has its expected error",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .required = true,
      .endings = ".vtp, .ply or .csv"},
     {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP "; default: fitted to the points",
@@ -49,7 +49,7 @@ typedef struct observations {
   supine_observation *points;
 } observations;
 
-/* Find the vertex of a name that has only one. */
+/* Find the vertex of the point that a row names. */
 static supine_status find_vertex(const supine_csv *csv, const supine_command_names *names,
                                  size_t *vertex, supine_error *error) {
   const char *text = supine_csv_text(csv, 0);
@@ -65,15 +65,15 @@ static supine_status find_vertex(const supine_csv *csv, const supine_command_nam
     return SUPINE_OK;
   }
   if (found > 1) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s, line %zu: '%s' has %zu vertices, so it is not a point: give "
-                            "names of points",
-                            csv->path, csv->line, text, found);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "%s:%zu: '%s' has %zu vertices, so it is not a point: give names of points", csv->path,
+        csv->line, text, found);
   }
   const char *nearest =
       supine_options_suggest(text, (const char *const *)names->text, names->count);
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s, line %zu: no point '%s' in the file of --points%s%s%s", csv->path,
+                          "%s:%zu: no point '%s' in the file of --points%s%s%s", csv->path,
                           csv->line, text, nearest == NULL ? "" : "; did you mean '",
                           nearest == NULL ? "" : nearest, nearest == NULL ? "" : "'?");
 }
@@ -88,8 +88,8 @@ static supine_status read_rows(supine_csv *csv, const supine_command_names *name
     }
     if (observed->count == SUPINE_LOCATE_POINTS_MAX) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s, line %zu: more than %d points; leave some out", csv->path,
-                              csv->line, (int)SUPINE_LOCATE_POINTS_MAX);
+                              "%s:%zu: more than %d points: leave some out", csv->path, csv->line,
+                              (int)SUPINE_LOCATE_POINTS_MAX);
     }
     supine_observation *point = &observed->points[observed->count];
     point->noise = noise;
@@ -129,21 +129,21 @@ enum { POSTURES = 6 };
 static const char *const postures[POSTURES] = {"supine", "prone",   "left",
                                                "right",  "upright", "inverted"};
 
-static const double negligible = 0.01; /* smallest probability with which a posture counts */
-static const double determined = 0.95; /* probability above which points determine a posture */
+static const double negligible = 0.01; /* less probable postures do not add to the errors */
+static const double determined = 0.95; /* probability from which a posture counts as determined */
 
-/* Lungs found from observed points. */
 typedef struct lungs_found {
-  size_t count;                       /* postures tried */
-  supine_location location[POSTURES]; /* of each */
-  double share[POSTURES];             /* its probability, given the points */
-  const supine_location *best;
-  supine_locate_residual *residuals; /* [points] of the most probable posture */
-  float *xyz, *sigma;                /* [N, 3] and [N] of that posture; errors include all */
-  void *space;                       /* workspaces of supine_locate */
+  size_t count;                       /* number of postures tried */
+  supine_location location[POSTURES]; /* result for each posture */
+  double share[POSTURES];             /* probability of each posture, given the points */
+  const supine_location *best;        /* result for the most probable posture */
+  supine_locate_residual *residuals;  /* [points] residuals in the best posture */
+  float *xyz;                         /* [N, 3] positions in the best posture, mm */
+  float *sigma;                       /* [N] expected errors, over all postures, mm */
+  void *space;                        /* workspaces of supine_locate */
 } lungs_found;
 
-/* Fit every posture; one that no volume fits gets the share 0. */
+/* Fit the given posture, or all postures. The share of a posture that cannot be fitted is 0. */
 static supine_status try_postures(const supine_locate_task *task, bool posture_given,
                                   supine_locate_residual *residuals, lungs_found *located,
                                   supine_error *error) {
@@ -182,8 +182,9 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
   return SUPINE_OK;
 }
 
-/* Compute the best posture's positions, and the errors of a mixture of all postures:
- * sigma^2 = sum over k of share_k (sigma_k^2 + |x_k - x|^2). */
+/* Compute the positions x in the best posture, and the expected errors of the mixture of all
+ * postures k: sigma^2 = sum over k of share_k (sigma_k^2 + |x_k - x|^2).
+ * @param xyz, sigma  [N, 3] and [N], work space */
 static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
                                     lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
@@ -214,8 +215,8 @@ static supine_status find_positions(const supine_basis *shown, float *xyz, float
   return status;
 }
 
-/* Find the lungs, and the positions [N, 3] of the basis `shown` in them. If no posture was given,
- * the task's gravity is tried as each of the six named postures. */
+/* Fit the lungs to the points, and compute the positions of the basis `shown`. If no posture was
+ * given, try the six named postures. */
 static supine_status find(const supine_locate_task *task, bool posture_given,
                           const supine_basis *shown, lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
@@ -369,12 +370,12 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                                    .state = wanted->state,
                                    .rigid = wanted->rigid};
   supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
-  if (status == SUPINE_ERROR_ARGUMENT &&
-      wanted->rigid) { /* the fault is in the file's points, not in an option */
+  if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
+    /* The points do not determine a rotation: an error of the file, not of an option. */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {
-    /* Write last: no failure follows. */
+    /* Print first and write last, so that a failure leaves no file. */
     print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, &located);
     status = csv ? write_points(wanted->output, inside, names, &located, error)
                  : write_surface(wanted->output, lungs, &located, error);
@@ -416,23 +417,23 @@ const supine_command supine_command_locate = {
     name,
     "find the whole lung from a few observed points",
     .usage = "BASIS OBSERVED.csv --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
-    .about = "Fits the lungs to a few points observed inside them, as a navigation system "
-             "collects them: the volume, the translation between the frames, and the residual "
-             "of the law near the points. OBSERVED.csv has the columns name,x,y,z, in mm, with "
-             "the names given to 'supine embed'. Each position has its expected error.",
+    .about = "Fits the lungs to a few points observed inside them, as a navigation system collects "
+             "them: the volume, the translation between the frames, and the residual of the law "
+             "near the points. OBSERVED.csv has the columns name,x,y,z, in mm, with the names "
+             "given to 'supine embed'. Each position has its expected error.",
     .options = table,
     .notes =
-        "The expected error is the root mean square of the distance in 3-D: half of all points "
-        "lie within 0.9 times this distance, 95 % within 1.8 times. " SUPINE_EXPECTED_SUPPORT
-        " A few points seldom determine the posture: give --posture. Without it six are "
+        "The expected error is the root mean square of the distance in 3-D: half of all points lie "
+        "within 0.9 times this distance, 95 % within 1.8 times. " SUPINE_EXPECTED_SUPPORT
+        " A few points seldom determine the posture: give --posture. Without it, six postures are "
         "tried, and the error includes the differences between them.\n"
         "\n"
         "Examples:\n"
         "  supine embed lungs.safetensors airways.csv -o inside.safetensors\n"
         "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
         "supine -o found.vtp\n"
-        "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
-        "left --volume rest --rigid -o found.csv",
+        "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture left "
+        "--volume rest --rigid -o found.csv",
     .operands_least = 2,
     .operands_most = 2,
     .operands_missing = "name a basis file and a CSV file of observed points",

@@ -21,10 +21,9 @@ static const supine_option table[] = {
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
-  const supine_mesh_save_options save = {
-      .comment =
-          "synthetic lungs, mm; shape after Chaste's lung test data (BSD-3-Clause, University "
-          "of Oxford)"};
+  const supine_mesh_save_options save = {.comment =
+                                             "synthetic lungs, mm; shape after Chaste's lung test "
+                                             "data (BSD-3-Clause, University of Oxford)"};
   supine_mesh mesh = {0};
   (void)given;
   supine_status status = supine_phantom_create(wanted->vertices, wanted->volume, &mesh, error);
@@ -43,8 +42,8 @@ const supine_command supine_command_phantom = {
     "phantom",
     "make a synthetic pair of lungs",
     .usage = "-o FILE [OPTIONS]",
-    .about = "Makes synthetic lungs for trials without a scan: two closed, smooth surfaces of "
-             "the shape of an adult's.",
+    .about = "Makes synthetic lungs for trials without a scan: two closed, smooth surfaces shaped "
+             "like an adult's lungs.",
     .options = table,
     .notes = "Example:\n  supine phantom -o lungs.ply --vertices 100000",
     .request_size = sizeof(request),

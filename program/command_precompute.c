@@ -38,23 +38,24 @@ static const supine_option table[] = {
      SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX},
      .more = true},
     {"modes", 0, "K|harmonics",
-     "number of functions of orientation, each a multiplication per vertex at run time: the best K "
-     "of the band (or fewer, where fewer describe the displacement), or its (L+1)^2 harmonics. "
-     "Santhanam 2008 used --band 3 --modes harmonics",
+     "functions of orientation, each of which costs a multiplication per vertex at run time: the "
+     "best K (or fewer, if fewer describe the displacement), or all (L+1)^2 harmonics up to band "
+     "L. Santhanam 2008 used --band 3 --modes harmonics",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
      .wants = "1 to 64 or 'harmonics'", .more = true},
     {"held-out", 0, "N",
      "number of held-out directions on which the error is measured; default: 100 to 1000",
      SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
-     "patient's model, made by 'supine fit', instead of --law and its constants",
+     "model of the patient, made by 'supine fit', to use instead of --law and its constants",
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
-    {.help = "Instead of the built-in physics, displacements from another simulator:",
+    {.help = "Displacements from another simulator, instead of the built-in physics:",
      .more = true},
     {"fields", 0, "FILE",
-     "safetensors file with gravity [M,3] and displacement [M,N,3], in mm: M directions of gravity "
-     "and the displacement of each vertex in each. MESH is the reference surface. Without --band, "
-     "cross-validation chooses the band among those that the directions determine",
+     "safetensors file with the tensors gravity [M,3], M directions, and displacement [M,N,3], the "
+     "displacement of each of N vertices for each direction, in mm. MESH is the reference surface. "
+     "Without "
+     "--band, cross-validation chooses the band among those that the directions determine",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
@@ -76,7 +77,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
   } else if (accuracy->volume == 1.0) {
     (void)snprintf(state, sizeof state, "rest");
   } else {
-    (void)snprintf(state, sizeof state, "%g of the way to rest", accuracy->volume);
+    (void)snprintf(state, sizeof state, "%g of the way from full to rest", accuracy->volume);
   }
   (void)printf("%s: %s, %zu vertices, band %zu, %zu %s%s\n", path,
                lungs->lung_count == 2 ? "two lungs" : "one lung", lungs->mesh.vertex_count,
@@ -88,8 +89,8 @@ static void report_result(const char *path, const supine_lungs *lungs,
     (void)printf("  %.*s\n", (int)(end != NULL ? end - item : 1000), item);
     end = end != NULL ? end + 2 : NULL;
   }
-  (void)printf("error against the full solve, on %zu held-out direction%s:\n  %.3g %% RMS, %.3g "
-               "%% 95th percentile, %.3g %% largest, of the RMS displacement\n",
+  (void)printf("error against the full solve, on %zu held-out direction%s:\n  %.3g %% RMS, %.3g %% "
+               "95th percentile, %.3g %% largest, of the RMS displacement\n",
                accuracy->direction_count, plural(accuracy->direction_count),
                100.0 * accuracy->relative_rms, 100.0 * accuracy->relative_p95,
                100.0 * accuracy->relative_max);
@@ -98,13 +99,13 @@ static void report_result(const char *path, const supine_lungs *lungs,
                  accuracy->rms_mm, accuracy->p95_mm, accuracy->max_mm, state);
   }
   if (report->turned_over > turned_over_limit) {
-    (void)printf("the surface looks torn: %.3g %% of its triangles turn over at %s in the "
-                 "worst of six\npostures. %s\n",
-                 100.0 * report->turned_over, state,
-                 options->model.reach == 0.0
-                     ? "The paper law spreads forces over a few links of any length: give "
-                       "--reach 10"
-                     : "Give a longer --reach");
+    (void)printf(
+        "the surface looks torn: %.3g %% of its triangles turn over at %s in the worst of "
+        "six\npostures. %s\n",
+        100.0 * report->turned_over, state,
+        options->model.reach == 0.0
+            ? "The paper law spreads forces over a few links of any length: give --reach 10"
+            : "Give a longer --reach");
   }
 }
 
@@ -172,7 +173,7 @@ static supine_status compute(const supine_lungs *lungs, request *wanted, const c
   return status;
 }
 
-/* Read a patient model and the text that the basis stores of it; the caller frees the text. */
+/* Read a patient model and encode it as text for the basis. The caller frees the text. */
 static supine_status take_patient(request *wanted, supine_patient_record *record, char **text,
                                   supine_error *error) {
   supine_status status = supine_patient_read(wanted->patient, record, error);
@@ -184,17 +185,17 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
   wanted->model.patient = record;
-  wanted->model.choice.law = SUPINE_LAW_DEEP; /* its constants are replaced by the patient's */
+  /* The patient model replaces the constants of this law. */
+  wanted->model.choice.law = SUPINE_LAW_DEEP;
   wanted->basis.patient = *text;
   const supine_patient_fit_report *report = &record->report;
-  (void)snprintf(
-      wanted->summary, sizeof wanted->summary,
-      "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% explained; "
-      "expected error %.1f mm RMS",
-      record->name, supine_patient_law_names[record->patient.law],
-      record->patient.centre_count > 0 ? " and kriging" : "", report->points,
-      report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline, report->explained,
-      report->expected_point);
+  (void)snprintf(wanted->summary, sizeof wanted->summary,
+                 "%s: %s law%s from %.0f points; held-out residual %.1f of %.1f mm RMS, %.0f %% "
+                 "explained; expected error %.1f mm RMS",
+                 record->name, supine_patient_law_names[record->patient.law],
+                 record->patient.centre_count > 0 ? " and kriging" : "", report->points,
+                 report->held_out[SUPINE_PATIENT_SCORE_CORRECTED], report->baseline,
+                 report->explained, report->expected_point);
   wanted->basis.patient_summary = wanted->summary;
   wanted->basis.expected_error = report->expected_constant;
   (void)printf("%s\n", wanted->summary);
@@ -205,8 +206,8 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
-/* Refuse constants of the law beside a patient model. Call before loading, which sets constants
- * that were not given. */
+/* Refuse options that set constants of the law, as the patient's model has its own. Call before
+ * loading, which sets the constants that were not given. */
 static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
   const supine_model *model = &choice->model;
   const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
@@ -223,7 +224,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const supine_lungs *lungs = &wanted->model.made_from.lungs;
   const bool fields = wanted->fields != NULL;
   char *text = NULL;
-  static supine_patient_record record; /* about 74 kB, too large for the stack */
+  static supine_patient_record record; /* static, as it is too large for the stack */
   if (supine_mesh_save_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: this is the name of a mesh: give a name that ends in .safetensors",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine pv: fit a lung's pressure-volume relation to samples, and show one. */
+/* supine pv: fit a lung's pressure-volume relation to samples, or print a relation. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,13 +21,14 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", "write the report with the parameters (JSON), for --pv",
+    {"output", 'o', "FILE",
+     "JSON file of the parameters and the report, for --pv of 'supine breathe'",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
     {"confidence", 'c', "SHARE", "confidence level of the intervals, between 0 and 1",
      SUPINE_FILLS(request, confidence), .standard = "0.95", .range = {0.0, 1.0}, .open = true,
      .wants = "a number between 0 and 1"},
     {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
-    {"step", 's', "CMH2O", "for show: step of pressure", SUPINE_FILLS(request, step),
+    {"step", 's', "CMH2O", "for 'show': step of pressure, in cmH2O", SUPINE_FILLS(request, step),
      .standard = "1", SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
     {.name = NULL}};
 
@@ -57,18 +58,18 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   }
   json_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    if (reports[limb].samples > 0) { /* else this limb has the curve of the other limb */
+    if (reports[limb].samples > 0) { /* a limb without samples has the curve of the other limb */
       (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
                                 json_limb(&pv.limb[limb], &reports[limb]));
     }
   }
   supine_options_print(json_incref(root), chosen->json);
   supine_output output = {0};
-  if (chosen->output != NULL) { /* last: no failure follows */
+  if (chosen->output != NULL) { /* opened last, so that a failure leaves no file */
     status = supine_output_open(chosen->output, &output, error);
   }
   if (status == SUPINE_OK && chosen->output != NULL) {
-    (void)json_dumpf(root, output.file, JSON_INDENT(2)); /* a failed write stays in the stream */
+    (void)json_dumpf(root, output.file, JSON_INDENT(2)); /* commit reports a failed write */
     status = supine_output_commit(&output, error);
   }
   json_decref(root);
@@ -132,37 +133,36 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_pv = {
     command,
-    "fit a pressure-volume relation to samples, and show one",
+    "fit a pressure-volume relation to samples, or print one",
     .usage = "fit SAMPLES.csv [-o FILE] [--confidence SHARE] [--json]\n"
              "show [FILE] [--step CMH2O]",
-    .about =
-        "Fits the lung's pressure-volume relation, which 'supine breathe --pv FILE' uses, to "
-        "samples, or shows one.\n"
-        "\nfit determines the five control parameters of each limb, their confidence intervals, "
-        "and the residual of the samples (RMS, in mL and as a percentage of the range of volumes; "
-        "below 1 % for Venegas' and Salazar-Knowles' curves).\n"
-        "\n"
-        "show prints volume and compliance against pressure as CSV; without FILE, of the built-in "
-        "normal adult lung.\n"
-        "\nSAMPLES.csv has one sample per line, in order of pressure within each limb:\n"
-        "\n"
-        "      # static manoeuvre; lines like this one are comments\n"
-        "      pressure_cmH2O,volume_mL,limb\n"
-        "      0,2250,inhale\n"
-        "      2.5,2390,inhale\n"
-        "      ...\n"
-        "      30,5980,exhale\n"
-        "\nWithout the column limb all samples are of the inhale limb. A limb needs at least 8 "
-        "samples, or 20 where their noise is 1 % of the range of volumes; a limb without samples "
-        "takes the other's curve. Volumes may be absolute or above any reference: breathing uses "
-        "only differences.",
+    .about = "Fits a lung's pressure-volume relation to samples, for 'supine breathe --pv FILE', "
+             "or prints a relation.\n"
+             "\nfit determines the five control parameters of each limb, their confidence "
+             "intervals, and the residual of the samples (RMS, in mL and as a percentage of the "
+             "range of volumes; below 1 % for Venegas' and Salazar-Knowles' curves).\n"
+             "\n"
+             "show prints volume and compliance against pressure as CSV; without FILE, those of "
+             "the built-in normal adult lung.\n"
+             "\nSAMPLES.csv has one sample per line, in order of pressure within each limb:\n"
+             "\n"
+             "      # static manoeuvre; lines like this one are comments\n"
+             "      pressure_cmH2O,volume_mL,limb\n"
+             "      0,2250,inhale\n"
+             "      2.5,2390,inhale\n"
+             "      ...\n"
+             "      30,5980,exhale\n"
+             "\nWithout the column limb all samples are of the inhale limb. A limb needs at least "
+             "8 samples, or 20 where their noise is 1 % of the range of volumes; a limb without "
+             "samples takes the other's curve. Volumes may be absolute or above any reference: "
+             "breathing uses only differences.",
     .options = table,
     .notes =
-        "The model, each limb on its own: V'' = u V' over the pressures of its samples, mapped to "
-        "x from -1 to 1, u = c1 P0(x) + ... + c5 P4(x) with Legendre polynomials P0 to P4. V' is "
-        "the compliance, u how fast it changes: c1 < 0 stiffens towards high pressure, c2 < 0 "
-        "puts the greatest compliance in the middle (a sigmoid), c3 skews the sigmoid, c4 and c5 "
-        "sharpen its knees.\n"
+        "Each limb has its own model: V'' = u V', where V is the volume as a function of the "
+        "pressure x, mapped so that the limb's samples span -1 to 1, and u = c1 P0(x) + ... + c5 "
+        "P4(x) with Legendre polynomials P0 to P4. V' is the compliance, and u its relative rate "
+        "of change: c1 < 0 stiffens the lung towards high pressure, c2 < 0 puts the greatest "
+        "compliance in the middle (a sigmoid), c3 skews the sigmoid, c4 and c5 sharpen its knees.\n"
         "\n"
         "Examples:\n"
         "  supine pv fit patient.csv -o patient.pv.json\n"

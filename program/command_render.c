@@ -18,24 +18,24 @@
 static const char name[] = "render";
 static const double inside_opacity = 0.35; /* default opacity of the lungs with --inside */
 
-enum { PER_SECOND = 15, FRAMES_MAX = 10000, PAUSE_MS = 1000 /* at the end of a turn */ };
+enum { FPS = 15, FRAMES_MAX = 10000, PAUSE_MS = 1000 }; /* pause at the end of a turn */
 
 typedef struct request {
   const char *output;
   const char *postures;
   supine_volume_options volume;
   supine_from from;     /* state that colours and displacements are measured from */
-  const char *inside;   /* NULL: none */
+  const char *inside;   /* file of structures inside; NULL: none */
   double largest;       /* end of the colour bar, mm; 0: automatic */
   double opacity;       /* opacity of the lungs; 0: not given */
-  size_t width, height; /* pixels; 0: automatic */
+  size_t width, height; /* size of the picture, pixels; 0: automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
   bool turns;
   breath_turn turn;
 } request;
 
-/* A state of the lungs, as a panel of the picture shows it. */
+/* A state of the lungs that a panel of the picture shows. */
 typedef struct drawn {
   supine_pose pose;
   float *value; /* [N] displacement, mm */
@@ -50,12 +50,12 @@ typedef struct studio {
   supine_reference_pose from;
   supine_compare *compare;
   supine_renderer *renderer;
-  supine_basis *inside; /* or NULL */
+  supine_basis *inside; /* structures inside; NULL: none */
   supine_command_names names;
-  supine_posture_list postures; /* one for each panel */
+  supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
-  double ends[2]; /* largest 95th percentile and largest displacement of the states found, mm */
+  double ends[2]; /* largest 95th percentile and largest displacement of the states so far, mm */
   char label[128];
 } studio;
 
@@ -95,8 +95,8 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
   return status;
 }
 
-/* Fill panel i: compute the pose of its posture, the values to colour by, the line below its name,
- * and the marks of the structures inside. */
+/* Fill panel i: compute its pose, the displacements to colour by, the subtitle, and the marks of
+ * the structures inside. */
 static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   const supine_posture_item *item = &s->postures.item[i];
   drawn *shown = &s->shown[i];
@@ -132,7 +132,7 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Return the picture of all panels. */
+/* Describe the picture of all panels. */
 static supine_picture make_picture(studio *s) {
   const request *wanted = s->wanted;
   const size_t count = s->postures.count;
@@ -171,7 +171,7 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   return status;
 }
 
-/* Fill the panel for frame `frame` of the `count` of a turn. */
+/* Fill the single panel of an animation for one of the `count` frames of a turn. */
 static supine_status find_frame(studio *s, size_t frame, size_t count, supine_error *error) {
   const breath_turn *turn = &s->wanted->turn;
   supine_posture_item *item = &s->postures.item[0];
@@ -196,7 +196,7 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
     picture.extent = extent;
     if (status == SUPINE_OK) {
       status = supine_render_animation_add(animation, s->renderer, &picture,
-                                           frame + 1 < count ? 1000 / PER_SECOND : PAUSE_MS, error);
+                                           frame + 1 < count ? 1000 / FPS : PAUSE_MS, error);
     }
     if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count)) {
       status =
@@ -213,7 +213,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   const char *path = s->wanted->output;
   const double seconds = s->wanted->turn.seconds;
-  const double frames = fmax(2.0, floor(seconds * PER_SECOND * (1.0 + 1e-12)) + 1.0);
+  const double frames = fmax(2.0, floor(seconds * FPS * (1.0 + 1e-12)) + 1.0);
   double extent[SUPINE_VIEWS_MAX][4];
   supine_animation *animation = NULL;
   supine_output output = {0};
@@ -247,7 +247,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   }
   if (status == SUPINE_OK) {
     status = supine_render_animation_write(animation, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* committing reports a failed write */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* commit reports a failed write */
       status = supine_output_commit(&output, error);
     }
   }
@@ -312,29 +312,29 @@ static supine_status read_views(const char *text, void *field, supine_error *err
 static const supine_option table[] = {
     {"posture", 0, "LIST", "postures to draw, up to 8", SUPINE_FILLS(request, postures)},
     {"turn", 0, "FROM:TO:SECONDS",
-     "draw an animation instead: gravity turns from one posture to another at constant speed, "
-     "as supine:left:5s, stays for a second, and starts again",
+     "draw an animation instead: gravity turns from one posture to another at constant speed, such "
+     "as supine:left:5s, pauses for a second, and starts again",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".png or .webp"},
-    {"size", 0, "WxH", "pixels; default: 440 x 480 for each posture and view, and a margin",
+    {"size", 0, "WxH", "size in pixels; default: 440 x 480 for each posture and view, plus margins",
      .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
      "anterior (default), posterior, left, right, lateral (from the left), head, feet, oblique; "
-     "several are drawn below each other",
+     "several views are drawn one below another",
      .read = read_views},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
-     "end of the colour bar; default: the 95th percentile over the surface, rounded up; a "
-     "pointed end marks values beyond it",
+     "end of the colour bar; default: the 95th percentile over the surface, rounded up; a pointed "
+     "bar marks larger values",
      SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
      .more = true},
     {"inside", 0, "FILE",
-     "structures from 'supine embed' with the same basis, seen through the lungs: points and "
-     "meshes, with their names and displacements",
+     "structures made by 'supine embed' from the same basis, shown through the lungs with their "
+     "names and displacements",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"opacity", 0, "SHARE",
      "opacity of the lungs, 0.05 to 1 (opaque); default 1, with --inside 0.35",
@@ -346,17 +346,17 @@ static const supine_option table[] = {
 /* Check that the options fit each other, then read the postures. */
 static supine_status check(const request *wanted, supine_posture_list *postures,
                            supine_error *error) {
-  const bool moving = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0; /* else .png */
+  const bool animation = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0;
   if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             wanted->turns ? "give --posture or --turn, not both"
-                                          : "which posture? Give --posture supine, for example");
+                                          : "the posture is missing: give --posture or --turn");
   }
-  if (wanted->turns != moving) {
+  if (wanted->turns != animation) {
     return supine_error_set(
         error, SUPINE_ERROR_ARGUMENT,
-        wanted->turns ? "--turn writes an animation: let -o end in .webp"
-                      : "postures make a still picture: let -o end in .png (.webp with --turn)");
+        wanted->turns ? "--turn writes an animation: give -o a name that ends in .webp"
+                      : "--posture writes a still picture: give -o a name that ends in .png");
   }
   const supine_status status =
       wanted->turns ? SUPINE_OK
@@ -393,11 +393,10 @@ const supine_command supine_command_render = {
     "draw the lungs: postures side by side, or a turn that plays",
     .usage = "BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]\n"
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
-    .about =
-        "Draws the lungs in each posture, side by side and off screen: coloured by "
-        "displacement, with contour lines at the ticks of the colour bar. A ball shows the "
-        "body's axes (left, right, anterior, posterior, head, feet) and gravity as an arrow (a "
-        "cross where it points away from you).",
+    .about = "Draws the lungs in each posture, side by side; no display is needed. Colours show "
+             "the displacement, with contour lines at the ticks of the colour bar. A ball shows "
+             "the body's axes (left, right, anterior, posterior, head, feet) and gravity as an "
+             "arrow (a cross where it points away from you).",
     .options = table,
     .notes =
         "Examples:\n"

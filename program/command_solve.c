@@ -27,18 +27,18 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
-     ". Default if rest is unknown: gain 1, displacements F d with the share F of the force that a "
-     "vertex keeps and its direction d in mm",
+     ". Default if rest is unknown: gain 1, so that a vertex moves by F d, "
+     "where F is the force that it keeps and d its direction of displacement, in mm",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"unit-force", 0, "VERTEX",
-     "instead of a posture: write as CSV the response of every vertex to a unit force on this "
-     "one (numbered from 0), a column of the transfer matrix T",
-     SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex), .wants = "a vertex",
-     .more = true},
+     "instead of a posture: write a CSV file of the response of every vertex to a unit force on "
+     "this vertex (numbered from 0), which is a column of the transfer matrix T",
+     SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex),
+     .wants = "the number of a vertex", .more = true},
     {"pitcher-catcher", 0, NULL,
      "iterate as Santhanam 2008 does, always from the node with the largest remaining force; print "
-     "the share of the force that remains and the largest difference from the direct solve. Slow, "
-     "for small meshes; needs --law paper",
+     "the share of the force that remains, and the largest difference from the direct solve. Slow: "
+     "use it for small meshes. Needs --law paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
@@ -78,7 +78,7 @@ cleanup:
   return status;
 }
 
-/* Compute the volume of each lung relative to its healthy reference surface, mL. */
+/* Compute the volume of each lung above its reference surface, mL, as if no lung were collapsed. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -98,10 +98,9 @@ static supine_status find_volumes(const supine_reference *reference, const supin
     total += supine_reference_rest(reference, g, part);
   }
   if (state->lung_count > 0) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "--volume: 'supine solve' takes one volume of all lungs together, not a "
-        "volume for each lung");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--volume: 'supine solve' takes one volume of all lungs together, not "
+                            "a volume for each lung");
   }
   supine_reference_share_out(reference, g, total, ml);
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
@@ -116,7 +115,7 @@ static void fill(double gains[2][3], double gain) {
   }
 }
 
-/* Find the gains of each lung from the volume of the state; else set them to 1. */
+/* Find the gains of each lung for the volume given; 1 if there is none and rest is unknown. */
 static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
@@ -126,7 +125,7 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
     return SUPINE_OK;
   }
-  if (!reference->known) { /* add the volume to the scan, with one gain for both lungs */
+  if (!reference->known) { /* the volume is added to the scan, with one gain for both lungs */
     const double held =
         volume->kind == SUPINE_VOLUME_ABSOLUTE ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
     double scale = 0.0;
@@ -135,7 +134,7 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
             ? supine_volume_scale(solution->cubic, volume->ml - held, &scale, error)
             : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                                "rest and full are unknown with --scanned none: give scan+ML or an "
-                               "absolute volume, as 2600mL");
+                               "absolute volume, such as 2600mL");
     fill(gains, scale);
     return status;
   }
@@ -165,7 +164,7 @@ static void report_remaining(void *context, size_t steps, double remaining) {
   }
 }
 
-/* Replace the directly solved catch by the result of the iteration of Santhanam 2008. */
+/* Replace the solved force on each vertex by that of the iteration of Santhanam 2008. */
 static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
                              const double g[3], supine_solution *solution, supine_error *error) {
   size_t n = lungs->mesh.vertex_count;
@@ -292,8 +291,8 @@ const supine_command supine_command_solve = {
     "solve the full physics for one posture",
     .usage = "MESH... --posture NAME -o FILE [OPTIONS]\n"
              "LABELS... --posture NAME -o FILE [OPTIONS]",
-    .about = "Solves the full physics for one direction of gravity, without harmonics, and "
-             "writes the deformed surface: the reference against which a basis is measured.",
+    .about = "Solves the full physics for one direction of gravity, without harmonics, and writes "
+             "the deformed surface: the reference against which a basis is measured.",
     .options = table,
     .notes = "Examples:\n"
              "  supine solve left.ply right.ply --posture prone --volume rest+500 -o prone.vtp\n"

@@ -18,17 +18,17 @@
 
 static const char name[] = "stream";
 
-static const double budget = 15e-3; /* time allowed per frame, s */
+static const double budget = 15e-3; /* time allowed from a received pose to the sent frame, s */
 
 typedef struct request {
   supine_stream_options options;
-  double down[3], body[4]; /* --world-down, --body-from-tracker */
+  double down[3], body[4]; /* values of --world-down and --body-from-tracker */
   int space;               /* index in `spaces` */
   supine_state volume;
   bool has_volume;
   const char *pv;
   supine_pv_breath breath;
-  double smooth; /* --smooth, ms */
+  double smooth; /* time constant of smoothing, ms; 0: none */
   const char *record, *replay;
   const char *web, *certificate, *key;
   supine_from from;
@@ -40,8 +40,9 @@ static const char *const spaces[] = {"lps", "ras", NULL};
 
 static const supine_option table[] = {
     {"listen", 0, "[ADDRESS:]PORT",
-     "address at which to wait for peers; a port alone can be reached from this machine only; port "
-     "0: any free port. Default: 18944, the port of the protocol, unless --connect is given",
+     "address at which to wait for peers. A port without an address can be reached from this "
+     "machine only; port 0 is any free port. Default: 18944, the port of the protocol, unless "
+     "--connect is given",
      SUPINE_FILLS(request, options.listen)},
     {"connect", 0, "HOST:PORT", "connect to a peer that listens: a tracker server, 3D Slicer",
      SUPINE_FILLS(request, options.connect)},
@@ -51,19 +52,19 @@ static const supine_option table[] = {
     {"world-down", 0, "X,Y,Z", "direction of gravity in the tracker's world",
      SUPINE_FILLS(request, down), .standard = "0,0,-1", .more = true},
     {"body-from-tracker", 0, "W,X,Y,Z",
-     "rotation from the marker's axes to the body's (left, back, head), as a quaternion; "
-     "0,0,0,1 where the marker's axes are right, front, head",
+     "rotation from the marker's axes to the body's (left, back, head), as a quaternion; 0,0,0,1 "
+     "if the marker's axes are right, front, head",
      SUPINE_FILLS(request, body), .standard = "1,0,0,0", .more = true},
     {"smooth", 0, "MS",
-     "time constant of smoothing, for a noisy tracker; a turn is shown this much later",
+     "time constant of smoothing, for a noisy tracker; it delays a turn by this time",
      SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms",
      .more = true},
     {.help = "Observed points inside the lungs, as in 'supine locate':"},
     {"points", 0, "FILE",
-     "the points in the scan, made by 'supine embed BASIS'. Their observed positions are received "
-     "as a TRANSFORM whose device is the point's name, or as a POINT list, in the axes of "
-     "--space. Surfaces are then sent in the frame of the observations, with the attribute "
-     "expected_error_mm. The volume is also determined, unless --volume or a message fixes it",
+     "positions of the points in the scan, made by 'supine embed BASIS'. Their observed positions "
+     "are received as a TRANSFORM whose device is the point's name, or as a POINT list, in the "
+     "axes of --space. Surfaces are then sent in the frame of the observations, with the attribute "
+     "expected_error_mm. The volume is fitted to the points, unless --volume or a message fixes it",
      SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
      .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres", .more = true},
@@ -76,16 +77,15 @@ static const supine_option table[] = {
      SUPINE_SAYS_GIVEN(request, has_volume)},
     {"tidal", 0, "ML", "tidal volume; default 500", SUPINE_FILLS(request, breath.tidal),
      SUPINE_ABOVE_ZERO},
-    {"rate", 0, "N", "breaths a minute; default 12", SUPINE_FILLS(request, breath.rate),
+    {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default: a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
      "what a peer receives until it asks for something else: weights, an NDARRAY of the K weights "
-     "and the "
-     "three gains of each lung; surface, a POLYDATA of points and triangle strips; points, a "
-     "POLYDATA whose triangles are sent once. A peer asks with a STRING of device SEND that "
+     "and the three gains of each lung; surface, a POLYDATA of points and triangle strips; points, "
+     "a POLYDATA whose triangles are sent once. A peer asks with a STRING of device SEND that "
      "holds one of these words",
      SUPINE_FILLS(request, options.content), .choices = supine_stream_content_names,
      .standard = "weights"},
@@ -93,14 +93,14 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, space), .choices = spaces, .standard = "lps"},
     {"name", 0, "NAME", "device name of the messages sent", SUPINE_FILLS(request, options.name),
      .standard = "SUPINE", .more = true},
-    {"fps", 0, "N", "largest number of frames a second", SUPINE_FILLS(request, options.rate),
+    {"fps", 0, "N", "largest number of frames per second", SUPINE_FILLS(request, options.rate),
      .range = {1.0, 1000.0}, .standard = "200", .more = true},
     {"peers", 0, "N", "largest number of peers, and of viewers of the page",
      SUPINE_FILLS(request, options.peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
-     "serve a page that shows the lungs live, to any number of viewers; a phone that shows it "
-     "can send its own tilt. A port without an address can be reached from this machine only",
+     "serve a page that shows the lungs live, to any number of viewers; a phone that shows it can "
+     "send its own tilt. A port without an address can be reached from this machine only",
      SUPINE_FILLS(request, web)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"certificate", 0, "PEM",
@@ -110,13 +110,13 @@ static const supine_option table[] = {
     {"key", 0, "PEM", "the certificate's private key", SUPINE_FILLS(request, key),
      .file = SUPINE_FILE_IN, .more = true},
     {.help = "Recording:"},
-    {"record", 0, "POSES.csv", "write the received poses, at the end of the run",
+    {"record", 0, "POSES.csv", "file to write the received poses to, at the end of the run",
      SUPINE_FILLS(request, record), .file = SUPINE_FILE_OUT},
     {"replay", 0, "POSES.csv",
      "follow recorded poses instead of a tracker, starting when the first peer or viewer connects, "
      "and stop at their end",
      SUPINE_FILLS(request, replay), .file = SUPINE_FILE_IN},
-    {"seconds", 0, "S", "duration; default: until interrupted",
+    {"seconds", 0, "S", "duration of the run in s; default: until interrupted",
      SUPINE_FILLS(request, options.seconds), SUPINE_ABOVE_ZERO, .more = true},
     {.name = NULL}};
 
@@ -136,32 +136,30 @@ static void report(const supine_stream_server *server, const request *wanted) {
   if (wanted->points != NULL) {
     (void)printf("positions of observed points: %llu\n", (unsigned long long)n->positions);
   }
-  (void)printf("poses: %llu (repaired: %llu; refused: %llu); frames: %llu (sent: %llu); peers: "
-               "%llu\n",
-               (unsigned long long)n->poses, (unsigned long long)n->repaired,
-               (unsigned long long)n->refused, (unsigned long long)n->frames,
-               (unsigned long long)n->sent, (unsigned long long)n->peers);
+  (void)printf(
+      "poses: %llu (repaired: %llu; refused: %llu); frames: %llu (sent: %llu); peers: %llu\n",
+      (unsigned long long)n->poses, (unsigned long long)n->repaired, (unsigned long long)n->refused,
+      (unsigned long long)n->frames, (unsigned long long)n->sent, (unsigned long long)n->peers);
   if (n->malformed + n->skipped + n->lost + n->turned_away + n->unreachable > 0) {
-    (void)printf(
-        "malformed messages: %llu; messages not read: %llu; peers disconnected: %llu; peers "
-        "refused: %llu; frames whose volume is out of reach: %llu\n",
-        (unsigned long long)n->malformed, (unsigned long long)n->skipped,
-        (unsigned long long)n->lost, (unsigned long long)n->turned_away,
-        (unsigned long long)n->unreachable);
+    (void)printf("malformed messages: %llu; messages not read: %llu; peers disconnected: %llu; "
+                 "peers refused: %llu; frames whose volume is out of reach: %llu\n",
+                 (unsigned long long)n->malformed, (unsigned long long)n->skipped,
+                 (unsigned long long)n->lost, (unsigned long long)n->turned_away,
+                 (unsigned long long)n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     const supine_stream_latency *latency = supine_stream_server_latency(
         server, surfaces != 0 ? SUPINE_STREAM_SURFACE : SUPINE_STREAM_WEIGHTS);
     if (latency->count > 0) {
       (void)printf(
-          "pose received to %s sent: median %.3f ms, 99 %% within %.3f ms, worst %.3f ms; "
-          "allowed: %.0f ms\n",
+          "pose received to %s sent: median %.3f ms, 99 %% within %.3f ms, worst %.3f ms; allowed: "
+          "%.0f ms\n",
           surfaces != 0 ? "surface" : "weights", 1e3 * supine_stream_latency_quantile(latency, 0.5),
           1e3 * supine_stream_latency_quantile(latency, 0.99), 1e3 * latency->worst, 1e3 * budget);
     }
   }
   if (wanted->smooth > 0.0) {
-    (void)printf("--smooth shows a steady turn another %.0f ms later\n", wanted->smooth);
+    (void)printf("--smooth delays a steady turn by another %.0f ms\n", wanted->smooth);
   }
 }
 
@@ -172,8 +170,7 @@ typedef struct observed_points {
   supine_stream_observed observed;
 } observed_points;
 
-/* Open the structures of --points, and list the single points, whose positions messages may set, as
- * not seen yet. */
+/* Open the file of --points, and list its single points, none of which is observed yet. */
 static supine_status open_points(const supine_basis *basis, const request *wanted,
                                  observed_points *points, supine_error *error) {
   const supine_command_names *names = &points->names;
@@ -212,7 +209,7 @@ static void close_points(observed_points *points) {
   supine_basis_close(points->inside);
 }
 
-/* Make the page of a basis file. The caller frees *page. */
+/* Make the live page of a basis file. The caller frees *page. */
 static supine_status make_page(const char *path, const export_page *shown, char **page,
                                size_t *size, supine_error *error) {
   export_source source = {0};
@@ -230,7 +227,7 @@ static supine_status make_page(const char *path, const export_page *shown, char 
   return status;
 }
 
-/* Make the page and serve it, if --web is given. The caller frees *page after the web server. */
+/* If --web is given, make the page and serve it. The caller frees *page after the web server. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
                                char **page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
@@ -353,8 +350,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (!supine_stream_rotation(wanted->body, options->setup.body) ||
       !supine_normalise(wanted->down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--world-down or --body-from-tracker is zero: give a "
-                            "direction, as 0,0,-1, and a rotation, as 1,0,0,0");
+                            "--world-down or --body-from-tracker is zero: give a direction, such "
+                            "as 0,0,-1, and a rotation, such as 1,0,0,0");
   }
   supine_basis *basis = NULL;
   supine_status status =
@@ -370,13 +367,12 @@ const supine_command supine_command_stream = {
     name,
     "follow a tracked patient live, over OpenIGTLink",
     .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
-    .about =
-        "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
-        "and sends the lungs in that pose to any number of peers. A pose is a TRANSFORM, QTDATA "
-        "or POSITION message, or an NDARRAY of three numbers, the direction of gravity that a "
-        "tilt sensor measures. Only the newest pose counts: a slow peer misses frames without "
-        "delaying the others. At the end the command prints the time from receiving a pose to "
-        "sending its frame.",
+    .about = "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
+             "and sends the lungs in that pose to any number of peers. A pose is a TRANSFORM, "
+             "QTDATA or POSITION message, or an NDARRAY of three numbers, the direction of gravity "
+             "that a tilt sensor measures. Only the newest pose counts: a slow peer misses frames "
+             "without delaying the others. At the end the command prints the time from receiving a "
+             "pose to sending its frame.",
     .options = table,
     .notes =
         "Examples:\n"

@@ -20,7 +20,7 @@ typedef struct request {
   bool json;
 } request;
 
-/* Read "prone", "prone:rest+500", "0.6:0:-0.8" or "0.6:0:-0.8:full". */
+/* Read a state, such as "prone", "prone:rest+500", "0.6:0:-0.8" or "0.6:0:-0.8:full". */
 static supine_status read_posture(const char *text, void *field, supine_error *error) {
   supine_command_state *state = field;
   if (text[0] == '\0' || strlen(text) >= sizeof state->posture) {
@@ -30,7 +30,7 @@ static supine_status read_posture(const char *text, void *field, supine_error *e
   return supine_state_parse(text, &state->state, error);
 }
 
-/* Read "prone.ply", "prone:prone.ply" or "prone:rest+500:prone.ply" into the whole request. */
+/* Append a state, such as "prone.ply" or "prone:rest+500:prone.ply", to the request. */
 static supine_status read_state(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   supine_command_state *state = &wanted->state[wanted->count];
@@ -57,22 +57,22 @@ static supine_status read_state(const char *text, void *field, supine_error *err
 static const supine_option table[] = {
     {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
      "surface of the same lungs in another state, with any mesh; may be repeated, up to 8 times. "
-     "Several also show how linear displacement is in volume",
-     .read = read_state, .wants = "(at most 8) SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE"},
+     "Several states also show whether the displacement is linear in volume",
+     .read = read_state,
+     .wants = "SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE (at most 8 times)"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
-     "state in which the motion starts, in which the first landmarks were placed; default: the "
+     "state that the motion starts from, in which the first landmarks were placed; default: the "
      "scan",
-     FILLS(from), .read = read_posture, .wants = "a state, as supine:rest"},
+     FILLS(from), .read = read_posture, .wants = "a state, such as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
-     "state of the second landmarks, without --state. With --state, the default for states "
-     "without a posture or a volume: supine, and the volume of the surface",
-     FILLS(to), .read = read_posture, .wants = "a state, as prone:rest+500"},
+     "state of the second landmarks, without --state. With --state, the default for states without "
+     "a posture or a volume: supine, and the volume of the surface",
+     FILLS(to), .read = read_posture, .wants = "a state, such as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
      "local errors: .png, a picture of every state; .ply or .vtp, the predicted surface of the "
-     "first "
-     "state, with its displacement from the nearest points of the state's surface (mm)",
+     "first state, with its displacement in mm from the nearest points of the scanned surface",
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -86,7 +86,7 @@ static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
                             "p95_mm", of[k].p95, "largest_mm", of[k].largest);
-    (void)json_object_set_new(row, "explained_percent", /* unknown where nothing moved */
+    (void)json_object_set_new(row, "explained_percent", /* null if nothing moved */
                               isnan(of[k].explained) ? json_null()
                                                      : json_real(100.0 * of[k].explained));
     (void)json_object_set_new(all, supine_command_map_names[k], row);
@@ -133,7 +133,7 @@ static void print(const supine_command_subject *s, bool json) {
   supine_options_print(root, json);
 }
 
-/* Set the states: each gets a posture, and a volume where one was given. */
+/* Set the states to compare. --to is the default for a posture or a volume that was not given. */
 static void set_states(const request *wanted, supine_command_subject *s) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_command_state *to = &wanted->to;
@@ -192,7 +192,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   if (wanted->path != NULL && wanted->count == 0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "-o draws the error against a --state: give one");
+                            "-o writes the errors of a --state: give one");
   }
   for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
     status = supine_options_check_output(wanted->path, wanted->state[i].path, error);
@@ -202,8 +202,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   if (supine_text_ends_in(path, ".json")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%s is a patient model without a surface: make a basis from it "
-                            "first with 'supine precompute --patient'",
+                            "%s is a patient model without a surface: make a basis from it first "
+                            "with 'supine precompute --patient'",
                             path);
   }
   s.moved = wanted->landmarks.rigid         ? SUPINE_PATIENT_RIGID
@@ -229,18 +229,18 @@ const supine_command supine_command_validate = {
     .about = "Compares a basis with other states of the same person. Reports the distances between "
              "the surfaces and between landmarks, and how much of the motion is explained, in "
              "comparison with no motion, a translation and an affine map. With several states, "
-             "reports how linear displacement is in volume.",
+             "reports whether the displacement is linear in volume.",
     .options = table,
     .notes =
         "Distances between surfaces are measured in both directions; the largest is the Hausdorff "
-        "distance. The translation and the affine map are fitted to the other state. "
-        "'explained' is 1 minus the squared distance after the motion over that without "
-        "motion. A small distance between surfaces does not prove the motion inside: "
-        "landmarks measure it. Santhanam 2008 found surfaces within 2 mm, and constants "
-        "within 1 %.\n"
-        "With several states, the displacement is also scaled to come nearest to each surface. "
-        "In each posture a straight line through the start of motion is fitted to scale over "
-        "volume; its largest deviation is given in percent of the largest scale.\n"
+        "distance. The translation and the affine map are fitted to the other state. 'explained' "
+        "is 1 minus the ratio of the squared distances with and without the motion. A small "
+        "distance between surfaces does not prove that the motion inside is right; landmarks "
+        "measure that. Santhanam 2008 found surfaces within 2 mm, and constants within 1 %.\n"
+        "With several states, the displacement is also scaled to come nearest to each surface. For "
+        "states in the posture of the first, a straight line through the start of motion is fitted "
+        "to scale over volume; the largest deviation from it is given in percent of the largest "
+        "scale.\n"
         "\n"
         "Examples:\n"
         "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write moved points as CSV, displacement fields, and images moved by them. */
+/* Write displacement fields, images moved by a field, and moved points as CSV. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,22 +13,21 @@
 #include "program/field.h"
 #include "program/inside.h"
 
-/* Distance outside the lungs over which a field fades to 0, mm; grids of 'supine embed' have this
- * margin. */
+/* Distance from the lungs over which a field falls to 0, mm: the margin of embedded grids. */
 static const double fade = 60.0;
 
 const supine_option supine_command_deform_content_options[] = {
-    {.help = "Embedded structures ('supine embed'): -o FILE.csv writes the moved points by name. "
-             "With a grid:"},
+    {.help =
+         "Structures made by 'supine embed': -o FILE.csv writes moved points by name. For a grid:"},
     {"field-out", 0, "FILE",
-     "displacement field to write, .nrrd, .nii, .nii.gz or .mha: from each node of the scan (or of "
-     "--from) to where its tissue moves, in mm and LPS (also in NIfTI, as in ITK and ANTs; for "
-     "NiftyReg, negate x and y). It fades out within 60 mm of the lungs",
+     "displacement field to write, .nrrd, .nii, .nii.gz or .mha: from each node in the scan (or in "
+     "the state of --from) to where its tissue moves, in mm and LPS (even in NIfTI, as ITK and "
+     "ANTs do; for NiftyReg, negate x and y). Outside the lungs it falls to 0 within 60 mm",
      SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT,
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"inverse", 0, NULL,
-     "let --field-out write the inverse: from each node of the moved lungs to where its tissue "
-     "was, as needed to resample images",
+     "write the inverse field to --field-out: from each node in the moved lungs to where its "
+     "tissue was, which resampling of an image needs",
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE",
      "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
@@ -52,22 +51,22 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
   if (wanted->path != NULL && image != supine_image_supports(wanted->path)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             image ? "%s: --image and --labels write .nrrd, .nii, .nii.gz or .mha"
-                                  : "%s: which image? Give --image FILE or --labels FILE",
+                                  : "%s: the image is missing: give --image FILE or --labels FILE",
                             wanted->path);
   }
   if (wanted->inverse && wanted->field == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--inverse changes --field-out FILE: give that too");
+                            "--inverse needs --field-out FILE: give both");
   }
   return wanted->density && wanted->image == NULL
              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "--density changes --image FILE: give that too")
+                                "--density needs --image FILE: give both")
              : SUPINE_OK;
 }
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  static const double aerated = -300.0; /* Hounsfield units; every lung has voxels below it */
+  static const double aerated = -300.0; /* HU; some voxels of every lung are below this */
   const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_image *image = &wanted->source;
   const supine_status status = path != NULL ? supine_image_read(path, image, error) : SUPINE_OK;
@@ -83,12 +82,11 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
     least = fmin(least, supine_image_get(image, i));
   }
-  return least < aerated
-             ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: no voxel is below %g, so it is not in Hounsfield units, which "
-                                "--density needs: convert it, or leave the option out",
-                                path, aerated);
+  return least < aerated ? SUPINE_OK
+                         : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                            "%s: no voxel is below %g, so the image is not in "
+                                            "Hounsfield units: convert it, or leave --density out",
+                                            path, aerated);
 }
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
@@ -96,7 +94,7 @@ bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
          supine_text_ends_in_any_case(wanted->path, ".csv");
 }
 
-/* Convert a vector, mm, LPS, to other axes and another unit. */
+/* Convert a vector from LPS and mm to other axes and another unit. */
 static void in_frame(supine_axes axes, double unit, const double lps[3], double out[3]) {
   double matrix[3][3];
   supine_mesh_axes_matrix(axes, matrix);
@@ -105,7 +103,8 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   }
 }
 
-/* Write name, lung, position and displacement of each point; over 60 lines, one for each column. */
+/* Write name, lung, position, displacement and expected error of each point as CSV. The ten columns
+ * need more than 60 lines of code. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, supine_error *error) {
   const supine_mesh_save_options *frame = &moved->save;
@@ -140,7 +139,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
         moved->from.name, axes, unit_name,
         sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
         sigma == NULL ? "" : ",expected_error_mm");
-    for (size_t i = 0; i < n; ++i) { /* in the order of the input */
+    for (size_t i = 0; i < n; ++i) { /* names.order has the order of the input */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;
@@ -197,12 +196,11 @@ static supine_status write_image(const supine_deform_content *wanted, const supi
       supine_field_resample(inverse, wanted->density ? &forward->depth : NULL,
                             wanted->labels != NULL, &wanted->source, &moved, error);
   if (status == SUPINE_OK) {
-    status =
-        supine_image_write(wanted->path, &moved,
-                           wanted->density ? "HU + 1000 inside the lungs scaled by their local "
-                                             "change of volume: mass is kept"
-                                           : NULL,
-                           error);
+    status = supine_image_write(wanted->path, &moved,
+                                wanted->density ? "HU + 1000 inside the lungs scaled by the local "
+                                                  "change of volume: mass is kept"
+                                                : NULL,
+                                error);
     supine_image_free(&moved);
   }
   if (status == SUPINE_OK) {
@@ -219,7 +217,7 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   const supine_status status = supine_field_invert(forward, inverse, &residual, error);
   if (status == SUPINE_OK) {
     (void)printf(
-        "field and inverse in turn: residual %.3g mm RMS, %.3g mm at most, inside the lungs",
+        "field followed by inverse: residual %.3g mm RMS, %.3g mm at most, inside the lungs",
         residual.rms, residual.largest);
     if (residual.lost > 0) {
       (void)printf("; the field folds and has no inverse at %zu %s", residual.lost,
@@ -230,8 +228,9 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   return status;
 }
 
-/* Replace `second`, the field from the scan to a state, by the field to it from the state that
- * `first` leads to: back to the scan by the inverse of `first`, and on by `second`. */
+/* Replace `second`, the field from the scan to a state B, by the field from state A to B,
+ * u(x) = v(x) + second(x + v(x)), where v is the inverse of `first`, the field from the scan to A.
+ */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};
@@ -262,7 +261,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   second->nodes.values = u;
   supine_image depth;
   status = supine_field_resample(&back, NULL, false, &second->depth, &depth, error);
-  if (status == SUPINE_OK) { /* the depth of the nodes in the first state */
+  if (status == SUPINE_OK) { /* depth of the nodes in state A */
     supine_image_free(&second->depth);
     second->depth = depth;
   }
@@ -270,7 +269,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   return status;
 }
 
-/* Compute the field from the scan, or the state of --from, to the pose. */
+/* Compute the field from the scan, or from the state of --from, to the pose. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
   supine_field first = {0};

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Move the points and grids that 'supine embed' made, for 'supine deform': write points, fields and
- * images. */
+/* Write the points, fields and images of 'supine deform', for structures made by 'supine embed'. */
 #ifndef SUPINE_DEFORM_CONTENT_H
 #define SUPINE_DEFORM_CONTENT_H
 
@@ -12,10 +11,10 @@
 #include "program/options/state_options.h"
 
 typedef struct supine_deform_content {
-  const char *path;   /* -o */
-  const char *field;  /* --field-out */
-  const char *image;  /* --image */
-  const char *labels; /* --labels */
+  const char *path;   /* file of -o; NULL: none */
+  const char *field;  /* file of --field-out; NULL: none */
+  const char *image;  /* file of --image; NULL: none */
+  const char *labels; /* file of --labels; NULL: none */
   bool inverse, density;
   supine_image source; /* image of --image or --labels, once read */
 } supine_deform_content;
@@ -29,10 +28,10 @@ typedef struct supine_deformation {
   supine_reference_pose from; /* state that displacements start from, and that images show */
   bool from_given;            /* --from was given; else `from` is the scan */
   supine_expected expected;
-  supine_mesh_save_options save; /* axes and unit of the output */
+  supine_mesh_save_options save; /* axes and unit of the output, and its comment */
 } supine_deformation;
 
-/* Check that the options fit each other (SUPINE_ERROR_ARGUMENT). */
+/* Check that the options fit each other; else return SUPINE_ERROR_ARGUMENT. */
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
                                                   supine_error *error);
 

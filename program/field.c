@@ -38,7 +38,7 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
       const size_t up = corner >> a & 1U;
       weight[a] = up ? cell->share[a] : 1.0 - cell->share[a];
       at[a] = cell->corner[a] + up;
-      at[a] -= at[a] == image->size[a]; /* a one-slice image: the next slice has weight 0 */
+      at[a] -= at[a] == image->size[a]; /* with one slice, the upper corner has weight 0 */
     }
     const size_t voxel = at[0] + image->size[0] * (at[1] + image->size[1] * at[2]);
     for (size_t c = 0; c < image->channels; ++c) {
@@ -52,7 +52,7 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
   }
 }
 
-/* Read the tensors of a grid, and check them. */
+/* Read and check the tensors of the grid of a basis. */
 static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
                                const uint32_t **part, const float **depth, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
@@ -62,46 +62,45 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   const supine_tensor *deep = supine_basis_tensor(basis, "depth");
   if (grid == NULL || size == NULL || of == NULL || deep == NULL) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis holds no grid: make one with 'supine embed BASIS --grid "
-                            "MM' or 'supine embed BASIS IMAGE'");
+                            "the basis holds no grid: make one with 'supine embed BASIS --grid MM' "
+                            "or 'supine embed BASIS IMAGE'");
   }
-  bool well = grid->dtype == SUPINE_F64 && grid->rank == 2 && grid->shape[0] == 4 &&
-              grid->shape[1] == 3 && size->dtype == SUPINE_U32 && size->rank == 1 &&
-              size->shape[0] == 3 && of->dtype == SUPINE_U32 && of->rank == 1 &&
-              of->shape[0] == n && deep->dtype == SUPINE_F32 && deep->rank == 1 &&
-              deep->shape[0] == n;
+  bool valid = grid->dtype == SUPINE_F64 && grid->rank == 2 && grid->shape[0] == 4 &&
+               grid->shape[1] == 3 && size->dtype == SUPINE_U32 && size->rank == 1 &&
+               size->shape[0] == 3 && of->dtype == SUPINE_U32 && of->rank == 1 &&
+               of->shape[0] == n && deep->dtype == SUPINE_F32 && deep->rank == 1 &&
+               deep->shape[0] == n;
   double count = 1.0;
-  for (size_t k = 0; k < 3 && well; ++k) {
+  for (size_t k = 0; k < 3 && valid; ++k) {
     nodes->size[k] = ((const uint32_t *)size->data)[k];
     count *= (double)nodes->size[k];
-    well = nodes->size[k] >= 2;
+    valid = nodes->size[k] >= 2;
   }
-  well = well && count < 2147483648.0;
-  for (size_t i = 0; i < 12 && well; ++i) {
+  valid = valid && count < 2147483648.0;
+  for (size_t i = 0; i < 12 && valid; ++i) {
     const double value = ((const double *)grid->data)[i];
     *(i < 3 ? &nodes->origin[i] : &nodes->step[i / 3 - 1][i % 3]) = value;
-    well = isfinite(value);
+    valid = isfinite(value);
   }
-  for (size_t i = 0; i < n && well; ++i) {
-    well = ((const uint32_t *)of->data)[i] < count;
+  for (size_t i = 0; i < n && valid; ++i) {
+    valid = ((const uint32_t *)of->data)[i] < count;
   }
   double axes[3] = {0.0, 0.0, 0.0};
-  if (well) {
-    supine_image_locate(nodes, axes,
-                        axes); /* not finite where the steps of the grid are linearly dependent */
+  if (valid) {
+    supine_image_locate(nodes, axes, axes); /* not finite if the steps are linearly dependent */
   }
-  if (!well || !isfinite(axes[0] + axes[1] + axes[2])) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the grid in the basis is malformed: make it again "
-                            "with 'supine embed'");
+  if (!valid || !isfinite(axes[0] + axes[1] + axes[2])) {
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the grid in the basis is malformed: make it again with 'supine embed'");
   }
   *part = of->data;
   *depth = deep->data;
   return SUPINE_OK;
 }
 
-/* Compute the mean displacement of the neighbours of node i that earlier layers have set; false if
- * there are none. */
+/* Average the displacements of the neighbours of node i that earlier layers have set; return false
+ * if there are none. `now` is the mark of the current layer. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
                            size_t i, float mean[3]) {
   const float *u = nodes->values;
@@ -129,8 +128,8 @@ static bool mean_neighbour(const supine_image *nodes, const unsigned char *known
   return count > 0;
 }
 
-/* Extend the field outwards layer by layer, so that it falls linearly to 0. `known` is 1 where the
- * basis has a node; the layers are alternately 2 and 3. */
+/* Extend the field outwards in layers of nodes, so that it falls linearly to 0 over `fade` mm.
+ * `known` is 1 for a node of the basis, else 0; layers are marked 2 and 3 alternately. */
 static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   float *u = nodes->values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
@@ -156,7 +155,7 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
     if (!any) {
       break;
     }
-    /* Earlier layers count as known; only the newest keeps its own mark. */
+    /* Only the newest layer keeps its mark; older layers are marked 1. */
     for (size_t i = 0; i < count; ++i) {
       known[i] = known[i] != 0 && known[i] != now ? 1 : known[i];
     }
@@ -190,9 +189,9 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
   } else {
     supine_displace_range(basis, pose, 0, n, moved);
     for (size_t i = 0; i < count; ++i) {
-      below[i] = (float)-fade; /* where the basis has no node */
+      below[i] = (float)-fade; /* nodes that the basis lacks are outside the lungs */
     }
-    /* The displacement starts at the node in the scan; info->vertices has it at full inflation. */
+    /* The field starts at the nodes in the scan, but info->vertices are at full inflation. */
     for (size_t i = 0; i < n; ++i) {
       double node[3];
       supine_image_place(&made.nodes, part[i], node);

@@ -11,13 +11,13 @@
 
 /** Displacement u(x) at the nodes x of a grid, mm. */
 typedef struct supine_field {
-  supine_image nodes; /**< F32, three channels */
-  supine_image depth; /**< F32, one channel: mm below the surface of the lungs, negative outside;
+  supine_image nodes; /**< the displacement u: three F32 channels, mm */
+  supine_image depth; /**< depth below the lungs' surface, negative outside: one F32 channel, mm;
                            values NULL in an inverse */
 } supine_field;
 
-/** Compute the field from the scan to a pose. Beyond the nodes of the basis, outside the lungs, it
- * fades out to 0 over `fade` mm; it has no meaning there.
+/** Compute the field from the scan to a pose. Outside the nodes of the basis the field has no
+ * physical meaning; it falls to 0 over `fade` mm.
  * @param field  release with supine_field_free
  * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one
  * @retval SUPINE_ERROR_MEMORY */
@@ -30,34 +30,32 @@ void supine_field_at(const supine_field *field, const double point[3], double u[
 
 /** Residual of a field followed by its inverse. */
 typedef struct supine_field_residual {
-  double rms, largest; /**< |u(x) + v(x + u(x))| over the nodes x inside the lungs, mm */
-  size_t lost;         /**< nodes whose inverse is not found to 0.01 mm, because the field folds */
+  double rms, largest; /**< of |u(x) + v(x + u(x))| at the nodes x inside the lungs, mm */
+  size_t lost; /**< number of nodes at which the field folds: the inverse misses by > 0.01 mm */
 } supine_field_residual;
 
 /** Invert a field on the same nodes by Newton's method: v(y) = x - y where x + u(x) = y. A
- * resampled image takes its voxel at y from y + v(y). Cost: about ten evaluations per node, in
- * parallel.
+ * resampled image takes the value of its voxel y from the place y + v(y). Cost: about ten
+ * evaluations per node, in parallel.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
                                   supine_field_residual *residual, supine_error *error);
 
-/** Move an image: moved(y) = image(y + v(y)) on its own voxels, where places outside the image take
- * the nearest voxel. With a depth, densities (Hounsfield units + 1000) inside the lungs are
- * multiplied by det(dv/dy + 1), the ratio of the tissue's volume before and after, which keeps its
- * mass.
- * @param inverse  of supine_field_invert
- * @param depth    of the field; NULL: densities are not scaled
- * @param labels   take the nearest voxel instead of interpolating
+/** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
+ * have the value of the nearest voxel. With a depth, densities (Hounsfield units + 1000) inside the
+ * lungs are multiplied by det(dv/dy + 1), the tissue's volume before the motion divided by that
+ * after, which keeps the mass.
+ * @param inverse  field v, made by supine_field_invert
+ * @param depth    depth of the field; NULL: densities are not scaled
+ * @param labels   true: take the value of the nearest voxel; false: interpolate
  * @param moved    release with supine_image_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
                                     bool labels, const supine_image *image, supine_image *moved,
                                     supine_error *error);
 
-/* Trilinear interpolation, for field.c and field_*.c. */
-
-/* Cell of voxels that contains a point: index of its first corner, and position of the point in it,
- * 0 to 1 along each axis. */
+/* Cell between eight voxels that contains a point: index of the first corner, and position of the
+ * point in the cell, 0 to 1 along each axis. */
 typedef struct supine_field_cell {
   size_t corner[3];
   double share[3];
@@ -67,8 +65,8 @@ typedef struct supine_field_cell {
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
 
-/* Interpolate all channels of an F32 image and their derivatives with respect to the shares,
- * [channels, 3]; a NULL `slope` is not computed. */
+/* Interpolate all channels of an F32 image and, unless `slope` is NULL, their derivatives with
+ * respect to the shares of the cell, [channels, 3]. */
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]);
 

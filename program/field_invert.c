@@ -12,8 +12,8 @@
 static const double tolerance = 1e-5;   /* residual at which iteration stops, mm */
 static const double lost_beyond = 0.01; /* residual above which a node counts as lost, mm */
 
-/* Compute the residual x + u(x) - y, mm, and its derivative with respect to x in steps of the grid
- * (NULL: not computed); return the length of the residual. */
+/* Compute the residual x + u(x) - y, mm, and, unless `slope` is NULL, its derivative with respect
+ * to x in steps of the grid; return the length of the residual. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
                      double residual[3], double (*slope)[3]) {
   supine_field_cell cell;
@@ -29,9 +29,9 @@ static double misfit(const supine_field *field, const double x[3], const double 
   return supine_length(residual);
 }
 
-/* Compute the Newton step, in steps of the grid; false where the derivative is singular. */
+/* Compute the Newton step, in steps of the grid; return false if the derivative is singular. */
 static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
-  supine_image cell = {.origin = {0.0}}; /* supine_image_locate solves the equations */
+  supine_image cell = {.origin = {0.0}}; /* supine_image_locate solves the three equations */
   for (size_t k = 0; k < 9; ++k) {
     cell.step[k % 3][k / 3] = -slope[k / 3][k % 3];
   }
@@ -39,8 +39,8 @@ static bool newton(const double slope[3][3], const double residual[3], double st
   return isfinite(step[0] + step[1] + step[2]);
 }
 
-/* Find x with x + u(x) = y, starting from x, and return the residual. Newton steps are halved until
- * they reduce it: the derivative of the field is discontinuous between cells. */
+/* Find x with x + u(x) = y, starting from the given x, and return the residual. Each Newton step is
+ * halved until it reduces the residual, as the derivative jumps between cells. */
 static double solve(const supine_field *field, const double y[3], double x[3]) {
   enum { STEPS = 40, HALVINGS = 6 };
   double residual[3];
@@ -95,7 +95,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
         x[k] = y[k] - u[k];
       }
       double off = solve(work->field, y, x);
-      if (off > lost_beyond) { /* try again from the node itself */
+      if (off > lost_beyond) { /* start again from the node itself */
         double other[3];
         memcpy(other, y, sizeof other);
         const double again = solve(work->field, y, other);

@@ -10,7 +10,7 @@
 
 #include "program/field.h"
 
-/* Number of voxels of a row that are processed together, by vector instructions. */
+/* Number of voxels of a row that are processed together, with vector instructions. */
 enum { RUN = 128 };
 
 #define INLINE static inline __attribute__((always_inline))
@@ -24,14 +24,15 @@ typedef struct resampling {
   bool labels;
 } resampling;
 
-/* Cells of a run of points: index of each cell's first value, and position of the point in the
- * cell, 0 to 1 along each axis. */
+/* Cells that contain RUN points: index of the value at each cell's first corner, and position of
+ * the point in the cell, 0 to 1 along each axis. */
 typedef struct cells {
   size_t first[RUN];
   double share[3][RUN];
 } cells;
 
-/* Find the cells of points, mm, by the operations of supine_field_find_cell in the same order. */
+/* Find the cells that contain points, mm. The operations and their order are those of
+ * supine_field_find_cell, so that both give the same bits. */
 INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *found) {
   const supine_image frame = *image; /* a local copy, so that stores cannot alias it */
   double at[3][RUN];
@@ -58,20 +59,20 @@ INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *f
   const double row = (double)frame.size[0];
   const double slice = row * (double)frame.size[1];
   for (size_t i = 0; i < RUN; ++i) {
-    found->first[i] = frame.channels * (size_t)(at[0][i] + row * at[1][i] +
-                                                slice * at[2][i]); /* exact: all are whole */
+    /* The sum is exact, as its terms are whole numbers. */
+    found->first[i] = frame.channels * (size_t)(at[0][i] + row * at[1][i] + slice * at[2][i]);
   }
 }
 
-/* Compute the weights of the cells' corners, and the offset of each corner's first value from the
- * cell's. */
+/* Compute the weights of the corners of each cell, and the offset of each corner's value from that
+ * of the first corner. */
 INLINE void weigh_corners(const supine_image *image, const cells *in, double (*weight)[RUN],
-                          size_t *behind) {
+                          size_t *offset) {
   for (size_t corner = 0; corner < 8; ++corner) {
     size_t stride = image->channels;
-    behind[corner] = 0;
-    for (size_t a = 0; a < 3; ++a) { /* where there is one slice, the next one's weight is 0 */
-      behind[corner] += (corner >> a & 1U) != 0 && image->size[a] > 1 ? stride : 0;
+    offset[corner] = 0;
+    for (size_t a = 0; a < 3; ++a) { /* with one slice, the upper corner has weight 0 */
+      offset[corner] += (corner >> a & 1U) != 0 && image->size[a] > 1 ? stride : 0;
       stride *= image->size[a];
     }
     for (size_t i = 0; i < RUN; ++i) {
@@ -83,18 +84,18 @@ INLINE void weigh_corners(const supine_image *image, const cells *in, double (*w
   }
 }
 
-/* Add to each point its displacement, mm, by the operations of supine_field_interpolate in the same
- * order. */
+/* Add to each point its displacement, mm. The operations and their order are those of
+ * supine_field_interpolate, so that both give the same bits. */
 INLINE void displace(const supine_image *nodes, const cells *in, double (*point)[RUN]) {
   double weight[8][RUN];
-  size_t behind[8];
-  weigh_corners(nodes, in, weight, behind);
+  size_t offset[8];
+  weigh_corners(nodes, in, weight, offset);
   for (size_t i = 0; i < RUN; ++i) {
     const float *first = (const float *)nodes->values + in->first[i];
     double u[3] = {0.0, 0.0, 0.0};
     for (size_t corner = 0; corner < 8; ++corner) {
       for (size_t k = 0; k < 3; ++k) {
-        u[k] += weight[corner][i] * (double)first[behind[corner] + k];
+        u[k] += weight[corner][i] * (double)first[offset[corner] + k];
       }
     }
     for (size_t k = 0; k < 3; ++k) {
@@ -107,11 +108,11 @@ INLINE void displace(const supine_image *nodes, const cells *in, double (*point)
 INLINE void interpolate(const supine_image *image, const cells *in, double *values) {
   double weight[8][RUN];
   double value[RUN];
-  size_t behind[8];
-  weigh_corners(image, in, weight, behind);
+  size_t offset[8];
+  weigh_corners(image, in, weight, offset);
   memset(values, 0, RUN * sizeof *values);
   for (size_t corner = 0; corner < 8; ++corner) {
-    supine_image_gather(image, behind[corner], in->first, RUN, value);
+    supine_image_gather(image, offset[corner], in->first, RUN, value);
     for (size_t i = 0; i < RUN; ++i) {
       values[i] += weight[corner][i] * value[i];
     }
@@ -130,7 +131,7 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
   supine_image_gather(image, 0, in.first, RUN, values);
 }
 
-/* Compute det(dv/dy + 1) at a voxel; 0 where the field folds. */
+/* Compute det(dv/dy + 1) of the inverse field v at a voxel y; 0 if the field folds there. */
 static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
   double point[3];
   double v[3];
@@ -147,10 +148,10 @@ static double volume_ratio(const supine_image *nodes, const supine_image *image,
                        supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]));
 }
 
-/* Interpolate densities over voxels on the same side of the lungs' surface as the nearest one, so
- * that no mass of the chest wall is added to the lungs, and multiply those inside by the ratio of
- * volumes.
- * @param first  index of the first voxel of the run in the moved image */
+/* Interpolate densities, and multiply those inside the lungs by the ratio of volumes. A point uses
+ * only the corners on the same side of the lungs' surface as its nearest voxel, so that the chest
+ * wall adds no mass to the lungs.
+ * @param first  index of the first of the RUN voxels in the moved image */
 INLINE void interpolate_density(const resampling *work, const cells *in, size_t first,
                                 double *values) {
   double weight[8][RUN];
@@ -158,13 +159,13 @@ INLINE void interpolate_density(const resampling *work, const cells *in, size_t 
   double nearest[RUN];
   double inside[RUN];
   double sum[RUN] = {0.0};
-  size_t behind[8];
-  weigh_corners(work->from, in, weight, behind);
+  size_t offset[8];
+  weigh_corners(work->from, in, weight, offset);
   take_nearest(&work->inside, *in, nearest);
   memset(values, 0, RUN * sizeof *values);
   for (size_t corner = 0; corner < 8; ++corner) {
-    supine_image_gather(work->from, behind[corner], in->first, RUN, value);
-    supine_image_gather(&work->inside, behind[corner], in->first, RUN, inside);
+    supine_image_gather(work->from, offset[corner], in->first, RUN, value);
+    supine_image_gather(&work->inside, offset[corner], in->first, RUN, inside);
     for (size_t i = 0; i < RUN; ++i) {
       const double part = inside[i] == nearest[i] ? weight[corner][i] : 0.0;
       values[i] += part * (value[i] + 1000.0);
@@ -179,7 +180,7 @@ INLINE void interpolate_density(const resampling *work, const cells *in, size_t 
   }
 }
 
-/* Mark the voxels of rows that are inside the lungs. */
+/* Mark the voxels that are inside the lungs, in rows `begin` to `end` - 1. */
 static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const resampling *work = context;
@@ -195,7 +196,7 @@ static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Resample voxels `begin` to begin + RUN of a row; those past its end are not stored. */
+/* Resample RUN voxels of a row from `begin` on; those past the end of the row are not stored. */
 SUPINE_CLONES static void resample_run(const resampling *work, size_t row, size_t begin) {
   const supine_image *from = work->from;
   const double at[2] = {(double)(row % from->size[1]), (double)(row / from->size[1])};

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open the structures that 'supine embed' made, read their names, and make the marks that show them
- * in pictures. */
+/* Read the names of structures made by 'supine embed', and make marks of them for pictures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +7,7 @@
 #include "program/inside.h"
 #include "program/options/basis_input.h"
 
-/* Sort vertices by name, stably, by counting. */
+/* List the vertices by name, in input order within each name; return false if out of memory. */
 static bool sort_by_name(supine_command_names *names, size_t n) {
   size_t *begin = calloc(names->count + 2, sizeof *begin);
   names->begin = begin;
@@ -22,7 +21,8 @@ static bool sort_by_name(supine_command_names *names, size_t n) {
   for (size_t name = 0; name < names->count; ++name) {
     begin[name + 2] += begin[name + 1];
   }
-  for (size_t i = 0; i < n; ++i) { /* this moves each begin + 1 to the begin of the next name */
+  for (size_t i = 0; i < n;
+       ++i) { /* at the end, begin[name + 1] is past the vertices of the name */
     names->order[begin[names->part[i] + 1]++] = i;
   }
   return true;
@@ -36,9 +36,9 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   *names = (supine_command_names){0};
   if (text == NULL || part == NULL || text->dtype != SUPINE_U8 || text->rank != 1 ||
       part->dtype != SUPINE_U32 || part->rank != 1 || part->shape[0] != n) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis names no points: make one with 'supine embed BASIS "
-                            "POINTS.csv'");
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the basis names no points: make one with 'supine embed BASIS POINTS.csv'");
   }
   const size_t length = text->shape[0];
   names->part = part->data;
@@ -62,8 +62,8 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     if (names->part[i] >= names->count) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "point %zu of the basis has no name: make it again with 'supine "
-                                "embed BASIS POINTS.csv'",
+                                "point %zu of the basis has no name: make the file again with "
+                                "'supine embed BASIS POINTS.csv'",
                                 i);
     }
   }
@@ -102,10 +102,10 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
                     a->lung_count == b->lung_count &&
                     memcmp(a->modes, b->modes, a->mode_count * terms * sizeof *a->modes) == 0;
   return same ? SUPINE_OK
-              : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                 "%s: not made from this basis: make it with 'supine embed' "
-                                 "from the basis that is shown",
-                                 path);
+              : supine_error_set(
+                    error, SUPINE_ERROR_FORMAT,
+                    "%s: made from another basis: make it with 'supine embed' from this basis",
+                    path);
 }
 
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,

@@ -1,19 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open the structures that 'supine embed' made, read their names, and make the marks that show them
- * in pictures. */
+/* Read the names of structures made by 'supine embed', and make marks of them for pictures. */
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
 #include "program/render/render.h"
 
-/* Names of embedded structures. */
 typedef struct supine_command_names {
-  size_t count;         /* names */
-  char **text;          /* [count] */
-  const uint32_t *part; /* [N] index of each vertex's name */
+  size_t count;         /* number of names */
+  char **text;          /* [count] the names */
+  const uint32_t *part; /* [N] index of each vertex's name in `text` */
   size_t *order;        /* [N] vertices by name, and by input order within each name */
   size_t *begin;        /* [count + 1] index in `order` of the first vertex of each name */
-  char *space;          /* memory of `text` */
+  char *space;          /* memory that `text` points into */
 } supine_command_names;
 
 /* Read the names of embedded structures.
@@ -22,15 +20,15 @@ supine_status supine_command_names_open(const supine_basis *basis, supine_comman
                                         supine_error *error);
 void supine_command_names_close(supine_command_names *names);
 
-/* Return the index of a vertex's lung. */
+/* Return the index of the lung that a vertex belongs to. */
 size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
 
-/* Check that structures were embedded in these lungs (SUPINE_ERROR_FORMAT). */
+/* Check that the structures `inside` were embedded in `lungs`; else return SUPINE_ERROR_FORMAT. */
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error);
 
-/* Open the structures and their names, and check them. Both arguments start zeroed and must be
- * closed also after a failure. */
+/* Open structures and their names, and check them. Set *inside and *names to zero before; close
+ * both afterwards, also after a failure. */
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);

@@ -25,7 +25,7 @@ static void print_help(void) {
     (void)printf("  %-11s %s\n", supine_command_list[i]->name, supine_command_list[i]->summary);
   }
   (void)puts("\n"
-             "'supine COMMAND --help' explains each. To try it without data:\n"
+             "'supine COMMAND --help' explains a command. To try supine without data:\n"
              "\n"
              "  supine phantom -o lungs.ply\n"
              "  supine precompute lungs.ply -o lungs.safetensors\n"
@@ -33,7 +33,8 @@ static void print_help(void) {
              "\n"
              "Lengths are millimetres and volumes millilitres; axes are the DICOM patient axes\n"
              "(x to the left, y to the back, z to the head).\n"
-             "Exit codes: 0 done, 1 usage, 2 input, 3 not in this build, 4 output, 5 numerical.");
+             "Exit codes: 0 done, 1 wrong usage, 2 wrong input, 3 not in this build, 4 failed "
+             "output,\n5 numerical failure.");
 }
 
 static const supine_command *find_command(const char *name) {
@@ -60,8 +61,8 @@ static int unknown_command(const char *name) {
   return SUPINE_EXIT_USAGE;
 }
 
-/* End the program where jansson or GSL lacks memory: a JSON value would be missing without a
- * message, and GSL reports it only to its handler. Unfinished outputs are removed. */
+/* End the program, without unfinished outputs, if jansson or GSL runs out of memory. Otherwise JSON
+ * values would be missing without a message; GSL reports the failure only to its error handler. */
 static _Noreturn void end_without_memory(void) {
   supine_output_abandon_all();
   (void)fputs("supine: out of memory\n", stderr);
@@ -76,7 +77,7 @@ static void *allocate_json(size_t size) {
   return memory;
 }
 
-/* Handle an error of GSL; all but a lack of memory are also returned by its functions. */
+/* Handle an error of GSL: end if out of memory. GSL's functions return all other errors. */
 static void handle_gsl(const char *reason, const char *file, int line, int code) {
   (void)reason;
   (void)file;
@@ -89,7 +90,7 @@ static void handle_gsl(const char *reason, const char *file, int line, int code)
 int main(int argc, char **argv) {
   (void)gsl_set_error_handler(handle_gsl);
   json_set_alloc_funcs(allocate_json, free);
-  openblas_set_num_threads(1); /* its threads would busy-wait beside the program's own */
+  openblas_set_num_threads(1); /* threads of OpenBLAS would busy-wait beside the program's own */
   (void)setenv("OMP_THREAD_LIMIT", "1", 0); /* CHOLMOD's loops are too short for threads */
   supine_options_signals_catch(false);
   if (argc < 2) {

@@ -17,7 +17,7 @@ static supine_status read_scan(const char *text, void *field, supine_error *erro
   return supine_reference_scan_parse(text, &choice->scan, error);
 }
 
-/* Read "supine=0.43,prone=2600mL". */
+/* Read volumes at rest, such as "supine=0.43,prone=2600mL". */
 static supine_status read_resting(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   char copy[256];
@@ -81,7 +81,7 @@ static supine_status read_lesion(const char *text, void *field, supine_error *er
   return SUPINE_OK;
 }
 
-/* Read "left:0.3". */
+/* Read a collapsed lung, such as "left:0.3". */
 static supine_status read_lung(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -97,9 +97,10 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
   return SUPINE_OK;
 }
 
-static const char *const sexes[] = {"unknown", "female", "male", NULL}; /* as supine_sex */
+/* Names of the values of supine_sex. */
+static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
-/* For help texts: the laws, and the constants of each. */
+/* Parts of help texts: the laws, and the constants of each law. */
 #define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) " " name " " #base
 #define LAW_GAIN(id, name, base, gain, ...) " " name " " #gain
@@ -112,22 +113,22 @@ const supine_option supine_command_model_options[] = {
     {.help = "Surfaces:"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"midline", 0, "X",
-     "x of the sagittal plane between the lungs, mm; default: the middle of the bounding box "
-     "of two lungs, or the medial side of a single lung",
+     "x of the sagittal plane between the lungs, mm; default: the middle of the bounding box of "
+     "two lungs, or the medial side of a single lung",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_options, source.has_midline),
-     .wants = "an x in mm", .more = true},
-    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask "
-             "per file, or the folder of masks that TotalSegmentator writes:"},
+     .wants = "a number of mm", .more = true},
+    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask per "
+             "file, or the folder of masks that TotalSegmentator writes:"},
     {"labels", 0, "WHICH",
      "labels of the lungs: lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), "
      "totalsegmentator (10 to 14), totalsegmentator-v1 (13 to 17), one (every label but 0 is lung; "
-     "left and right are separated), or your own, as left=10+11,right=12+13+14, or left=2 for one "
-     "lung. Default: recognised from the labels present, where they are unambiguous",
+     "left and right are separated), or a list such as left=10+11,right=12+13+14, or left=2 for "
+     "one lung. Default: recognised from the labels present, if they are unambiguous",
      FILLS(source.labels.labels)},
-    {"edge", 0, "MM", "edge length of the surface; default 2", FILLS(source.labels.edge),
-     .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
+    {"edge", 0, "MM", "edge length of the surface's triangles; default 2",
+     FILLS(source.labels.edge), .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
     {"close", 0, "MM",
-     "close gaps and channels narrower than twice this, which vessels leave in masks; default 0",
+     "close gaps and channels narrower than twice MM, which vessels leave in masks; default 0",
      FILLS(source.labels.close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
     {"surfaces-out", 0, "FILE", "also write the surfaces: " SUPINE_MESH_ENDINGS,
      FILLS(source.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS,
@@ -137,30 +138,31 @@ const supine_option supine_command_model_options[] = {
      "state of the lungs in the scan: full (TLC, a breath-hold at full inflation; the default), "
      "POSTURE:rest (FRC, the end of a quiet expiration), either with +ML or -ML for both lungs "
      "together (supine:rest+300, full-2000), or none (unknown: breaths are added to the scan, and "
-     "a change of posture alone moves nothing). The model starts from full inflation, where the "
-     "shape is the same in every posture; for a scan in another state, that shape is computed "
-     "first",
+     "a change of posture alone does not deform it). The model starts from full inflation, where "
+     "the shape is the same in every posture; if the scan is in another state, the shape at full "
+     "inflation is computed first",
      FILLS(choice), .read = read_scan,
      .wants = "full, POSTURE:rest, either with +ML or -ML, or none"},
     {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
      FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
     {"resting", 0, "LIST",
-     "volume at rest (FRC) in each posture, where it is known for the patient: POSTURE=2600mL, "
-     "gas and tissue of both lungs, as measured in a CT at rest (lung-function tests give the "
-     "gas alone, seated: add about 0.9 L of tissue and give it as upright; other postures keep "
-     "their proportion to those named); POSTURE=0.43, a share of the volume at full inflation; "
-     "POSTURE=0.42/0.44, shares of the left and the right lung. Default, from healthy people: "
-     "supine 0.418/0.440, prone 0.464/0.475, left "
-     "0.413/0.546, right 0.563/0.435, upright 0.481/0.506, inverted as supine",
+     "volume at rest (FRC) in each posture that is known for the patient: POSTURE=2600mL, gas and "
+     "tissue of both lungs, as measured in a CT at rest; POSTURE=0.43, a share of the volume at "
+     "full inflation; or POSTURE=0.42/0.44, shares for the left and the right lung. Other postures "
+     "keep their proportion to those named. A lung-function test gives the gas alone, seated: add "
+     "about 0.9 L of tissue, and give the sum as upright. Default, from healthy people: supine "
+     "0.418/0.440, prone 0.464/0.475, left 0.413/0.546, right 0.563/0.435, upright 0.481/0.506, "
+     "inverted as supine",
      FILLS(choice), .read = read_resting, .wants = "POSTURE=2600mL or POSTURE=SHARE,..."},
     {"height", 0, "CM",
-     "height of the person, to report with --sex the expected volume at TLC beside the scan's "
-     "volume (ECSC 1993, less 10 % for lying, plus 0.86 L of tissue); default: the range of adults",
+     "height of the person. With --sex it gives the volume expected at TLC (ECSC 1993, less 10 % "
+     "for lying, plus 0.86 L of tissue), which is reported with the scan's volume; default: the "
+     "range of adults",
      FILLS(choice.person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm", .more = true},
     {"sex", 0, "SEX", "female or male", FILLS(choice.person.sex), .choices = sexes, .more = true},
     {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z: h is its height along "
-             "gravity (0 uppermost, 1 lowermost); X, Y, Z are its coordinates in the bounding "
-             "box (0 to 1, from the midline outwards, from the back, from the apex):",
+             "gravity (0 uppermost, 1 lowermost); X, Y, Z are its coordinates in the bounding box "
+             "(0 to 1, from the midline outwards, from the back, from the apex):",
      .more = true},
     {"base", 0, "B", "base; default by law:" SUPINE_LAWS(LAW_BASE), FILLS(choice.model.force.base),
      .more = true},
@@ -170,41 +172,42 @@ const supine_option supine_command_model_options[] = {
      "cx, cy and cz, fixed to the body; default by law:" SUPINE_LAWS(LAW_BOX),
      FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
     {"soften", 0, "S",
-     "make dependent tissue more expandable: a is multiplied by exp(S (h - mean h)); default "
-     "0. With the paper law, give --reach as well",
+     "make dependent tissue more expandable: its expandability is multiplied by exp(S (h - mean "
+     "h)); default 0. With the paper law, give --reach too",
      FILLS(choice.model.force.soften), .more = true},
     {.help = "Direction of displacement:", .more = true},
     {"constants", 0, "C1,...,C6",
      "constants of the box model; default by law:" SUPINE_LAWS(
-         LAW_CONSTANTS) ". Those of paper are fitted to the landmarks of ten 4-D CTs "
-                        "(DIR-Lab), as the original constants are lost; those of deep to ten "
-                        "full breaths (DIR-Lab COPDgene)",
+         LAW_CONSTANTS) ". Those of paper are fitted to the landmarks of ten 4-D CTs (DIR-Lab), as "
+                        "the original constants are lost; those of deep to ten full breaths "
+                        "(DIR-Lab COPDgene)",
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
-    {.help = "Tissue. Expandability a is the inverse of stiffness, E = 1/a. Only ratios "
-             "between the parts of the lungs count: doubling every a changes nothing."},
+    {.help = "Tissue. Expandability a is the inverse of stiffness, E = 1/a. Only ratios between "
+             "the parts of the lungs count: doubling every a changes nothing."},
     {"expandability", 0, "WHAT",
-     "uniform (default)\nlinear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a changes from FROM to TO "
-     "linearly or exponentially along AXIS: x from the midline outwards, y from back to front, "
-     "z from apex to base; linear:z:0.5:1.5 expands most at the base\nFILE: a for every "
-     "vertex: CSV with the column expandability, in the vertex order of 'supine solve' (left lung "
-     "first), or with the columns vertex,expandability, vertices from 0",
+     "uniform (default)\nlinear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a changes from FROM to TO linearly "
+     "or exponentially along AXIS: x from the midline outwards, y from back to front, z from apex "
+     "to base; linear:z:0.5:1.5 expands most at the base\nFILE: CSV with a for every vertex: a "
+     "column expandability, in the vertex order of 'supine solve' (left lung first), or columns "
+     "vertex,expandability, with vertices numbered from 0",
      FILLS(choice), .read = read_expandability, .file = SUPINE_FILE_IN,
      .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
               "above 0, or a file",
      .more = true},
     {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
-     "lesion at X,Y,Z (mm, LPS): E is multiplied by FACTOR within half of RADIUS (mm), by less "
-     "farther out, and by 1 from RADIUS on. A FACTOR above 1 stiffens: the tissue moves less. "
-     "May be repeated",
+     "lesion at X,Y,Z (mm, LPS): E is multiplied by FACTOR within half of RADIUS (mm); farther out "
+     "the factor changes to 1 at RADIUS. A FACTOR above 1 stiffens the tissue, which then moves "
+     "less. May be repeated, up to 64 times",
      FILLS(choice), .read = read_lesion,
-     .wants = "(at most 64) X,Y,Z,RADIUS,FACTOR, the last two above 0"},
+     .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",
      "collapsed lung (pneumothorax), left or right: its volume at rest and its share of a breath "
      "are multiplied by SHARE (0 to 1); the other lung takes the rest of the breath's volume",
      FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {"reach", 0, "MM",
-     "length over which a force spreads along the surface, about exp(-r/MM); default 10. The paper "
-     "law spreads it over a few links of the mesh instead: less on finer meshes, which may tear",
+     "length over which a force spreads along the surface: at distance r it is about exp(-r/MM); "
+     "default 10. The paper law spreads it over a few links of the mesh instead, which is shorter "
+     "on finer meshes and may tear them",
      FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.name = NULL}};
 
@@ -236,8 +239,7 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Copy a patient's law, force and stiffness into the choice, and the fitted state that the scan
- * shows. */
+/* Copy a patient's law and force into the choice, and the state of the scan if none was given. */
 static supine_status take_patient(supine_model_options *options, supine_error *error) {
   const supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;
@@ -257,12 +259,13 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
     if (state == 1 && !choice->scan.known) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "this scan is the emptier of the two that were fitted, and how far "
-                              "it is below full inflation is unknown: give its state, as "
+                              "it is below full inflation is unknown: give its state, such as "
                               "--scanned supine:rest, or use the fuller scan");
     }
-    supine_findings_add(&options->findings,
-                        "note: assumed to be the %s of the two fitted states; --scanned changes it",
-                        state == 0 ? "fuller" : "emptier");
+    supine_findings_add(
+        &options->findings,
+        "note: the scan is assumed to be the %s of the two fitted states; --scanned changes this",
+        state == 0 ? "fuller" : "emptier");
   }
   options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
   status = options->patient_arrays == NULL
@@ -323,7 +326,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   const supine_status status =
       count > FILES_MAX
           ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                             "'%s': more than two lungs: give one or two", operand)
+                             "'%s': more than two surfaces: give one or two", operand)
           : supine_precompute_source_load(options, paths, count, &source, &findings, error);
   supine_options_say_findings(command, &findings);
   *lungs = source.lungs;

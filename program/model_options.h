@@ -18,14 +18,14 @@ typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
   const supine_patient_record *patient; /* patient model, owned by the caller; NULL: none */
-  double *patient_arrays;               /* used by the patient model: see supine_patient_model */
-  supine_source made_from;  /* the lungs as loaded, with the axes and units of their files */
-  supine_prepared prepared; /* the model of the lungs */
-  char assumed[800];        /* sentence about the assumptions */
+  double *patient_arrays;               /* [4, N] memory that supine_patient_model fills */
+  supine_source made_from;  /* lungs as loaded, with the axes and units of their files */
+  supine_prepared prepared; /* model of the lungs */
+  char assumed[800];        /* assumptions about the scan and the model, in words */
   supine_findings findings; /* findings about the files and the model */
 } supine_model_options;
 
-/* Set the defaults of a zeroed struct. */
+/* Set the defaults of options that are initialised to zero. */
 void supine_command_model_options_begin(supine_model_options *options);
 
 /* Load the files, print the findings and prepare the model.
@@ -33,13 +33,12 @@ void supine_command_model_options_begin(supine_model_options *options);
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
                                         char **paths, size_t count, bool keep, supine_error *error);
 
-/* Load surfaces, "left.ply,right.ply", or a label map as one pair of lungs; print the findings.
- * @param lungs  zeroed */
+/* Load one or two surfaces, such as "left.ply,right.ply", or a label map; print the findings.
+ * @param lungs  initialised to zero */
 supine_status supine_command_load_lungs(const char *command, const char *operand,
                                         const supine_source_options *options, supine_lungs *lungs,
                                         supine_error *error);
 
-/* Release what supine_command_model_load allocated. */
 void supine_command_model_options_free(supine_model_options *options);
 
 #endif

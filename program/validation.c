@@ -12,12 +12,12 @@
 #include "precompute/inside/surface.h"
 #include "program/options/basis_input.h"
 
-/* Largest number of vertices whose distance is searched, and number of golden-section steps. */
+/* Largest number of vertices whose distance is measured, and number of golden-section steps. */
 enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24 };
 
-static const double search_span = 0.5; /* half-width of the search, in shares of a full breath */
+static const double search_span = 0.5;           /* half-width of the search for scales up to 1 */
 static const double golden = 0.6180339887498949; /* (sqrt(5) - 1) / 2 */
-static const double same_posture = 1e-9;         /* largest difference of equal unit vectors */
+static const double same_posture = 1e-9;         /* difference of components that counts as equal */
 
 void supine_command_subject_free(supine_command_subject *subject) {
   supine_basis_close(subject->basis);
@@ -36,7 +36,7 @@ static bool same_direction(const double a[3], const double b[3]) {
   return off < same_posture;
 }
 
-/* Compute the surface in a pose, [N, 3], which the caller frees. */
+/* Compute the positions in a pose, [N, 3], which the caller frees. */
 static supine_status deform(const supine_basis *basis, const supine_pose *pose, double **positions,
                             supine_error *error) {
   *positions = supine_options_basis_positions(basis, pose);
@@ -46,7 +46,7 @@ static supine_status deform(const supine_basis *basis, const supine_pose *pose, 
                                 supine_basis_get_info(basis)->vertex_count);
 }
 
-/* Compute the volume of all lungs in a pose, mL. */
+/* Return the volume of all lungs in a pose, mL. */
 static double held(const supine_basis *basis, const supine_pose *pose) {
   double volumes[SUPINE_LUNGS_MAX];
   double sum = 0.0;
@@ -68,7 +68,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   if (s->from.posture[0] == '\0') {
     s->from.state = supine_basis_scan(s->basis);
   }
-  /* Where rest is unknown, a posture without a volume means the scan. */
+  /* If rest is unknown, a posture without a volume gets the volume of the scan. */
   if (s->from.state.volume.kind == SUPINE_VOLUME_DEFAULT &&
       !supine_basis_get_info(s->basis)->has_rest) {
     s->from.state.volume.kind = SUPINE_VOLUME_SCAN;
@@ -86,7 +86,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   return status;
 }
 
-/* Compute the gains for the volume of the state: as given, else that of its surface. */
+/* Compute the gains for the volume of a state, or for that of its surface if none was given. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
@@ -127,12 +127,12 @@ static supine_status predict_surface(const supine_command_subject *s,
 
 typedef struct search {
   const supine_inside_surface *tree;
-  size_t vertices, count; /* vertices of the mesh, and how many of them are searched */
-  double *distance;       /* [count] */
+  size_t vertices, count; /* number of vertices, and number of those measured */
+  double *distance;       /* [count] distances to the surface, mm */
 } search;
 
-/* Compute the RMS distance, mm, from predicted vertices to the surface at a scale; all gains keep
- * their proportion. */
+/* Compute the RMS distance, mm, from the vertices to the surface if all gains are changed in
+ * proportion, so that the first is `scale`. */
 static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale,
                                  const search *look, double *rms, supine_error *error) {
@@ -162,7 +162,7 @@ static supine_status distance_at(const supine_command_subject *s,
   return SUPINE_OK;
 }
 
-/* Find the scale that comes nearest to the surface, by golden section about the predicted one. */
+/* Find the scale with the least distance to the surface, by golden-section search. */
 static supine_status find_best(const supine_command_subject *s, const supine_mesh *mesh,
                                supine_command_outcome *outcome, supine_error *error) {
   const size_t n = s->rest.vertex_count;
@@ -226,7 +226,7 @@ void supine_command_find_line(supine_command_subject *subject) {
   s->line_off = most > 0.0 ? off / most : 0.0;
 }
 
-/* Move points inside by biharmonic interpolation of the surface's displacement. */
+/* Predict points inside by biharmonic interpolation of the surface's displacement, mm. */
 static supine_status predict_points(const supine_command_subject *s, size_t which,
                                     const supine_patient_pairs *pairs, double *predicted,
                                     supine_error *error) {
@@ -270,8 +270,8 @@ static supine_status check_points(const supine_command_subject *s,
   return 2 * outside <= pairs->count
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%zu of %zu landmarks lie outside the basis's bounding box: "
-                                "check their frame, unit and person, or give --reverse",
+                                "%zu of %zu landmarks lie outside the basis's bounding box: check "
+                                "their frame, unit and person, or give --reverse",
                                 outside, pairs->count);
 }
 
@@ -319,8 +319,7 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   if (status == SUPINE_OK && landmarks != NULL) {
     status = validate_points(s, i, landmarks, reverse, error);
   }
-  if (status == SUPINE_OK &&
-      state->path != NULL) { /* this also moves the prediction by the fitted motion */
+  if (status == SUPINE_OK && state->path != NULL) { /* also changes outcome->predicted */
     status = supine_command_compare_surfaces(&s->rest, s->moved, outcome->predicted, &lungs.mesh,
                                              outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;

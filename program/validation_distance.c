@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the distances of a prediction, and of fitted maps, to another state of the same lungs. */
+/* Compute the distances of a prediction and of fitted maps from another state of the same lungs. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +17,7 @@ const char *const supine_command_map_names[SUPINE_PATIENT_MAP_COUNT] = {"predict
 
 enum { ROUNDS = 20, FITTED_MAX = 2000 };
 
-/* RMS motion, mm, below which nothing moved: landmarks and surfaces are less precise. */
+/* Smallest RMS motion that counts as motion, mm; landmarks and surfaces are less precise. */
 static const double still = 0.05;
 
 static void summarise(double *distances, size_t count, supine_command_distance *of) {
@@ -38,7 +38,7 @@ static void explain(supine_patient_scan_motion moved,
   }
 }
 
-/* Choose the map to fit: for the prediction, the one that removes the motion between the scans. */
+/* Choose the map to fit; for the prediction, that of the motion between the scans. */
 static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID
@@ -77,9 +77,7 @@ supine_status supine_command_compare_points(
   return SUPINE_OK;
 }
 
-/* --- surfaces -------------------------------------------------------------------------------- */
-
-/* Summarise the distances of the vertices of each surface to the other, taken together. */
+/* Summarise the distances in both directions, from the vertices of each surface to the other. */
 static supine_status surface_distance(const supine_mesh *rest, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
@@ -101,9 +99,10 @@ static supine_status surface_distance(const supine_mesh *rest, const double *mov
   return status;
 }
 
-/* Fit the map of a kind to surfaces by iterated nearest points; write all n mapped vertices. */
-static bool settle(supine_patient_map kind, size_t n, const double *vertices,
-                   const supine_inside_surface *tree, double *space, double *moved) {
+/* Fit a map of vertices to a surface by iterated nearest points, and apply it to all n vertices;
+ * return false if it is not determined. `space` has memory for 10 FITTED_MAX numbers. */
+static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
+                    const supine_inside_surface *tree, double *space, double *moved) {
   const size_t count = n < FITTED_MAX ? n : FITTED_MAX;
   double *from = space;
   double *at = from + 3 * count;
@@ -150,7 +149,7 @@ supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_scan_mot
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
     status =
-        settle(map_of(k, moved), n, own ? predicted : rest->vertices, tree, space, at)
+        fit_map(map_of(k, moved), n, own ? predicted : rest->vertices, tree, space, at)
             ? surface_distance(rest, at, state, tree, own ? nearest : NULL, &distance[k], error)
             : undetermined(error);
     if (own && status == SUPINE_OK) {

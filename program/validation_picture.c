@@ -8,11 +8,11 @@
 
 #include "program/render/render.h"
 
-/* Least upper end of the colour scale, mm. */
+/* Smallest upper end of the colour scale, mm. */
 static const double end_least = 1.0;
 
-/* Compute the distance of each predicted vertex from the state's surface, mm, and raise the largest
- * distance and the largest 95th percentile of all states. */
+/* Compute the distance of each predicted vertex from the scanned surface, mm. Update *largest, the
+ * largest distance, and *end, the largest 95th percentile, over the states so far. */
 static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
                         float *value, double *largest, double *end) {
   for (size_t i = 0; i < s->rest.vertex_count; ++i) {

@@ -148,7 +148,7 @@ TEST(test_nrrd_bad_files_refused) {
        "more than"},
       {"dimension: 4\nspace: LPS\nsizes: 1 1 1 4\nspace directions: none (1,0,0) (0,1,0) "
        "(0,0,1)\nspace origin: (0,0,0)\n",
-       "4 axes"},
+       "dimension 4"},
       {"dimension: 3\nsizes: 1 2 2\nspacings: 1 1 1\n", "directions"},
       {"dimension: 3\nspace: LAS\nsizes: 1 2 2\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace "
        "origin: (0,0,0)\n",
@@ -186,7 +186,7 @@ TEST(test_nifti_bad_files_refused) {
     size_t count;
     const char *said;
   } bad[] = {{40, {3, 32767, 32767, 32767, 1}, 5, "more than"},
-             {40, {4, 5, 4, 1, 3}, 5, "4 axes"},
+             {40, {4, 5, 4, 1, 3}, 5, "ndim is 4"},
              {254, {0}, 1, "orientation"},
              {70, {32}, 1, "COMPLEX"},
              {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* the first row of the matrix is 0 */

@@ -146,7 +146,7 @@ near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json)
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
 "$supine" fit p_supine_rest.ply p_supine_full.ply --other supine:full \
   --state prone:rest:p_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
-grep -q 'gain from.*other postures do not' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
+grep -q 'source of the gain.*other postures do not' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
 
 # A stiff region is recovered, and a basis with it reaches the other state.
 "$supine" phantom -o rest.ply --vertices 400 >/dev/null || fail phantom
@@ -251,7 +251,7 @@ refused 1 'make a basis from it first' validate points.json --landmarks full.csv
 refused 1 'landmarks do not give it' validate points.safetensors --landmarks full.csv
 refused 1 'nothing to fit to' fit rest.ply
 refused 1 'more than two scans' fit rest.ply rest.ply rest.ply
-refused 1 'name that of the first scan' fit --landmarks full.csv --state prone:rest:half.ply
+refused 1 'name the surface of the first scan' fit --landmarks full.csv --state prone:rest:half.ply
 refused 1 'rest+500' fit --landmarks full.csv --other supine:500
 refused 2 'exchange --rest and --other' fit p_supine_full.ply p_supine_rest.ply --other supine:full
 refused 2 'exchange --rest and --other' fit --landmarks empty.csv --other supine:full

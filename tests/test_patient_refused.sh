@@ -123,7 +123,7 @@ sed '5s/[-0-9.e]*$/nan/' state.obj >broken.obj
 refused 2 'broken.obj' rest.obj broken.obj
 refused 2 'No such file' rest.obj absent.obj
 refused 2 'give each lung once' rest.obj,rest.obj state.obj
-refused 1 'more than two lungs' rest.obj,other.obj,state.obj state.obj
+refused 1 'more than two surfaces' rest.obj,other.obj,state.obj state.obj
 refused 1 'nothing to fit to' --state prone:state.obj
 refused 2 'faces the same way on the surface of the other state' rest.obj state.obj --state prone:far.obj
 refused 2 'mm apart' --landmarks apart.csv rest.obj state.obj

@@ -148,11 +148,11 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
   }
   (void)json_object_set_new(group_of(root, "force"), "gain_from",
                             json_string(record->gain_undetermined
-                                            ? "the law deep: the states in other postures do not "
+                                            ? "the deep law: the states in other postures do not "
                                               "determine it"
                                         : record->gain_error > 0.0
                                             ? "the states in other postures"
-                                            : "the law deep: scans in one posture do not determine "
+                                            : "the deep law: scans in one posture do not determine "
                                               "it; give --state in another posture"));
   return root;
 }

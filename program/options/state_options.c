@@ -127,7 +127,7 @@ const supine_option supine_options_volume[] = {
 
 const supine_option supine_options_from[] = {
     {"from", 0, "STATE",
-     "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME, as "
+     "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME, such as "
      "supine:rest or scan; default: the scan, or supine:rest where a command compares "
      "postures",
      SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from},

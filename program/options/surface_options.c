@@ -28,7 +28,7 @@ const supine_option supine_options_surface_frame[] = {
      "R, P or A, S or I): LPS in DICOM, RAS in 3D Slicer and nibabel. ITK names the opposite "
      "directions: its RAI is LPS here. Default: the axes that the file states, else LPS",
      SUPINE_FILLS(supine_mesh_load_options, axes), .read = read_axes,
-     .wants = "three letters, one each of L or R, P or A, S or I, as LPS"},
+     .wants = "three letters, one each of L or R, P or A, S or I, such as LPS"},
     {"units", 0, "UNIT",
      "unit of the files: mm, cm, m, um, in, or a number of millimetres; default mm",
      SUPINE_FILLS(supine_mesh_load_options, millimetres_per_unit), .read = read_units,
@@ -41,8 +41,8 @@ const supine_option supine_options_landmarks[] = {
     {"landmarks", 0, "FILE",
      "matched points, in mm and LPS: CSV with the columns x,y,z,to_x,to_y,to_z (first state, "
      "other state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled; "
-     "motion is from 2 to 1). Where several states are given, the points belong to the "
-     "first",
+     "the motion is from image 2 to image 1). If there are several states, the points belong to "
+     "the first",
      FILLS(path), .file = SUPINE_FILE_IN},
     {"reverse", 0, NULL, "exchange the two states of the landmarks", FILLS(reverse)},
     {"translation", 0, NULL, "also fit a translation between the frames of the scans",
