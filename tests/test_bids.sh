@@ -22,7 +22,7 @@ head -c 3000 data/sub-03/anat/*.ply >cut && mv cut data/sub-03/anat/sub-03_desc-
 mkdir data/sub-04
 
 python3 "$cohort/bids.py" data out group >said 2>&1 && fail "the group level succeeds without participants"
-grep -q 'run participant first' said || fail "$(cat said)"
+grep -q "run the level 'participant' first" said || fail "$(cat said)"
 python3 "$cohort/bids.py" data out participant --participant_label 02 -- --band 2 >said 2>&1 ||
   fail "one participant: $(cat said)"
 [ "$(ls out)" = "dataset_description.json

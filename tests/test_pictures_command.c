@@ -195,7 +195,7 @@ TEST(test_compare_misuse_usage_error) {
 TEST(test_render_misuse_usage_error) {
   EXPECT(1, ".png", "render lungs.safetensors --posture prone");
   EXPECT(1, ".png", "render lungs.safetensors --posture prone -o lung.gif");
-  EXPECT(1, "which posture", "render lungs.safetensors -o lung.png");
+  EXPECT(1, "the posture is missing", "render lungs.safetensors -o lung.png");
   EXPECT(1, "did you mean 'posterior'", "render lungs.safetensors --view posteror -o a.png");
   EXPECT(1, "WIDTHxHEIGHT", "render lungs.safetensors --size 100 -o a.png");
   EXPECT(1, "WIDTHxHEIGHT", "render lungs.safetensors --size 0x100 -o a.png");
