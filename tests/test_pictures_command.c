@@ -205,7 +205,7 @@ TEST(test_render_misuse_usage_error) {
       "render lungs.safetensors --posture left,left,left,left,left,left,left,left,left -o a.png");
   EXPECT(2, "surface is open", "render " OPEN " --posture left -o a.png");
   EXPECT(2, "nothere", "render nothere.safetensors --posture left -o a.png");
-  EXPECT(1, ".webp", "render lungs.safetensors --posture left -o a.webp");
+  EXPECT(1, "writes a still picture", "render lungs.safetensors --posture left -o a.webp");
   EXPECT(1, ".webp", "render lungs.safetensors --turn supine:left:1s -o a.png");
   EXPECT(1, "not both", "render lungs.safetensors --turn supine:left:1s --posture left -o a.webp");
   EXPECT(1, "FROM:TO:SECONDS", "render lungs.safetensors --turn supine:left -o a.webp");

@@ -334,7 +334,7 @@ TEST(test_doubt_implausible_volume_names_option) {
     double rest;        /* volume at rest supine given by --resting, mL; 0 if not given */
     const char *doubts; /* expected text; NULL if nothing is doubted */
   } known[] = {{"full", 3000.0, 0.0, NULL},
-               {"full", 1700.0, 0.0, "--scanned supine:rest"},
+               {"full", 1700.0, 0.0, "--scanned, such as supine:rest"},
                {"supine:rest", 5100.0, 0.0, "--scanned full"},
                {"supine:rest", 3000.0, 2400.0, "but --resting and --scanned say 2400 mL"},
                {"supine:rest", 3000.0, 2600.0, NULL},
