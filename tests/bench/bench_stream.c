@@ -5,7 +5,8 @@
  *     bench_stream SUPINE BASIS [SECONDS [WHAT...]]
  *
  * This program sends 66.66 poses a second, as a tracker does, to a server on the same machine, and
- * receives weights, points or surfaces (WHAT). Print one row for each:
+ * receives weights, points or surfaces (WHAT). Print one row for each, and below it one for a bare
+ * server that sends messages of the same size without any computation:
  * - number of poses sent, and of poses answered by a frame
  * - "old": number of frames of a pose that was no longer the newest when their last byte arrived
  * - "oldest": largest number of poses sent since the pose of a frame
@@ -32,6 +33,8 @@
 #include "sh/base/clock.h"
 
 static const double interval = 1.0 / 66.66; /* time between poses, s */
+
+enum { POSE_SIZE = SUPINE_STREAM_HEADER + 48 };
 
 static int fail(const char *what) {
   perror(what);
@@ -62,6 +65,39 @@ static int serve(const char *supine, const char *basis, const char *what, pid_t 
     (void)sscanf(line, "listening on port %d", &port);
   }
   return port;
+}
+
+/* Start a server that answers each pose by a message of `size` bytes without any computation, the
+ * least time that a frame of this size can take; return its port, or 0 on failure. */
+static int serve_bare(size_t size, pid_t *server) {
+  struct sockaddr_in here = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+  socklen_t length = sizeof here;
+  unsigned char pose[POSE_SIZE];
+  unsigned char *message = calloc(size, 1);
+  const int listener = socket(AF_INET, SOCK_STREAM, 0);
+  if (message == NULL || bind(listener, (struct sockaddr *)&here, sizeof here) != 0 ||
+      listen(listener, 1) != 0 || getsockname(listener, (struct sockaddr *)&here, &length) != 0) {
+    return 0;
+  }
+  *server = fork();
+  if (*server == 0) {
+    const int s = accept(listener, NULL, NULL);
+    while (recv(s, pose, sizeof pose, MSG_WAITALL) == (ssize_t)sizeof pose) {
+      supine_stream_header header;
+      supine_error error;
+      (void)supine_stream_header_read(pose, &header, &error);
+      header.size = size - SUPINE_STREAM_HEADER;
+      supine_stream_header_write(&header, message);
+      for (size_t sent = 0; sent < size;) {
+        const ssize_t n = send(s, message + sent, size - sent, MSG_NOSIGNAL);
+        sent = n > 0 ? sent + (size_t)n : size;
+      }
+    }
+    _exit(0);
+  }
+  (void)close(listener);
+  free(message);
+  return ntohs(here.sin_port);
 }
 
 /* Return the resident memory of a process in KiB, -1 if it is unknown. */
@@ -95,7 +131,7 @@ static int dial(int port) {
 
 /* Write the message of the pose at `time` s, of a body that turns about its long axis twice a
  * minute. */
-static void make_pose(double time, uint64_t stamp, unsigned char bytes[SUPINE_STREAM_HEADER + 48]) {
+static void make_pose(double time, uint64_t stamp, unsigned char bytes[POSE_SIZE]) {
   const double angle = time * (2.0 * M_PI / 30.0);
   /* The columns of the rotation: the directions of left, back and head. */
   float columns[12] = {
@@ -164,11 +200,15 @@ static bool take(int s, tally *t) {
   }
 }
 
-static int measure(const char *supine, const char *basis, const char *what, double seconds) {
+/* Measure one kind of frame, and set `size` to the size of its message. If `size` is not 0, measure
+ * messages of that size by the server without computation instead. */
+static int measure(const char *supine, const char *basis, const char *what, double seconds,
+                   size_t *size) {
   pid_t server = 0;
   FILE *lines = NULL;
   char line[256];
-  const int port = serve(supine, basis, what, &server, &lines);
+  const int port =
+      *size > 0 ? serve_bare(*size, &server) : serve(supine, basis, what, &server, &lines);
   const int s = port == 0 ? -1 : dial(port);
   const size_t count = (size_t)(seconds / interval);
   tally t = {.sent = calloc(count, sizeof(double)),
@@ -184,7 +224,7 @@ static int measure(const char *supine, const char *basis, const char *what, doub
     const double now = supine_clock_seconds();
     const double due = begun + interval * (double)t.poses;
     if (now >= due) {
-      unsigned char pose[SUPINE_STREAM_HEADER + 48];
+      unsigned char pose[POSE_SIZE];
       make_pose(now - begun, t.poses + 1, pose);
       t.sent[t.poses++] = supine_clock_seconds();
       alive = send(s, pose, sizeof pose, MSG_NOSIGNAL) == (ssize_t)sizeof pose;
@@ -217,7 +257,10 @@ static int measure(const char *supine, const char *basis, const char *what, doub
     }
   }
   (void)waitpid(server, NULL, 0);
-  (void)fclose(lines);
+  if (lines != NULL) {
+    (void)fclose(lines);
+  }
+  *size = SUPINE_STREAM_HEADER + (size_t)t.header.size;
   (void)fflush(stdout);
   free(t.sent);
   free(t.latency);
@@ -237,7 +280,9 @@ int main(int count, char **word) {
       "what        poses answered    old oldest  median ms    99 %% ms   worst ms  KiB 1 s "
       "   KiB end\n");
   for (int i = 0; i < kinds; ++i) {
-    if (measure(word[1], word[2], what[i], seconds) != 0) {
+    size_t size = 0;
+    if (measure(word[1], word[2], what[i], seconds, &size) != 0 ||
+        measure(word[1], word[2], "bare", seconds, &size) != 0) {
       return 1;
     }
   }
