@@ -142,8 +142,8 @@ static supine_status check_rest(const supine_compression *compression,
     if (supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner) != SUPINE_OK) {
       return supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
-          "with gravity along %g,%g,%g the lungs cannot rest %.0f mL below full inflation: %s; "
-          "give --resting, or take the scan as it is with --scanned none",
+          "with gravity along %g,%g,%g the volume at rest cannot be %.0f mL below full inflation: "
+          "%s; give --resting, or take the scan as it is with --scanned none",
           g[0], g[1], g[2], -volume[lung], inner.message);
     }
   }

@@ -260,9 +260,10 @@ const supine_command supine_command_embed = {
     .about = "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json of "
              "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
              "nodules), the parts of a label map, or the nodes of a regular grid or of the voxels "
-             "of an image (.nrrd, .nii, .nii.gz). Every command that reads a basis reads this file "
-             "too.\n\nDisplacements inside are interpolated from those of each lung's surface by "
-             "biharmonic splines, which are exact on the surface and for affine motion.",
+             "of an image (.nrrd, .nii, .nii.gz). 'supine deform', 'breathe', 'compare', 'info' "
+             "and 'stream' read the file like any basis; 'render' and 'export' show it with "
+             "--inside.\n\nDisplacements inside are interpolated from those of each lung's surface "
+             "by biharmonic splines, which are exact on the surface and for affine motion.",
     .options = table,
     .notes = "Examples:\n"
              "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"

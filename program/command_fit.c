@@ -92,11 +92,10 @@ static const supine_option table[] = {
      "name of the person; default: the name of the file of landmarks, or of the second surface",
      FILLS(name), .more = true},
     {"state", 0, "STATE:FILE",
-     "further state, and its surface or landmarks from the first scan (.csv); may be repeated, up "
-     "to 8 times. A state in a posture other than those of the scans determines the part of the "
-     "force that depends on gravity (the gain); for other states only the size of the displacement "
-     "is fitted. "
-     "The other constants are fitted to the two scans alone",
+     "further state with its surface, or with landmarks (.csv) that lead to it from the first "
+     "scan; may be repeated, up to 8 times. A state in a posture other than those of the scans "
+     "determines the part of the force that depends on gravity (the gain); for other states only "
+     "the size of the displacement is fitted. All other constants come from the two scans",
      .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
@@ -450,9 +449,10 @@ const supine_command supine_command_fit = {
         "Residuals are given for no motion, a translation, an affine map, the law, and the law "
         "corrected by kriging. Held-out residuals are from cross-validation: 5 folds of blocks of "
         "40 mm, repeated 3 times. A small distance between surfaces does not prove that the motion "
-        "inside is right: points erred by 14 mm where surfaces were 5 mm apart. The applied force "
-        "is found from the displacement by the inverse of the operator; its residual is what (18) "
-        "of Santhanam 2008 does not explain.\n"
+        "inside is right: points inside have been 14 mm off where the surfaces were 5 mm apart. "
+        "The applied force is computed from the displacement by the inverse of the elastic "
+        "operator; its residual is the part that equation (18) of Santhanam 2008 does not "
+        "explain.\n"
         "\n"
         "Examples:\n"
         "  supine fit --landmarks pairs.csv --translation --rest supine:rest --other supine:full "

@@ -39,12 +39,13 @@ static const supine_option table[] = {
      .more = true},
     {"modes", 0, "K|harmonics",
      "functions of orientation, each of which costs a multiplication per vertex at run time: the "
-     "best K (or fewer, if fewer describe the displacement), or all (L+1)^2 harmonics up to band "
-     "L. Santhanam 2008 used --band 3 --modes harmonics",
+     "best K (or fewer, if fewer describe the displacement), or all (L+1)^2 harmonics up to band L "
+     "(Santhanam 2008 used --band 3 --modes harmonics)",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
      .wants = "1 to 64 or 'harmonics'", .more = true},
     {"held-out", 0, "N",
-     "number of held-out directions on which the error is measured; default: 100 to 1000",
+     "number of held-out directions on which the error is measured; default: 1000, or fewer (at "
+     "least 100) for more than 20000 vertices",
      SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
      "model of the patient, made by 'supine fit', to use instead of --law and its constants",
@@ -54,8 +55,7 @@ static const supine_option table[] = {
     {"fields", 0, "FILE",
      "safetensors file with the tensors gravity [M,3], M directions, and displacement [M,N,3], the "
      "displacement of each of N vertices for each direction, in mm. MESH is the reference surface. "
-     "Without "
-     "--band, cross-validation chooses the band among those that the directions determine",
+     "Without --band, cross-validation chooses the band among those that the directions determine",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};

@@ -140,7 +140,7 @@ const supine_command supine_command_pv = {
              "or prints a relation.\n"
              "\nfit determines the five control parameters of each limb, their confidence "
              "intervals, and the residual of the samples (RMS, in mL and as a percentage of the "
-             "range of volumes; below 1 % for Venegas' and Salazar-Knowles' curves).\n"
+             "range of volumes; below 1 % for samples of Venegas' or Salazar-Knowles' curve).\n"
              "\n"
              "show prints volume and compliance against pressure as CSV; without FILE, those of "
              "the built-in normal adult lung.\n"
@@ -154,8 +154,8 @@ const supine_command supine_command_pv = {
              "      30,5980,exhale\n"
              "\nWithout the column limb all samples are of the inhale limb. A limb needs at least "
              "8 samples, or 20 where their noise is 1 % of the range of volumes; a limb without "
-             "samples takes the other's curve. Volumes may be absolute or above any reference: "
-             "breathing uses only differences.",
+             "samples takes the curve of the other limb. Volumes may be absolute or relative to "
+             "any reference, as breathing uses only differences.",
     .options = table,
     .notes =
         "Each limb has its own model: V'' = u V', where V is the volume as a function of the "

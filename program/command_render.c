@@ -390,7 +390,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_render = {
     name,
-    "draw the lungs: postures side by side, or a turn that plays",
+    "draw the lungs: postures side by side, or an animated turn",
     .usage = "BASIS --posture NAME[,NAME...] -o lung.png [OPTIONS]\n"
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
     .about = "Draws the lungs in each posture, side by side; no display is needed. Colours show "

@@ -27,8 +27,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
-     ". Default if rest is unknown: gain 1, so that a vertex moves by F d, "
-     "where F is the force that it keeps and d its direction of displacement, in mm",
+     ". Default: rest; if rest is unknown, gain 1: each vertex moves by F d, in mm, where F is the "
+     "force on it after spreading, and d its direction of displacement",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"unit-force", 0, "VERTEX",
      "instead of a posture: write a CSV file of the response of every vertex to a unit force on "
@@ -175,7 +175,7 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
   supine_status status = SUPINE_OK;
   if (model->reach > 0.0 || model->lesions != NULL) {
     status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--pitcher-catcher computes the transfer over links, without "
+                              "--pitcher-catcher spreads forces over links of the mesh, without "
                               "lesions: give --law paper and leave --reach and --lesion out");
   } else if (force == NULL || caught == NULL ||
              supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) !=

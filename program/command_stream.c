@@ -56,7 +56,8 @@ static const supine_option table[] = {
      "if the marker's axes are right, front, head",
      SUPINE_FILLS(request, body), .standard = "1,0,0,0", .more = true},
     {"smooth", 0, "MS",
-     "time constant of smoothing, for a noisy tracker; it delays a turn by this time",
+     "time constant of smoothing, in ms, for a noisy tracker; it delays a turn by this time; "
+     "default 0",
      SUPINE_FILLS(request, smooth), .range = {0.0, 10000.0}, .wants = "0 to 10000 ms",
      .more = true},
     {.help = "Observed points inside the lungs, as in 'supine locate':"},
@@ -83,10 +84,10 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
-     "what a peer receives until it asks for something else: weights, an NDARRAY of the K weights "
-     "and the three gains of each lung; surface, a POLYDATA of points and triangle strips; points, "
-     "a POLYDATA whose triangles are sent once. A peer asks with a STRING of device SEND that "
-     "holds one of these words",
+     "what a peer receives until it asks for something else (by a STRING of device SEND that holds "
+     "one of these words): weights, an NDARRAY of the K weights and the three gains of each lung; "
+     "surface, a POLYDATA of points and triangle strips; points, a "
+     "POLYDATA whose triangles are sent once",
      SUPINE_FILLS(request, options.content), .choices = supine_stream_content_names,
      .standard = "weights"},
     {"space", 0, "NAME", "axes of the points: lps (left, back, head), or ras as in 3D Slicer",

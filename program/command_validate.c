@@ -66,8 +66,8 @@ static const supine_option table[] = {
      "scan",
      FILLS(from), .read = read_posture, .wants = "a state, such as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
-     "state of the second landmarks, without --state. With --state, the default for states without "
-     "a posture or a volume: supine, and the volume of the surface",
+     "without --state: state of the second landmarks. With --state: posture and volume of states "
+     "that name none; default: supine, and the volume of the surface",
      FILLS(to), .read = read_posture, .wants = "a state, such as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
@@ -236,11 +236,12 @@ const supine_command supine_command_validate = {
         "distance. The translation and the affine map are fitted to the other state. 'explained' "
         "is 1 minus the ratio of the squared distances with and without the motion. A small "
         "distance between surfaces does not prove that the motion inside is right; landmarks "
-        "measure that. Santhanam 2008 found surfaces within 2 mm, and constants within 1 %.\n"
+        "measure that. Santhanam 2008 reported surfaces 2 mm apart, and constants recovered within "
+        "1 %.\n"
         "With several states, the displacement is also scaled to come nearest to each surface. For "
-        "states in the posture of the first, a straight line through the start of motion is fitted "
-        "to scale over volume; the largest deviation from it is given in percent of the largest "
-        "scale.\n"
+        "states in the same posture as the first state, a straight line through the start of "
+        "motion is fitted to these scales over volume; the largest deviation from the line is "
+        "given in percent of the largest scale.\n"
         "\n"
         "Examples:\n"
         "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"

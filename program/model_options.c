@@ -102,10 +102,11 @@ static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
 /* Parts of help texts: the laws, and the constants of each law. */
 #define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
-#define LAW_BASE(id, name, base, ...) " " name " " #base
-#define LAW_GAIN(id, name, base, gain, ...) " " name " " #gain
-#define LAW_BOX(id, name, base, gain, box, ...) " " name " " #box
-#define LAW_CONSTANTS(id, name, base, gain, box, constants, ...) " " name " " #constants
+#define LAW_BASE(id, name, base, ...) "; default for " name ": " #base
+#define LAW_GAIN(id, name, base, gain, ...) "; default for " name ": " #gain
+#define LAW_BOX(id, name, base, gain, box, ...) "; default for " name ": " #box
+#define LAW_CONSTANTS(id, name, base, gain, box, constants, ...)                                   \
+  "; default for " name ": " #constants
 
 #define FILLS(member) SUPINE_FILLS(supine_model_options, member)
 
@@ -146,11 +147,11 @@ const supine_option supine_command_model_options[] = {
     {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
      FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
     {"resting", 0, "LIST",
-     "volume at rest (FRC) in each posture that is known for the patient: POSTURE=2600mL, gas and "
-     "tissue of both lungs, as measured in a CT at rest; POSTURE=0.43, a share of the volume at "
-     "full inflation; or POSTURE=0.42/0.44, shares for the left and the right lung. Other postures "
-     "keep their proportion to those named. A lung-function test gives the gas alone, seated: add "
-     "about 0.9 L of tissue, and give the sum as upright. Default, from healthy people: supine "
+     "patient's volume at rest (FRC), for one posture or several: POSTURE=2600mL, gas and tissue "
+     "of both lungs, as measured in a CT at rest; POSTURE=0.43, a share of the volume at full "
+     "inflation; or POSTURE=0.42/0.44, shares for the left and the right lung. Other postures keep "
+     "their proportion to those named. A lung-function test gives the gas alone, seated: add about "
+     "0.9 L of tissue, and give the sum as upright. Default, from healthy people: supine "
      "0.418/0.440, prone 0.464/0.475, left 0.413/0.546, right 0.563/0.435, upright 0.481/0.506, "
      "inverted as supine",
      FILLS(choice), .read = read_resting, .wants = "POSTURE=2600mL or POSTURE=SHARE,..."},
@@ -164,12 +165,9 @@ const supine_option supine_command_model_options[] = {
              "gravity (0 uppermost, 1 lowermost); X, Y, Z are its coordinates in the bounding box "
              "(0 to 1, from the midline outwards, from the back, from the apex):",
      .more = true},
-    {"base", 0, "B", "base; default by law:" SUPINE_LAWS(LAW_BASE), FILLS(choice.model.force.base),
-     .more = true},
-    {"gain", 0, "G", "default:" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain),
-     .more = true},
-    {"box-force", 0, "X,Y,Z",
-     "cx, cy and cz, fixed to the body; default by law:" SUPINE_LAWS(LAW_BOX),
+    {"base", 0, "B", "base" SUPINE_LAWS(LAW_BASE), FILLS(choice.model.force.base), .more = true},
+    {"gain", 0, "G", "gain" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain), .more = true},
+    {"box-force", 0, "X,Y,Z", "cx, cy and cz, fixed to the body" SUPINE_LAWS(LAW_BOX),
      FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
     {"soften", 0, "S",
      "make dependent tissue more expandable: its expandability is multiplied by exp(S (h - mean "
@@ -177,10 +175,10 @@ const supine_option supine_command_model_options[] = {
      FILLS(choice.model.force.soften), .more = true},
     {.help = "Direction of displacement:", .more = true},
     {"constants", 0, "C1,...,C6",
-     "constants of the box model; default by law:" SUPINE_LAWS(
-         LAW_CONSTANTS) ". Those of paper are fitted to the landmarks of ten 4-D CTs (DIR-Lab), as "
-                        "the original constants are lost; those of deep to ten full breaths "
-                        "(DIR-Lab COPDgene)",
+     "constants of the box model" SUPINE_LAWS(
+         LAW_CONSTANTS) ". The constants for paper are fitted to landmarks in ten 4-D CTs "
+                        "(DIR-Lab), as the original ones are lost; the constants for deep are "
+                        "fitted to landmarks in ten full breaths (DIR-Lab COPDgene)",
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
     {.help = "Tissue. Expandability a is the inverse of stiffness, E = 1/a. Only ratios between "
              "the parts of the lungs count: doubling every a changes nothing."},
@@ -195,9 +193,9 @@ const supine_option supine_command_model_options[] = {
               "above 0, or a file",
      .more = true},
     {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
-     "lesion at X,Y,Z (mm, LPS): E is multiplied by FACTOR within half of RADIUS (mm); farther out "
-     "the factor changes to 1 at RADIUS. A FACTOR above 1 stiffens the tissue, which then moves "
-     "less. May be repeated, up to 64 times",
+     "lesion at X,Y,Z (mm, LPS): E is multiplied by FACTOR within half of RADIUS (mm); from there "
+     "to RADIUS the multiplier changes smoothly to 1. A FACTOR above 1 stiffens the tissue, which "
+     "then moves less. May be repeated, up to 64 times",
      FILLS(choice), .read = read_lesion,
      .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",

@@ -275,8 +275,8 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   }
   status = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak);
   if (status != SUPINE_OK) {
-    return supine_error_set(error, status, "no pressure found for %g mL: check the inhale limb",
-                            full);
+    return supine_error_set(error, status,
+                            "the inhale limb has no pressure for %g mL: check its curve", full);
   }
   status = limb_holds(pv, "peak", cycle->peak, error);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
@@ -309,8 +309,11 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
     *volume = breath->tidal * share;
     const supine_status status =
         limb_pressure(here, between(low + share * cycle->gain[of], low, high), pressure);
-    return status == SUPINE_OK ? status
-                               : supine_error_set(error, status, "no pressure found at %g s", time);
+    return status == SUPINE_OK
+               ? status
+               : supine_error_set(
+                     error, status,
+                     "at %g s the limb has no pressure for this volume: check its curve", time);
   }
   if (breath->course == SUPINE_PV_COSINE) {
     share = 0.5 - 0.5 * cos(pi * share);
@@ -327,7 +330,8 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
   supine_status status = breath_check(breath, error);
   for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
     if (!isfinite(times[j])) {
-      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT, "time %zu is not finite", j);
+      status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                                "time %zu is not finite: give a time in s", j);
     }
   }
   if (status != SUPINE_OK || count == 0) {

@@ -211,7 +211,8 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   memcpy(factor, a, sizeof a);
   if (!supine_kriging_factor(TERMS, factor) || !determined(a, factor)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a rotation needs three points that are not on one line");
+                            "a rotation needs three points that are not on one line: add points, "
+                            "or fit only a translation");
   }
   solve_terms(fit, options, factor, right);
   find_weights(fit);

@@ -100,8 +100,8 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
   }
   if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2]) || c[0] == 0) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "a change of the reference surface's volume by %g mL is out of "
-                            "reach: no gain changes the volume in this posture; choose another",
+                            "a change of the reference surface's volume by %g mL is out of reach: "
+                            "no gain changes the volume in this posture; choose another posture",
                             volume);
   }
   const double side = volume / c[0] > 0 ? 1 : -1;
@@ -121,10 +121,11 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     }
     far *= 2;
     if (!isfinite(far)) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a change of the reference surface's volume by %g mL is out of "
-                              "reach: no gain changes the volume in this posture; choose another",
-                              volume);
+      return supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "a change of the reference surface's volume by %g mL is out of reach: "
+          "no gain changes the volume in this posture; choose another posture",
+          volume);
     }
   }
   *scale = side > 0 ? cubic_solve(c, volume, 0, far) : cubic_solve(c, volume, far, 0);

@@ -191,8 +191,7 @@ static supine_status check(const char *path, const supine_image *image, const la
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
           "%s: no voxel has a label that --labels gives the %s lung; the labels "
-          "present are %s: correct --labels, or name only one lung: --labels "
-          "%s=1+2",
+          "present are %s: correct --labels, or name only one lung: --labels %s=1+2",
           path, names[s], present, names[1 - s]);
     }
   }

@@ -82,8 +82,8 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
   for (size_t i = 0; i < 3 * info->vertex_count && status == SUPINE_OK; ++i) {
     if (!isfinite(scanned[i])) {
       status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                "the basis cannot reach the scan's volume: make a new basis, with "
-                                "--scanned for that scan");
+                                "the basis cannot reach the scan's volume: make a new basis, and "
+                                "state with --scanned how full the lungs were in the scan");
     }
   }
   for (size_t lung = 0; lung < shells->count && status == SUPINE_OK; ++lung) {

@@ -116,8 +116,8 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
     if (!fit_blocks(products, applied)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
-          "the displacement along the law's directions does not determine the force: check "
-          "that both surfaces are of the same whole lungs");
+          "the displacement along the law's directions does not determine the force: check that "
+          "both surfaces show the same lungs, and none is cut off");
     }
   }
   free(spread);

@@ -243,8 +243,7 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   if (s.displacement < displacement_least) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "the two states are the same (%.2g mm RMS%s): give a state in which the "
-        "lungs have moved",
+        "the two states are the same (%.2g mm RMS%s): give a state in which the lungs have moved",
         s.displacement, scans_moved ? " apart from a translation" : "");
   }
   return SUPINE_OK;

@@ -94,8 +94,7 @@ static supine_status check_apart(supine_patient_matching *m, supine_patient_surf
              ? SUPINE_OK
              : supine_error_set(
                    error, SUPINE_ERROR_MESH,
-                   "the two surfaces are the same (%.2g mm RMS apart): give two different "
-                   "states",
+                   "the two surfaces are the same (%.2g mm RMS apart): give two different states",
                    report->before);
 }
 

@@ -414,8 +414,7 @@ supine_status supine_physics_equilibrium_solve(supine_equilibrium *equilibrium, 
       return supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
           "the equilibrium was not solved: the relative residual is %.3g, above "
-          "%.3g. Check that forces and stiffnesses are finite, or give a "
-          "shorter --reach",
+          "%.3g. Check that forces and stiffnesses are finite, or give a shorter --reach",
           s.status[k] != SUPINE_OK ? INFINITY : s.residual[k], residual_limit);
     }
   }

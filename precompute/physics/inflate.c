@@ -227,8 +227,7 @@ static supine_status iterate(ascent *a, supine_error *error) {
                    error, SUPINE_ERROR_NUMERICAL,
                    "no surface at full inflation was found: after %d steps it still "
                    "changes by %.3g mm RMS. If the scan is fuller than --scanned says, "
-                   "change --scanned or --resting; --scanned none uses the scan as it "
-                   "is",
+                   "change --scanned or --resting; --scanned none uses the scan as it is",
                    SOLVES_MAX, a->rms)
              : status;
 }

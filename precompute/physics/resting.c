@@ -119,8 +119,8 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
       resting->share[k][axis] *= factor;
       if (!is_share(resting->share[k][axis])) {
         return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "lungs with a full volume of %.0f mL do not hold %.0f mL at rest, "
-                                "%s: change --resting or --scanned",
+                                "lungs with a full volume of %.0f mL do not hold %.0f mL at rest "
+                                "in posture %s: change --resting or --scanned",
                                 full[0] + (count > 1 ? full[1] : 0.0), resting->ml[axis],
                                 names[axis]);
       }
@@ -134,8 +134,8 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
       }
       if (!is_share(*share)) {
         return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "--resting scales the volume at rest, %s, to less than the tissue: "
-                                "give --resting for this posture too",
+                                "--resting makes the volume at rest in posture %s less than that "
+                                "of the tissue: give --resting for this posture too",
                                 names[axis]);
       }
     }

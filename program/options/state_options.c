@@ -119,7 +119,9 @@ const supine_option supine_options_folds[] = {
 
 const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
-     SUPINE_VOLUME_HELP "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung",
+     SUPINE_VOLUME_HELP
+     "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung\nDefault: rest; if rest "
+     "is unknown, scan+500, or for a basis made with --fields the displacements given there",
      SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
      .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
@@ -128,8 +130,8 @@ const supine_option supine_options_volume[] = {
 const supine_option supine_options_from[] = {
     {"from", 0, "STATE",
      "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME, such as "
-     "supine:rest or scan; default: the scan, or supine:rest where a command compares "
-     "postures",
+     "supine:rest or scan; default: the scan for 'deform' and 'breathe'; supine:rest for other "
+     "commands, or the scan if rest is unknown",
      SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from},
     {.name = NULL}};
 

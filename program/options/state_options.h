@@ -66,10 +66,9 @@ typedef struct supine_volume_options {
 } supine_volume_options;
 
 #define SUPINE_VOLUME_HELP                                                                         \
-  "rest (FRC, the end of a quiet expiration in that posture; the default where the basis "         \
-  "knows it), full (TLC, full inflation) or scan (the volume scanned), each with +ML or "          \
-  "-ML added, such as rest+500; or the absolute volume of gas and tissue in all lungs, as "        \
-  "measured in a CT: 2600mL"
+  "rest (FRC, the end of a quiet expiration in the posture), full (TLC, full inflation) or scan "  \
+  "(the volume scanned), each with +ML or -ML added, such as rest+500; or the absolute volume of " \
+  "gas and tissue in all lungs, as measured in a CT: 2600mL"
 
 /* Table of --from, which fills a supine_from. */
 extern const supine_option supine_options_from[];

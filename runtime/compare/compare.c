@@ -63,7 +63,8 @@ static supine_status share_area(supine_compare *compare, supine_error *error) {
   return total > 0 && isfinite(total)
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the area of the surface is 0 or not finite: repair the mesh");
+                                "the area of the surface is 0 or not finite: give a basis of the "
+                                "lungs' surface");
 }
 
 /* Add `weight` times c c^T to the upper triangle of `gram` [count, count]. */

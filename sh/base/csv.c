@@ -145,9 +145,7 @@ supine_status supine_csv_open(const char *path, const char *const *names, size_t
   char *text = csv_line(csv, &status, error);
   if (status == SUPINE_OK && text == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: the file is empty; expected a header "
-                              "%s,...",
-                              path, names[0]);
+                              "%s: the file is empty; expected a header %s,...", path, names[0]);
   }
   if (status == SUPINE_OK) {
     csv->separator = strchr(text, ',') != NULL    ? ','
