@@ -156,8 +156,8 @@ typedef struct supine_mesh_save_options {
   const unsigned char *lung;       /**< [vertex_count] index of the lung, point data "lung" */
   const supine_mesh_field *fields; /**< [field_count] numbers for the field data */
   size_t field_count;
-  double rounding; /**< largest step of rounded lengths, mm; the step is a power of two of the
-                      file's unit. Normals get steps of 1/256. 0: no rounding */
+  double rounding; /**< largest step of rounded lengths, mm: in the file's unit, the step is the
+                      next lower power of two. Normals are rounded to 1/256. 0: no rounding */
   /** @} */
 } supine_mesh_save_options;
 

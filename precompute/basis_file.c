@@ -207,7 +207,7 @@ static void add_normals(entries *list, const supine_normals_modes *normals, bool
   }
 }
 
-/* Over 60 lines: all metadata and tensors, in the order of the file. */
+/* All metadata and tensors, in the order of the file, need more than 60 lines of code. */
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error) {
   const supine_lungs *lungs = content->lungs;

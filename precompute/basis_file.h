@@ -10,7 +10,7 @@
 /** Content of a basis file, with N vertices and G lungs. */
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
-  const supine_precompute_options *options; /**< `fit` needs only modes, findings and made_by */
+  const supine_precompute_options *options; /**< with `fit`: only modes, findings and made_by */
   const supine_fit_report *fit; /**< fit of another simulator's fields; NULL: field of a model */
   const double *directions;     /**< [N, 3] mm; NULL: coefficients are vectors */
   const supine_compression *compression;

@@ -12,13 +12,13 @@
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
-/* Directions determine a band up to this condition number of its harmonics, and up to this leverage
- * of a direction. At a leverage of 1, one direction would determine a coefficient by itself. */
+/* Directions determine a band if the condition number of its harmonics, and the leverage of every
+ * direction, are at most these. At a leverage of 1, a direction alone determines a coefficient. */
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
-/* A higher band is chosen only if its error is below `worthwhile` times that of the band chosen
- * before, and if the latter exceeds `exact`, the rounding error of single precision. */
+/* A higher band is chosen only if its error is below `worthwhile` times the error of the
+ * band chosen before, and if that error exceeds `exact`, the rounding error of single precision. */
 static const double worthwhile = 0.99;
 static const double exact = 1e-6; /* relative RMS */
 
@@ -229,7 +229,7 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Make a projection of the fields, which are its columns [rows, M]; its functions [M, P] are the
+/* Make a projection whose columns [rows, M] are the fields, and whose functions [M, P] are the
  * transposed analysis of the chosen band. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {

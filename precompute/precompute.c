@@ -31,8 +31,8 @@ typedef struct pipeline {
   supine_lungs anchored; /* `given` with vertices moved by anchor(), or empty */
   supine_reference reference;
   double *directions; /* [N, 3] d, mm */
-  double *weight; /* [N] |d|^2, with which modes minimise the error of displacement: 0.34 % RMS with
-                     16 modes, but 0.40 % without weights (a left lung, soften 1) */
+  double *weight; /* [N] |d|^2, so that modes minimise the error of displacement: a left lung had
+                     0.34 % RMS with 16 modes, and 0.40 % without weights */
   supine_projection projection;
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];

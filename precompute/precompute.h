@@ -17,7 +17,7 @@ typedef struct supine_precompute_options {
   size_t band;                       /**< highest degree of the harmonics */
   size_t modes;          /**< largest number of modes; 0: keep the (band + 1)^2 harmonics */
   size_t held_out;       /**< number of directions to measure the error at; 0: 100 to 1000 */
-  double expected_error; /**< constant (supine/locate.h), mm, at most the default; 0: the default */
+  double expected_error; /**< c of supine/locate.h, mm, at most the default; 0: the default */
   supine_scan_frame frame;
   /** @{ Metadata of the file, or NULL. */
   const char *made_by;         /**< command line */

@@ -18,7 +18,7 @@ typedef struct supine_model_choice {
   supine_model model;      /**< constants; NAN: as in the law */
   const char *patient_law; /**< name of a patient's law, which `model` contains; NULL: none */
   const double *stiffness; /**< [N] stiffness E of the patient's law, or NULL */
-  bool has_scan; /**< `scan` was given; false: the scan is full, or none with the paper's law */
+  bool has_scan; /**< `scan` was given; false: it is full or, with the paper's law, none */
   supine_scan scan;
   supine_resting resting;
   supine_person person;
@@ -38,8 +38,8 @@ typedef struct supine_prepared {
   supine_model model; /**< refers to the arrays below */
   supine_reference reference;
   char summary[512]; /**< assumptions in words: law, scan, volumes */
-  double *stiffness; /**< [N] or NULL */
-  double *lesions;   /**< [N] or NULL */
+  double *stiffness; /**< [N] stiffness E, or NULL */
+  double *lesions;   /**< [N] factors on the stiffness, or NULL */
 } supine_prepared;
 
 /** Select the law, set stiffness and lesions, and move the lungs to the reference.

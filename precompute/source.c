@@ -22,7 +22,7 @@ typedef struct reading {
   size_t count; /* number of files, or of lungs after loading label maps */
   supine_mesh *meshes;
   supine_mesh_report *reports;
-  supine_error *errors; /* of each file; status SUPINE_OK if it was loaded */
+  supine_error *errors; /* error of each file; status SUPINE_OK if the file was loaded */
   supine_axes axes;     /* axes of the files, or of a label map's header */
   bool has_midline;
   double midline;

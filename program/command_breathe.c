@@ -122,7 +122,7 @@ typedef struct playing {
   double *volumes;     /* [T, G] volume of gas and tissue in each lung, mL */
   supine_mesh mesh;    /* triangles; for VTP, also the positions of the current frame */
   float *normals;      /* [N, 3] normals of the current frame, for VTP */
-  float *positions;    /* mm: [N, 3] current frame; for safetensors, [T, N, 3] all frames follow */
+  float *positions;    /* [N, 3] current frame, mm; for safetensors, then [T, N, 3] all frames */
   double *seconds;     /* [T] compute time of each frame, s */
   double *origin;      /* [N, 3] positions that displacements start from, mm */
   char comment[512];   /* comment in the VTP file */

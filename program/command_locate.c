@@ -129,7 +129,7 @@ enum { POSTURES = 6 };
 static const char *const postures[POSTURES] = {"supine", "prone",   "left",
                                                "right",  "upright", "inverted"};
 
-static const double negligible = 0.01; /* less probable postures do not add to the errors */
+static const double negligible = 0.01; /* probability below which a posture is ignored */
 static const double determined = 0.95; /* probability from which a posture counts as determined */
 
 typedef struct lungs_found {

@@ -55,7 +55,7 @@ typedef struct studio {
   supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
-  double ends[2]; /* largest 95th percentile and largest displacement of the states so far, mm */
+  double ends[2]; /* largest 95th percentile, and largest value, of displacement so far, mm */
   char label[128];
 } studio;
 

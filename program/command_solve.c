@@ -164,7 +164,7 @@ static void report_remaining(void *context, size_t steps, double remaining) {
   }
 }
 
-/* Replace the solved force on each vertex by that of the iteration of Santhanam 2008. */
+/* Replace the solved force on each vertex by the result of the iteration of Santhanam 2008. */
 static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
                              const double g[3], supine_solution *solution, supine_error *error) {
   size_t n = lungs->mesh.vertex_count;

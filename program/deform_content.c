@@ -66,7 +66,7 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  static const double aerated = -300.0; /* HU; some voxels of every lung are below this */
+  static const double aerated = -300.0; /* density that every lung has voxels below, HU */
   const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_image *image = &wanted->source;
   const supine_status status = path != NULL ? supine_image_read(path, image, error) : SUPINE_OK;
@@ -139,7 +139,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
         moved->from.name, axes, unit_name,
         sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
         sigma == NULL ? "" : ",expected_error_mm");
-    for (size_t i = 0; i < n; ++i) { /* names.order has the order of the input */
+    for (size_t i = 0; i < n; ++i) { /* rows by name; within a name in the input's order */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;

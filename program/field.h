@@ -30,7 +30,7 @@ void supine_field_at(const supine_field *field, const double point[3], double u[
 
 /** Residual of a field followed by its inverse. */
 typedef struct supine_field_residual {
-  double rms, largest; /**< of |u(x) + v(x + u(x))| at the nodes x inside the lungs, mm */
+  double rms, largest; /**< RMS and largest |u(x) + v(x + u(x))| at nodes x inside the lungs, mm */
   size_t lost; /**< number of nodes at which the field folds: the inverse misses by > 0.01 mm */
 } supine_field_residual;
 

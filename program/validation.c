@@ -15,7 +15,7 @@
 /* Largest number of vertices whose distance is measured, and number of golden-section steps. */
 enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24 };
 
-static const double search_span = 0.5;           /* half-width of the search for scales up to 1 */
+static const double search_span = 0.5;           /* half-width of the search / max(1, |scale|) */
 static const double golden = 0.6180339887498949; /* (sqrt(5) - 1) / 2 */
 static const double same_posture = 1e-9;         /* difference of components that counts as equal */
 
@@ -86,7 +86,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   return status;
 }
 
-/* Compute the gains for the volume of a state, or for that of its surface if none was given. */
+/* Compute the gains for a state's volume or, if none was given, for its surface's volume. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {

@@ -57,8 +57,8 @@ typedef struct supine_command_subject {
 
 void supine_command_subject_free(supine_command_subject *subject);
 
-/* Open a basis and compute the surface that motion starts from: that of the state `from`, or the
- * scan's if `from` names no posture.
+/* Open a basis and compute the surface that motion starts from: the surface of the state `from`, or
+ * the scan's if `from` names no posture.
  * @retval any status of the run-time library */
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error);

@@ -38,7 +38,7 @@ static void explain(supine_patient_scan_motion moved,
   }
 }
 
-/* Choose the map to fit; for the prediction, that of the motion between the scans. */
+/* Choose the map to fit. To the prediction, fit the motion between the scans. */
 static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID

@@ -36,7 +36,7 @@ struct supine_basis {
   double mode_scale[SUPINE_MODES_MAX];
   /** Bounds on the packing error and the displacement of mode k at weight 1 and gain 1, mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
-  double reference_volume[SUPINE_LUNGS_MAX]; /**< numbers of info.reference_volume, mL */
+  double reference_volume[SUPINE_LUNGS_MAX]; /**< array that info.reference_volume points to, mL */
   const double *resting; /**< harmonics of the volume at rest less the reference volume, mL: [G, 9],
                             or [9] for all lungs together; NULL without rest */
   bool rest_by_lung;     /**< `resting` is [G, 9], and each lung has its own gains */

@@ -87,9 +87,9 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
   }
 }
 
-/* Compute the 3-D variance 3 (k - w'w) + m' spread m at each point of a run, mm^2. k is the
- * variance of g on one axis, w is from solve(); m are the columns 1, v and p - c at the point, less
- * w' L^-1 times the columns of the observed points. */
+/* Compute the 3-D variance of the prediction, 3 (k - w'w) + m' spread m, at each point of a run,
+ * mm^2. k is the variance of g on one axis, w the result of solve(), and m the row (1, v, p - c)
+ * (kriging.h) of the point less w' L^-1 times the rows of the observed points. */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

@@ -14,8 +14,8 @@ _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
 static const double prior_spread = 0.17;
 static const double outlier_limit = 3.0; /* residual above which a point is an outlier, in sigma */
 static const double outlier_noise = 300; /* noise that replaces the noise of an outlier, mm */
-static const double volume_step = 1;     /* change of the volume that ends the search, mL */
-static const double angle_step = 1e-4;   /* change of the rotation that ends the search, rad */
+static const double volume_step = 1;     /* change of the volume below which the search ends, mL */
+static const double angle_step = 1e-4;   /* rotation in a step below which the search ends, rad */
 /* Ratio of the sill to the constant of the expected error: 6 mm to 4.5 mm. The constant is smaller,
  * as it was measured after the best translation. */
 static const double sill_of_error = 4.0 / 3;

@@ -8,8 +8,8 @@
 /* Poses of the scan and of the located state (at; with more volume: fuller), and constants. */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* smaller of the expected error's constant and the RMS displacement (at least 2
-                      mm), mm */
+  double constant; /* constant of the expected error, mm, limited to the RMS displacement (at least
+                      2 mm) */
   double per_step; /* ratio of the prior standard deviation of the volume to the step to `fuller` */
 } poses;
 
@@ -68,8 +68,8 @@ static void predict(const supine_location *found, const supine_basis *basis, con
 
 /* Convert positions to the frame of the observations, and bound expected errors by those without
  * observations. Such a bound requires that three points or more determine the translation: with two
- * points, it would be too small by a factor of 0.85. It does not include the error of a fitted
- * rotation and does not apply then. */
+ * points, it would be too small by a factor of 0.85. It does not apply to a fitted rotation, whose
+ * error it does not include. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

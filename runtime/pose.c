@@ -60,7 +60,7 @@ static double sum_of(const double *values, size_t count) {
 typedef struct volumes {
   size_t lung_count;
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* volume at rest; 0 if the file has none for each lung */
+  double rest[SUPINE_LUNGS_MAX]; /* volume of a lung at rest; 0 if the file does not state it */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;

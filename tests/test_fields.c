@@ -249,7 +249,7 @@ static double gain_of_band_2(double amount, size_t *band) {
   return report.error[2] / report.error[1];
 }
 
-/* Band 2 is chosen if it lowers the error by 1.5 %, but not if by 0.5 %. */
+/* Band 2 is chosen if it lowers the error by 1.5 %, but not if it lowers the error by 0.5 %. */
 TEST(test_fit_band_reducing_error_below_one_percent_not_chosen) {
   static const double wanted[] = {0.995, 0.985};
   for (size_t i = 0; i < 2; ++i) {

@@ -197,7 +197,7 @@ TEST(test_biharmonic_centres_and_affine_exact) {
     }
     noise = fmax(noise, fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]));
   }
-  assert_true(noise > 0.1); /* noise is not interpolated at points other than the centres */
+  assert_true(noise > 0.1); /* at points other than the centres, noise is not reproduced */
   for (size_t j = 0; j < CENTRES; ++j) {
     const size_t i = fit.chosen[j];
     assert_true(fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]) < 1e-9);
@@ -333,8 +333,8 @@ TEST(test_embed_surface_points_move_with_surface) {
   supine_inside_content_free(&content);
 }
 
-/* In a scan below full inflation, content is embedded at its position in the scan, has that
- * position in the state of the scan, and moves with the surface of the scan if it is on it. */
+/* In a scan below full inflation, content is embedded at its position in the scan, and has that
+ * position in the state of the scan. Content on the surface of the scan moves with the surface. */
 TEST(test_embed_scan_below_full_counts_from_scan) {
   enum { COUNT = 400 };
   char path[80];

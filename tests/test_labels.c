@@ -194,7 +194,7 @@ TEST(test_labels_conventions_same_lungs) {
   supine_image_free(&image);
 }
 
-/* Lobes give the same lungs from a TotalSegmentator map with other organs as from one file for each
+/* A TotalSegmentator map with lobes and other organs gives the same lungs as one file for each
  * lobe. */
 TEST(test_labels_other_organs_ignored_and_files_of_lobes_joined) {
   static const uint8_t left[2] = {11, 10};
@@ -463,7 +463,7 @@ TEST(test_labels_noise_closed_manifold) {
       const bool is = 0.5 + 0.5 * random_signed(&seed) < density;
       at[i] = !is || i % 31 == 15 ? 0 : i % 31 < 15 ? 1 : 2;
     }
-    /* keep the voxels, average eight, interpolate */
+    /* edges that keep the voxels, average eight, or interpolate */
     const double edges[] = {4.0, 8.0, 2.7};
     for (size_t e = 0; e < 3; ++e) {
       const supine_labels_options options = {.edge = edges[e]};

@@ -152,7 +152,7 @@ TEST(test_locate_given_volume_kept) {
 
 TEST(test_locate_wrong_point_reported_and_ignored) {
   world *w = *state;
-  const supine_state truth = state_of("left:full-700"); /* with expected errors of about 10 mm */
+  const supine_state truth = state_of("left:full-700"); /* expected errors are about 10 mm */
   const supine_state posture = state_of("left");
   observe(w, &truth, false);
   const supine_location before = locate(w, &posture, false);

@@ -63,7 +63,7 @@ static void fail_each(supine_status (*work)(const char *path, supine_error *erro
     if (status == SUPINE_OK) {
       continue; /* the memory was optional, as that of a buffer */
     }
-    /* An output that cannot be opened may give a write error, whose message also names memory. */
+    /* Without memory, opening an output may give a write error; its message names memory. */
     if ((status != SUPINE_ERROR_MEMORY && status != SUPINE_ERROR_WRITE) || error.status != status ||
         strstr(error.message, "memory") == NULL) {
       fail_msg("%s: allocation %d: status %d, \"%s\"", path, nth, (int)status, error.message);

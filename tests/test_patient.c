@@ -233,8 +233,8 @@ TEST(test_fit_noisy_landmarks_recover_constants) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* The entries of a row are the derivatives of its displacement by the unknowns, compared here with
- * difference quotients. */
+/* The entries of a row are the derivatives of its displacement with respect to the unknowns,
+ * compared here with difference quotients. */
 TEST(test_power_design_each_unknown_matches_difference) {
   supine_patient_pairs pairs = scatter(20, 3);
   const supine_patient truth = known(&pairs);

@@ -203,9 +203,9 @@ static void slide(const supine_lungs *lungs, const supine_patient_power *law, un
   free(normals);
 }
 
-/* Surfaces do not show motion along them. Surfaces that are moved by the deep law and slide with
- * the covariance of other patients are fitted to a fraction of a millimetre, but points err by
- * millimetres, which the expected error must state. */
+/* Surfaces do not show motion along them. Here the deep law moves them, and a random field makes
+ * them slide. The fit reaches them to a fraction of a millimetre, but points err by millimetres,
+ * which the expected error must state. */
 TEST(test_fit_surface_alone_expected_error_includes_sliding) {
   enum { SEEDS = 5 };
   supine_mesh lump = helper_lump(6, 70.3, 5);

@@ -70,7 +70,7 @@ static void check_posture(const json_t *posture) {
   }
   assert_true(fabs(gain - 400) < 0.05); /* tolerance of float positions, mL */
   assert_true(fabs(share - 1) < 1e-4);
-  /* Volumes of slabs are those at rest in the posture. */
+  /* The volumes of the slabs sum to the volume at rest in the posture. */
   assert_true(fabs(volume - number(posture, "volume_ml", "left") -
                    number(posture, "volume_ml", "right")) < 0.05);
   const json_t *top = json_array_get(slabs, 1);

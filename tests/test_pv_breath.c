@@ -107,7 +107,7 @@ TEST(test_breath_volume_follows_scaled_limbs) {
   }
 }
 
-/* At constant flow, pressures belong to the volumes, even on a limb with two steep parts. */
+/* At constant flow, a limb has the breath's volumes at its pressures, even with two steep parts. */
 TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   enum { COUNT = 61 };
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};

@@ -61,8 +61,8 @@ TEST(test_evaluate_second_control_gives_gaussian_compliance) {
   }
 }
 
-/* The derivative of the log compliance by x, from finite differences, equals the sum u(x) of
- * Legendre polynomials. */
+/* The derivative of the log compliance with respect to x, from finite differences, equals the sum
+ * u(x) of Legendre polynomials. */
 TEST(test_evaluate_any_controls_satisfy_equation) {
   const double half = 0.5 * (sigmoid.pressure[1] - sigmoid.pressure[0]);
   const double step = 1e-4;

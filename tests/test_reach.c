@@ -227,7 +227,7 @@ TEST(test_reach_sphere_damps_harmonics_as_laplacian) {
       printf("reach %2.0f mm, l = %zu: error %.2e with 642 vertices, %.2e with 5762, %.2e if "
              "irregular\n",
              reaches[r], l, coarse, fine, rough);
-      /* A limit remains in finer meshes, as links are not isotropic. */
+      /* Some error remains even on a fine mesh, as links are not isotropic. */
       assert_true(coarse < 0.1);
       assert_true(fine < 0.1);
       assert_true(rough < 0.15);

@@ -253,7 +253,7 @@ enum { ZONES = 10 };
 
 typedef struct ventilation {
   double index[ZONES]; /* mean catch, relative to the mean over all slabs */
-  double swept[ZONES]; /* share of the breath that a zone sweeps over its share of the area */
+  double swept[ZONES]; /* ratio of a slab's share of the breath to its share of the area */
   double slope;        /* least-squares slope of the index over relative height, 0 to 1 */
   double height;       /* height of the lungs along gravity, mm */
 } ventilation;

@@ -95,7 +95,7 @@ static bool mend_corner(float *share, const size_t at[8]) {
   return false;
 }
 
-/* Correct every edge and corner; return whether any was wrong. */
+/* Apply mend_edge and mend_corner everywhere; return whether a cube was filled. */
 static bool mend(const size_t size[3], float *share) {
   const size_t stride[3] = {1, size[0], size[0] * size[1]};
   bool mended = false;

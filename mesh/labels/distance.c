@@ -8,7 +8,7 @@
 #include "mesh/labels/mask.h"
 #include "sh/base/parallel.h"
 
-static const float far_away = 1e30F; /* mm^2, for voxels of a row without voxels of the set */
+static const float far_away = 1e30F; /* squared distance in a row without voxels of the set, mm^2 */
 
 typedef struct sweep {
   const labels_mask *mask;
@@ -41,8 +41,8 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Replace each of the n values f(x), at line[x stride], by the minimum over y of (x - y)^2 + f(y).
- * Work space: v, indices of the lowest parabolas; z, where each begins, mm; f, the values. */
+/* Replace the n values f(x), at line[x * stride], by the minimum over y of (x - y)^2 + f(y).
+ * Work space: v, indices y of the envelope's parabolas; z, where each begins, mm; f, the values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;

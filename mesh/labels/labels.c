@@ -10,11 +10,11 @@
 #include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
-static const double least_edge = 0.2;      /* mm; gives some ten million vertices */
-static const double most_edge = 20.0;      /* mm; larger cubes leave little of a lung */
-static const double most_closing = 20.0;   /* largest radius of closing, mm */
-static const double least_lung = 1.0;      /* least volume of a lung, mL */
-static const double longest_lung = 1000.0; /* mm; if longer, the header's voxel size is wrong */
+static const double least_edge = 0.2;    /* smallest edge, mm: some ten million vertices */
+static const double most_edge = 20.0;    /* largest edge, mm; larger cubes leave little of a lung */
+static const double most_closing = 20.0; /* largest radius of closing, mm */
+static const double least_lung = 1.0;    /* least volume of a lung, mL */
+static const double longest_lung = 1000.0; /* largest length of a lung with valid voxels, mm */
 
 typedef struct work {
   const char *path; /* first file, for messages */

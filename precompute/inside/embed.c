@@ -20,8 +20,8 @@ typedef struct embedding {
   const supine_inside_content *content;
   const supine_inside_options *options;
   size_t columns;             /* values per point: 3 K for K modes */
-  supine_inside_place *place; /* [N] in the content's order */
-  unsigned char *lung;        /* [N] in the content's order */
+  supine_inside_place *place; /* [N] place of each point in its lung, in the content's order */
+  unsigned char *lung;        /* [N] lung of each point, in the content's order */
   size_t *order;              /* [N] indices of the content's points, lung by lung */
   float *vertices;      /* [N, 3] at full inflation, mm; this and the arrays below follow `order` */
   float *coefficients;  /* [N, 3, K] displacement by each mode, mm */
@@ -139,8 +139,8 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
 }
 
 /* Find the displacements of points [begin, end) of `order`, at most BLOCK, all of one lung. `space`
- * holds positions [2 BLOCK, 3] of the points, then of the nearest surface points of the points
- * within `reach`; their values [2 BLOCK, columns]; and one surface point's values [columns]. All
+ * has room for positions and values of 2 BLOCK points (first the given points; then, for each point
+ * within `reach` of the surface, the nearest surface point) and for the values of one more. All
  * eight parameters describe one block and its work space. */
 static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
@@ -184,7 +184,7 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
                                 supine_error *error) {
-  static const double reach_spacings = 2.0; /* reach over (centres' spacing + mean edge) */
+  static const double reach_spacings = 2.0; /* ratio of reach to (centres' spacing + mean edge) */
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;

@@ -199,7 +199,7 @@ static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32
 supine_status supine_inside_surface_create(const double *vertices, size_t count,
                                            const uint32_t *triangles, bool sides,
                                            supine_inside_surface **surface, supine_error *error) {
-  const size_t leaves = 2 * count / LEAF + 1; /* upper bound: each is at least half full */
+  const size_t leaves = 2 * count / LEAF + 1; /* upper bound: each leaf is at least half full */
   supine_inside_surface *s = calloc(1, sizeof *s);
   keyed *space = malloc((count + count / 2) * sizeof *space);
   *surface = NULL;
@@ -424,7 +424,7 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
                                                   const supine_inside_place *near) {
   supine_inside_place place = {.point = {point[0], point[1], point[2]}};
   double best = INFINITY;
-  if (near != NULL) { /* upper bound of the distance */
+  if (near != NULL) { /* `near` gives an upper bound of the distance */
     const double limit =
         (fabs(near->depth) + supine_distance(point, near->point)) * (1.0 + 1e-9) + 1e-9;
     best = limit * limit;
@@ -467,7 +467,7 @@ supine_inside_place supine_inside_surface_find(const supine_inside_surface *surf
   supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)
-                           ? near->depth > 0.0 /* same side: the surface is farther from `near` */
+                           ? near->depth > 0.0 /* on the same side as `near` */
                            : angle(surface, 0, point) > half);
   place.depth = inside ? place.depth : -place.depth;
   return place;

@@ -49,7 +49,7 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
  * @param vertices  [N, 3] output, mm */
 void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
-/** Scale directions of displacement [N, 3] from the healthy to the collapsed lungs, in place. */
+/** Scale the directions [N, 3] of healthy lungs to those of collapsed lungs, in place. */
 void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
                                        double *directions);
 

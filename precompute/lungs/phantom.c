@@ -31,7 +31,7 @@ size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
 /* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
-  const size_t axis = index / 4; /* axis of the coordinate +-1; the axis before it has 0 */
+  const size_t axis = index / 4; /* axis whose coordinate is +-1; the next is +-golden */
   const double one = index % 2 == 0 ? -1.0 : 1.0;
   const double far = index % 4 < 2 ? golden : -golden;
   p[axis % 3] = one;

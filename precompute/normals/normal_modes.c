@@ -25,8 +25,8 @@ enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
 /* Largest mean and 99.9th percentile of the angle, degrees, between the normals of the modes and
- * the exact normals. They are a fifth below 0.1 and 1, as other states and vertices than the
- * held-out ones have slightly different errors. */
+ * the exact normals. They are a fifth below the goals of 0.1 and 1, because the errors at other
+ * vertices and states differ slightly from those measured. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees = 57.29577951308232; /* degrees per radian */

@@ -54,7 +54,7 @@ supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          size_t offset, size_t stride, supine_normals_rows *rows);
 void supine_normals_rows_free(supine_normals_rows *rows);
 
-/* Monomials of the weights and gains in some states. */
+/* Sampled states of the lungs, and the monomials of their weights and gains. */
 typedef struct supine_normals_states {
   size_t count;    /* number S of states, all with volumes that the lungs can reach */
   size_t room;     /* number of states requested */

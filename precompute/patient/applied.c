@@ -38,8 +38,8 @@ static void find_spread_force(supine_patient_matching *m, const supine_patient *
   }
 }
 
-/* Compute means over each block of the terms of (18), the height along gravity and the force. Sum
- * the products of the means over the blocks, weighted by area. */
+/* Compute the means over each block of the terms of (18), of the height along gravity and of the
+ * force. Sum the products of the means over all blocks, weighted by area. */
 static void add_blocks(const supine_patient_matching *m, const double *force,
                        const double gravity[3], const double *vertex_area, size_t blocks,
                        double *means, double products[ALL * ALL]) {

@@ -18,20 +18,20 @@ enum {
   ROUNDS = 5         /* rounds of fitting and matching */
 };
 
-/* Prior standard deviation of the difference of expandability between neighbours, and from 1. */
+/* Prior standard deviations of the difference of expandability: between neighbours, and from 1. */
 static const double neighbour_deviation = 0.3;
 static const double region_deviation = 1.0;
 
 static const double noise_least = 0.3;     /* lower bound on the noise of a row, mm */
-static const double rows_per_error = 10.0; /* number of rows with a common error */
+static const double rows_per_error = 10.0; /* number of nearby rows that share one error */
 
-/* Largest distance of neighbouring centres over the smallest distance of any two centres. */
+/* Largest distance between neighbouring centres / smallest distance between any two centres. */
 static const double neighbour_ratio = 1.7;
 
-/* Regions are kept if their held-out error is below this multiple of that of uniform tissue. */
+/* Regions are kept if their held-out error is below this share of the error with uniform tissue. */
 static const double kept_ratio = 0.95;
 
-/* Find the vertex of a side that is farthest from all centres, and its distance, mm. */
+/* Find the vertex of one lung that is farthest from all centres, and its distance, mm. */
 static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
                        int side, double *distance) {
   size_t found = 0;
@@ -150,7 +150,7 @@ static void set_forces(supine_patient_matching *m, size_t count, const double *r
   }
 }
 
-/* Alternate between the fit and matching, with full weights: large residuals show the regions. */
+/* Alternate between fit and matching; no robust weights, as large residuals show the regions. */
 static supine_status iterate(supine_patient_matching *m, const double *response,
                              supine_patient_fit_options *options, supine_patient *patient,
                              supine_patient_stiffness *regions, supine_error *error) {

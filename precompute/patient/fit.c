@@ -45,7 +45,7 @@ typedef struct study {
   supine_status failed[ITEMS];
 } study;
 
-/* Compute the derivatives x of axis . (t + M p) by t and M; p is the place's offset, in 100 mm. */
+/* Compute derivatives x of axis . (t + M p) with respect to t and M, where p = offset / 100 mm. */
 static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   for (size_t a = 0; a < 3; ++a) {
     x[a] = row->axis[a];

@@ -12,7 +12,7 @@
 
 static const double gain_least = 0.01, gain_most = 2.0; /* range of accepted gains */
 static const double same_posture = 0.05;  /* distance of unit vectors 3 degrees apart */
-static const double converged = 1e-4;     /* change of scales and gain that ends the rounds */
+static const double converged = 1e-4;     /* change of scales and gain below which rounds end */
 static const double not_converged = 1e-2; /* change in the last round above which the fit fails */
 static const double force_least = 0.2;    /* lower bound on the fitted force */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, GAIN = 5, UNKNOWNS = 6 };

@@ -19,8 +19,8 @@ enum {
   STEPS = 60
 };
 
-static const double size_deviation = 0.3; /* prior standard deviation of SCALE */
-static const double converged = 1e-10;    /* relative decrease of the squares that ends a fit */
+static const double size_deviation = 0.3; /* prior standard deviation of the law's relative size */
+static const double converged = 1e-10;    /* relative decrease of the squares at which a fit ends */
 static const double damping_most = 1e10;  /* damping above which a fit ends */
 static const double expandability_least = 0.02;
 
@@ -79,7 +79,7 @@ static supine_patient_power take_step(const supine_patient_power *law, const dou
   return stepped;
 }
 
-/* Call supine_patient_power_design, and add the derivatives by the expandability of the regions. */
+/* Call supine_patient_power_design, and add derivatives with respect to the expandabilities. */
 static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
   if (k->options.region_count == 0) {
     return supine_patient_power_design(&k->law, row, x);
@@ -97,8 +97,8 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factor the covariance of the rows, noise plus g. If only the size of the law is fitted, the
- * covariance of g is that for the prior mean of the size.
+/* Factor the covariance of the rows, noise plus g. If only the size of the law is fitted, g has its
+ * covariance at the prior mean of the size.
  * @return half the logarithm of the determinant; NAN if it is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
@@ -196,7 +196,7 @@ static bool factor_terms(supine_patient_krige *k) {
   return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal, terms) == 0;
 }
 
-/* Minimise the squares. Return false if the rows do not determine the terms. */
+/* Minimise the sum of squares. Return false if the rows do not determine the terms. */
 static bool descend(supine_patient_krige *k) {
   double damping = 0.0;
   linearise(k);

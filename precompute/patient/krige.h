@@ -41,8 +41,8 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
  * size of the law. The expandability of each region follows if it is fitted. */
 enum { SUPINE_PATIENT_TERMS = 16, SUPINE_PATIENT_REGIONS_MAX = 256 };
 
-/* Compute the derivatives x of a row's displacement by the unknowns; return the displacement by the
- * law and the motion less the measured value, mm. */
+/* Compute the derivatives x of a row's predicted displacement with respect to the unknowns. Return
+ * the prediction (law and motion between the scans) less the measured value, mm. */
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]);
 
@@ -74,10 +74,10 @@ typedef struct supine_patient_krige {
   supine_patient_power uncorrected_law; /* law fitted without g */
   supine_patient_power law;
   double scaled_sill;            /* sill, scaled to the fitted size of the law */
-  supine_patient_centre *centre; /* [count] kernel of each row, without its weight */
-  double *factor; /* [count, count] Cholesky factor of the covariance of the rows; NULL without g */
-  double *design; /* [count, terms + 1] derivatives and residual of each row, whitened */
-  double *weight; /* [count] weight of each row's kernel */
+  supine_patient_centre *centre; /* [count] kernel of each row; its weight is in `weight` */
+  double *factor;  /* [count, count] Cholesky factor of the rows' covariance; NULL: no g */
+  double *design;  /* [count, terms + 1] derivatives and residual of each row, whitened */
+  double *weight;  /* [count] weight of each row's kernel */
   double *scratch; /* [count] work space */
   double *normal;  /* [2, terms, terms] normal matrix (after the fit, its factor) and work space */
   double squares;  /* whitened squared residual plus squared deviation from the prior */
@@ -134,7 +134,7 @@ typedef struct supine_patient_fit_report {
   double band;      /**< share of the held-out points within the 95 % band, % */
   double explained; /**< share of the squared held-out displacement that the law explains, % */
   double expected_point;                  /**< expected error of a point, in three dimensions */
-  double expected_constant;               /**< squared expected error over displacement, mm */
+  double expected_constant;               /**< squared expected error divided by displacement, mm */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 */
 } supine_patient_fit_report;
 

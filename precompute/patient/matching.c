@@ -15,8 +15,8 @@
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5;    /* cosine of the largest angle of compatible normals */
-static const double biweight = 4.685;    /* cutoff of Tukey's biweight over the robust scale */
+static const double compatible = 0.5; /* cosine of the largest angle between compatible normals */
+static const double biweight = 4.685; /* cutoff of Tukey's biweight, in units of the robust scale */
 static const double surface_noise = 0.5; /* standard deviation of the noise of a row, mm */
 static const double scale_least = 0.02;  /* lower bound on the robust scale, mm */
 static const double matched_least = 0.3; /* smallest accepted share of vertices with a match */

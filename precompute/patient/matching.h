@@ -88,7 +88,7 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
  * under a prior that a is near 1 and similar in neighbouring regions. Fits alternate with matching.
  *
  * The regions are kept only if they predict held-out blocks of 40 mm better than uniform tissue.
- * @param matching   without landmarks; on return its force is spread by the found stiffness
+ * @param matching   without landmarks; on return its force is spread by the stiffness found
  * @param options    the paper's law, and gravity in the other state
  * @param patient    in: the frame; out: the fitted law
  * @param stiffness  written; without regions if they are not kept
@@ -100,8 +100,8 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
 
 /** Find the force that the displacement to the other surface implies, averaged over blocks, and fit
  * (18) to it.
- * @param matching  its force is spread by the patient's stiffness; on return every vertex is chosen
- * @param patient   the law fitted to the matching; the correction is not used
+ * @param matching  created with the patient's stiffness; on return all vertices are matched
+ * @param patient   law fitted to the matching; its correction g is not used
  * @param gravity   unit vector in the other state
  * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine (18)
  * @retval SUPINE_ERROR_MEMORY */

@@ -12,8 +12,8 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between the faces of a surface's box and of a state's box, over the width of the
- * state's box; [0] if that box is of landmarks, [1] if it is of a surface. */
+/* Largest distance between the faces of a surface's box and of a fitted state's box, relative to
+ * the width of the state's box. [0]: the state was given by landmarks; [1]: by a surface. */
 static const double apart_most[2] = {0.45, 0.2};
 
 /* Lower bound on a force that a displacement is divided by; the mean force is 1. */

@@ -15,15 +15,15 @@
 enum {
   COLUMNS = 12,
   COORDINATES = 6,
-  PAIRS_LEAST = 12 /* smallest number of pairs: three times that of an affine map */
+  PAIRS_LEAST = 12 /* smallest number of pairs: three times what an affine map needs */
 };
 
 static const double flat_least = 1.0; /* smallest RMS distance of points from a plane, mm */
 static const double displacement_least = 0.05; /* smallest RMS displacement, mm */
 static const double rotation_most = 25.0;      /* largest rotation between two scans, degrees */
-static const double apart_most = 0.5; /* largest ratio of the states' distance to their spread */
+static const double apart_most = 0.5;        /* largest translation, as a fraction of the spread */
 static const double box_overlap_least = 0.5; /* smallest overlap, as a fraction of the larger box */
-static const double residual_most = 0.7; /* largest ratio of the affine residual to the spread */
+static const double residual_most = 0.7; /* largest affine residual, as a fraction of the spread */
 
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
                                              "im1_x", "im1_y", "im1_z", "im2_x", "im2_y", "im2_z"};
@@ -106,8 +106,8 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
 bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
                             const double *to, supine_patient_affinity *map) {
   double mean[2][3] = {{0.0}};
-  double cross[3][3] = {{0.0}};   /* sum of from_a to_b, less the means */
-  double scatter[3][3] = {{0.0}}; /* sum of from_a from_b, less the means */
+  double cross[3][3] = {{0.0}};   /* sum of from_a to_b about the means */
+  double scatter[3][3] = {{0.0}}; /* sum of from_a from_b about the means */
   double mapped[3];
   bool determined = true;
   *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};

@@ -30,7 +30,7 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
                                         supine_error *error);
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
 
-/** Compute the volume of the second state over that of the first: the determinant of the best
+/** Compute the ratio of the volumes of the second and the first state: the determinant of the best
  * affine map.
  * @return 1 if the points do not determine a map, or if the map is a reflection */
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs);

@@ -127,7 +127,7 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
 void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3],
                                    double side, double spread, double at[3], double u[3]) {
   enum { STEPS = 60 };
-  static const double converged = 1e-4; /* change in a step that ends the iteration, mm */
+  static const double converged = 1e-4; /* change below which the iteration ends, mm */
   double change = INFINITY;
   for (int step = 0; step < STEPS && change >= converged; ++step) {
     const supine_patient_place place = supine_patient_find(&patient->frame, at, side);

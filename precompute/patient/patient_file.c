@@ -20,7 +20,7 @@ enum {
 
 /* A number or an array of numbers in a record and in its file. */
 typedef struct numbers {
-  const char *group; /* key of the object that has `key`; NULL: the root */
+  const char *group; /* key of the enclosing object; NULL: the root */
   const char *key;
   size_t count;  /* number of values; 1: a number, more: an array */
   size_t offset; /* position in the record, bytes */
@@ -82,7 +82,7 @@ static json_t *array_of(const double *values, size_t count) {
   return array;
 }
 
-/* Return an object of the root, which is made if it is missing; key NULL: the root. */
+/* Return the member `key` of the root, an object, and add it if missing; key NULL: the root. */
 static json_t *group_of(json_t *root, const char *key) {
   if (key != NULL && json_object_get(root, key) == NULL) {
     (void)json_object_set_new(root, key, json_object());

@@ -64,8 +64,8 @@ typedef struct supine_patient_applied {
   double blocks;      /**< number of blocks; 0: the force was not computed */
   double correlation; /**< correlation of force and height along gravity */
   double slopes[3];   /**< c7 to c9 of (18) fitted to f */
-  double residual;    /**< RMS residual of (18), divided by the force at the box's centre */
-  double spread;      /**< standard deviation of f, divided by the force at the box's centre */
+  double residual;    /**< RMS residual of (18), divided by f at the box's centre */
+  double spread;      /**< standard deviation of f over blocks, divided by f at the box's centre */
 } supine_patient_applied;
 
 /** Result of matching two surfaces. */

@@ -8,13 +8,13 @@
 #include "precompute/patient/matching.h"
 
 enum {
-  VERTICES_MAX = 600,  /* dense enough for kriging with a correlation length of 90 mm */
-  EXPANDED_MAX = 2000, /* dense enough for regions of expandability 45 mm apart */
+  VERTICES_MAX = 600,  /* matched vertices: dense enough for a correlation length of 90 mm */
+  EXPANDED_MAX = 2000, /* if regions of expandability are fitted, which are 45 mm apart */
   ROUNDS_MAX = 60
 };
 
-static const double converged = 2e-3;     /* RMS change in a round that ends the fit, mm */
-static const double size_converged = 0.5; /* RMS change that ends the fit of size only, mm */
+static const double converged = 2e-3;     /* RMS change in a round below which the fit ends, mm */
+static const double size_converged = 0.5; /* the same while only a size is fitted, mm */
 
 /* Lower bound on the robust scale, mm. Smaller residuals are left to kriging. */
 static const double scale_least = 1.0;

@@ -27,7 +27,7 @@ static const double agreement = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
   static const struct {
-    double slope, offset; /* of the capacity: L per m, L */
+    double slope, offset; /* capacity in L is slope x height in m - offset */
     double usual[2];      /* shortest and tallest usual adults, cm */
   } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* women, men */
   range[0] = INFINITY;

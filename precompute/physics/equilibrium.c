@@ -44,8 +44,8 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
-  double reach;    /* mm; 0: none */
-  double *area;    /* [N] area of each vertex over the mean area; NULL without a reach */
+  double reach;    /* reach R, mm; 0: none */
+  double *area;    /* [N] area of each vertex / mean area; NULL without a reach */
   double *link;    /* [edges] with a reach w / 2, else D(mass, spring) in mm (equilibrium.h) */
   double *lesions; /* [N] factors on the normalised stiffness; NULL: 1 */
   double *mass_s;  /* [N] S of the masses in the matrix: with a reach 1, else 1 / E */
@@ -104,7 +104,7 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
 static void split(supine_equilibrium *eq) {
   const size_t n = eq->vertex_count;
   const supine_topology *topology = eq->topology;
-  size_t last = 0;  /* highest neighbour of the vertices before i */
+  size_t last = 0;  /* highest index of a neighbour of the vertices before i */
   size_t least = n; /* size of the larger part in the best split so far */
   part *first = &eq->parts[0];
   *first = (part){.vertex_count = n, .edge_count = topology->edge_count};

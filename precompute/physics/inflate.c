@@ -54,9 +54,9 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
 }
 
 /* Find the gains A = s (sigma + 2 bend e(sigma)) of one lung's scan, on the path from full
- * inflation (sigma 0) to rest (sigma 1, gains s; supine/volume.h). Applied to the scan, gains of -A
- * add `to_full` mL and lead to full inflation, and gains of s - A add `to_rest` mL and lead to
- * rest. For each sigma, `to_full` gives s; secant steps find the sigma that also gives `to_rest`.
+ * inflation (sigma 0) to rest (sigma 1, gains s; supine/volume.h). Two volumes determine s and
+ * sigma: applied to the scan, gains -A add `to_full` mL and lead to full inflation; gains s - A add
+ * `to_rest` mL and lead to rest. `to_full` gives s for each sigma; secant steps find sigma.
  * @param form  volume form of the field applied to the scan */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],

@@ -14,7 +14,7 @@
  * a supine_volume_form. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double sixth_ml = 1e-3 / 6.0; /* tetrahedron: mL per mm^3 of its determinant */
+static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron, mL per mm^3 of determinant */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);

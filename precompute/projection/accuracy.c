@@ -37,7 +37,7 @@ typedef struct accuracy_work {
   double *space;        /* [threads, BLOCK, K + 2 D] work space */
 } accuracy_work;
 
-/* Compute errors of displacements, mm: out [n] = |a is - b should| length. */
+/* Compute errors of displacement, |a is - b should| length, mm; a and b are gains of the fields. */
 SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {
@@ -92,7 +92,7 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
 }
 
 /* Find the gains at which the full solve and the compression each reach `part` times the volumes
- * [D]; return false if one of them cannot in some direction. */
+ * [D]; return false if either cannot reach them in some direction. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
                         const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {

@@ -63,7 +63,7 @@ json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb
  * @param end  displacement that the last colour shows, mm */
 json_t *supine_export_glb_extras(const glb *g, double end);
 
-/** Return the extras of a lung's mesh: its numbers in the formulas of the file's extras. */
+/** Return the extras of a lung's mesh: its constants in the formulas of the file's extras. */
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
 
 /** Compute the rotation of the node "patient" as a quaternion x, y, z, w: lying down, and turned

@@ -7,7 +7,7 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-/* Largest number of targets with volume formulas. Those of more would be larger than the mesh. */
+/* Largest number of targets with volume formulas; more formulas would be larger than the mesh. */
 enum { FORMS_MAX = 32 };
 
 static const char frame_text[] =
@@ -64,7 +64,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* unit of the modes, stored as integers because these are shorter */
+  const double unit = 1e-7; /* unit of the modes: integers are shorter text than fractions */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();

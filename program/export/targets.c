@@ -156,7 +156,7 @@ static void find_normals(const export_source *source, const export_targets *targ
  * by the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* smallest divisor, which limits the length of the vectors */
+  static const double least = 0.2; /* smallest length to divide by, so that vectors stay short */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -180,7 +180,7 @@ static void make_unit(const export_source *source, const export_targets *targets
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
-  static const float near = 2; /* largest difference that is near, in units of a byte */
+  static const float near = 2; /* largest difference that counts as near, in units of a byte */
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];

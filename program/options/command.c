@@ -109,7 +109,7 @@ bool supine_options_parse_count(const char *text, size_t *value) {
 
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
-  size_t fewest = 1 + strlen(text) / 2; /* edits allowed; then the fewest found */
+  size_t fewest = 1 + strlen(text) / 2; /* edits allowed at first, then the fewest found */
   for (size_t i = 0; i < count; ++i) {
     const size_t edits = supine_words_distance(text, candidates[i]);
     if (edits < fewest || (edits == fewest && best == NULL)) {

@@ -24,7 +24,7 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
-  char standard[16]; /* replaces the output "-": "-" with the first ending, such as "-.ply" */
+  char standard[16]; /* replaces the output "-": its ending is added, as in "-.ply" */
   int help;          /* 0: run the command; 'h' or HELP_ALL: print help */
 } reading;
 

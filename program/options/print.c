@@ -248,8 +248,8 @@ static void print_member(const char *parent, const char *name, json_t *value, in
   }
 }
 
-/* Print the members of the object with the key `parent`; if all are rows, print one table with
- * their labels. */
+/* Print the members of the object with the key `parent`; if every member is an object on one row,
+ * print one table, with a label for each row. */
 static void print_object(const char *parent, json_t *object, int indent) {
   const char *name;
   json_t *member;

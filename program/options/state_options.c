@@ -7,7 +7,7 @@
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
-/* Limits of plausible volumes, as fractions of full inflation. Tissue alone has about the least. */
+/* Limits of plausible volumes, as fractions of full inflation. Tissue alone has about 0.1. */
 static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
 /* Fraction of triangles turned over, above which a surface is implausible. */
@@ -106,7 +106,7 @@ supine_status supine_options_read_volume(const char *text, void *field, supine_e
 
 static supine_status read_from(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
-  *state = (supine_state){.gravity = {0.0}}; /* zero: supine_options_reference sets the posture */
+  *state = (supine_state){.gravity = {0.0}}; /* supine_options_reference sets the posture */
   return supine_state_parse(text, state, error);
 }
 

@@ -196,7 +196,7 @@ static void place_name(double (*box)[3], size_t count, double line) {
 }
 
 /* Draw discs and dots at the marks, then the labels over them. The scene lies at (x, y); `size` is
- * that of the font, pixels. */
+ * the size of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y) {
   double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
@@ -263,7 +263,7 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
 }
 
 /* Draw the lungs and the marks of a panel in a box of `width` x `height` pixels at (x, y); `size`
- * is that of the font, pixels. The 13 parameters say what to draw, and where. */
+ * is the size of the font, pixels. The 13 parameters say what to draw, and where. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,

@@ -66,7 +66,7 @@ typedef struct supine_scene {
   supine_view view;
   bool shell;           /**< draw a grey, transparent shell with an outline instead of colours */
   size_t width, height; /**< size of the drawing, pixels */
-  const double *extent; /**< [4] extent to show, by supine_render_extent; NULL: that of the scene */
+  const double *extent; /**< [4] extent to show, by supine_render_extent; NULL: the scene's own */
 } supine_scene;
 
 /** Empty extent, to be enlarged by supine_render_extent. */

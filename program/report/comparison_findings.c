@@ -7,7 +7,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* Published values for the rows of their postures; report.html names the sources. */
+/* Published values, each for the table row of its posture; report.html names the sources. */
 static const struct {
   const char *posture, *words;
 } published[] = {

@@ -53,7 +53,7 @@ typedef struct supine_stream_counts {
   uint64_t refused;     /**< poses refused */
   uint64_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
   uint64_t skipped;     /**< messages of unknown types, or too large */
-  uint64_t unreachable; /**< frames with earlier gains, as their own volume is out of reach */
+  uint64_t unreachable; /**< frames with the previous gains, because the volume was unreachable */
   uint64_t frames;
   uint64_t sent;        /**< frames sent, summed over peers */
   uint64_t peers;       /**< peers accepted */

@@ -283,7 +283,7 @@ void supine_compare_statistics(const supine_compare *compare, const float *dista
   for (size_t i = 0; i < compare->basis->info.vertex_count; ++i) {
     const double share = (double)compare->share[i];
     const double d = (double)distance[i];
-    area += share; /* becomes 1, up to rounding */
+    area += share; /* 1 after the last vertex, up to rounding */
     sum += share * d;
     square += share * d * d;
     largest = distance[i] > largest ? distance[i] : largest;

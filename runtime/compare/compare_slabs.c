@@ -50,7 +50,7 @@ static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   return out;
 }
 
-/* Add the volume, mL, of the cone from the origin to a polygon, and its gain in the breath. */
+/* Add the volume of the cone from the origin to a polygon, and what it gains in the breath, mL. */
 static void add_polygon(const polygon *p, supine_slab *slab) {
   double volume[TIMES] = {0};
   for (size_t i = 1; i + 1 < p->count; ++i) {

@@ -19,9 +19,9 @@ typedef int32_t vi __attribute__((vector_size(4 * LANES)));
 typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 
 enum {
-  GROUPS = TILE / LANES,         /* vectors that hold one number of each vertex of a tile */
-  PIECES = TILE_NUMBERS / LANES, /* vectors that hold the coordinates of a tile */
-  CHAINS = GROUPS == 1 ? 2 : 1,  /* partial sums over the modes; a second sum hides latency */
+  GROUPS = TILE / LANES,         /* number of vectors that hold a `row` */
+  PIECES = TILE_NUMBERS / LANES, /* number of vectors that hold `triples` */
+  CHAINS = GROUPS == 1 ? 2 : 1,  /* number of partial sums over the modes; two hide latency */
   KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
 

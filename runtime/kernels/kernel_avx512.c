@@ -12,7 +12,7 @@ typedef struct writer {
   __m512 last;  /* last vector given to writer_put() */
   __m512i join; /* permutation that selects a line from (last, next) */
   float *to;
-  size_t offset; /* number of floats from the last line boundary to `to` */
+  size_t offset; /* number of floats from the start of a cache line to `to` */
   bool stream;
   bool shared; /* the next line to store begins before the array */
 } writer;

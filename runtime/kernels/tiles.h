@@ -33,7 +33,7 @@ typedef struct supine_tiles {
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
   size_t stride;          /**< size of a tile in bytes */
   size_t count;           /**< number of tiles */
-  /** Exponent of the unit of compact reference positions, as the exponent bits of a float. */
+  /** Unit of compact reference positions, a power of two: the bits of its exponent in a float. */
   uint32_t reference_unit;
   unsigned char *bytes; /**< [count, stride] the tiles */
 } supine_tiles;

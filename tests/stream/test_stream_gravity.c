@@ -72,7 +72,7 @@ TEST(test_gravity_tracker_matrices_give_postures) {
     double r[9];
     double gravity[3];
     matrix_of(&placements[i], r);
-    assert_true(fabs(determinant(r) - 1.0) < tolerance); /* checks the table */
+    assert_true(fabs(determinant(r) - 1.0) < tolerance); /* a rotation */
     assert_int_equal(take(r, gravity), SUPINE_STREAM_EXACT);
     expect_gravity(gravity, placements[i].posture);
   }

@@ -312,7 +312,7 @@ TEST(test_server_each_pose_answered_by_weights) {
   assert_true(send_bytes(peer, bytes + size - 1, 1));
   (void)receive_stamp(peer, 300, &header, body);
   expect_weights(s, poses[2], -12.0, body);
-  rest(1.0); /* the latency of the next message must not include this age of the pose */
+  rest(1.0); /* the latency of the next message must not include this second */
   assert_true(say(peer, "VOLUME", "rest-11"));
   assert_true(receive(peer, &header, body));
   expect_weights(s, poses[2], -11.0, body);
@@ -368,7 +368,7 @@ TEST(test_server_send_request_switches_content) {
   unsigned char body[4096];
   const size_t points = 40 + 12 * info->vertex_count;
   size_t whole = 0;                          /* size of a body with points and triangles */
-  assert_true(send_pose(peer, poses[3], 1)); /* before any request, weights are the answer */
+  assert_true(send_pose(peer, poses[3], 1)); /* until a peer asks for content, it gets weights */
   (void)receive_stamp(peer, 1, &header, body);
   const char *const wishes[] = {"points", "surface"};
   for (uint64_t w = 0; w < 2; ++w) {
@@ -388,7 +388,7 @@ TEST(test_server_send_request_switches_content) {
       const supine_pose pose = pose_of(s, poses[i], 30.0);
       float xyz[300];
       supine_deform_range(s->basis, &pose, 0, 100, xyz);
-      for (int k = 0; k < 300; ++k) { /* the server calls the same function */
+      for (int k = 0; k < 300; ++k) { /* the server calls supine_deform_range too */
         assert_true(fabsf(float_at(body + 40 + 4 * k) - xyz[k]) < 1e-4f);
       }
     }
