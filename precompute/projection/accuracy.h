@@ -14,7 +14,8 @@
 /** Errors of displacement over all vertices and held-out directions. */
 typedef struct supine_accuracy {
   size_t direction_count;
-  double relative_rms, relative_p95, relative_max; /**< errors as fractions of the RMS displacement, for equal gains */
+  double relative_rms, relative_p95,
+      relative_max; /**< errors as fractions of the RMS displacement, for equal gains */
   /** Fraction, 0 to 1, of the requested volume at which the errors in mm were measured; if rest is
    * unknown, supine_precompute replaces it by that volume in mL. 0: the surface is open, and there
    * are no errors in mm. */
