@@ -8,7 +8,7 @@
 #include <webp/demux.h>
 
 /* Basis of an open surface, made by a version that accepted open surfaces. */
-#define OPEN SUPINE_GOLDEN "/open_surface.safetensors"
+#define OPEN "\"" SUPINE_GOLDEN "/open_surface.safetensors\""
 
 static size_t count_words(const char *text, const char *word) {
   size_t count = 0;
