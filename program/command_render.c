@@ -27,7 +27,7 @@ typedef struct request {
   supine_from from;     /* state that colours and displacements are measured from */
   const char *inside;   /* file of structures inside; NULL: none */
   double largest;       /* end of the colour bar, mm; 0: automatic */
-  double opacity;       /* opacity of the lungs; 0: not given */
+  double opacity;       /* opacity of the lungs, 0 to 1; 0: the default */
   size_t width, height; /* size of the picture, pixels; 0: automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;

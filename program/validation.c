@@ -128,7 +128,7 @@ static supine_status predict_surface(const supine_command_subject *s,
 typedef struct search {
   const supine_inside_surface *tree;
   size_t vertices, count; /* number of vertices, and number of those measured */
-  double *distance;       /* [count] distances to the surface, mm */
+  double *distance;       /* [count] distance of each measured vertex from the surface, mm */
 } search;
 
 /* Compute the RMS distance, mm, from the vertices to the surface if all gains are changed in

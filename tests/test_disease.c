@@ -68,8 +68,8 @@ static void widen(double range[2], double value) {
   range[1] = fmax(range[1], value);
 }
 
-/* Compare a breath with the lesion to one without. Both have `volume` mL or, if it is 0, the same
- * scale. */
+/* Compare a breath with the lesion to one without. Both breaths have `volume` mL;
+ * if `volume` is 0, both have a scale of 1. */
 static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
   double *factors = no_lesions(lungs);

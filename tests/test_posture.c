@@ -99,7 +99,7 @@ TEST(test_quaternion_known_orientations_literal) {
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, h, 0}, g), SUPINE_OK);
   assert_vector(g, 1, 0, 0);
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, 0, h}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* a rotation about gravity changes nothing */
+  assert_vector(g, 0, 0, -1); /* the body's own axis z points up: upright, however it is turned */
 }
 
 /* Rotate v by the quaternion q: out = q v q*, written with cross products. */

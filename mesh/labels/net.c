@@ -15,8 +15,8 @@
  * are inside and some outside. */
 typedef struct surface_net {
   size_t count;
-  uint32_t (*cell)[3];      /* indices of the lowest cube of each vertex's cell */
-  double (*at)[3];          /* position of each vertex in its cell, 0 to 1 along each axis */
+  uint32_t (*cell)[3]; /* x, y and z index of the first of the eight cubes of each vertex's cell */
+  double (*at)[3];     /* position of each vertex in its cell, 0 to 1 along each axis */
   uint32_t (*neighbour)[6]; /* vertices across the cell's faces -x, +x, -y, ..., or NONE */
   size_t quad_count;
   uint32_t (*quad)[4]; /* corners, whose order faces outwards if the map's axes are right-handed */

@@ -11,12 +11,13 @@
 typedef struct supine_lungs {
   supine_mesh mesh;
   supine_topology topology;
-  size_t lung_count;        /**< 1 or 2 */
-  size_t lung_begin[3];     /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
-  size_t triangle_begin[3]; /**< first triangle of each lung, then the number of triangles */
-  int side[2];              /**< +1 left, -1 right */
-  bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
-  double minimum[3];        /**< bounding box over all lungs, mm */
+  size_t lung_count;    /**< 1 or 2 */
+  size_t lung_begin[3]; /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
+  size_t
+      triangle_begin[3]; /**< triangles of lung j: triangle_begin[j] <= t < triangle_begin[j + 1] */
+  int side[2];           /**< +1 left, -1 right */
+  bool reversed[2];      /**< whether the lung's triangles faced inwards and were reversed */
+  double minimum[3];     /**< bounding box over all lungs, mm */
   double maximum[3];
   double *scanned; /**< [N, 3] vertices in the scan if `mesh` was moved from there to full
                         inflation (reference.h); else NULL */

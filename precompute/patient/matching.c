@@ -15,7 +15,7 @@
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5; /* cosine of the largest angle between compatible normals */
+static const double compatible = 0.5; /* smallest cosine between normals that match: 60 degrees */
 static const double biweight = 4.685; /* cutoff of Tukey's biweight, in units of the robust scale */
 static const double surface_noise = 0.5; /* standard deviation of the noise of a row, mm */
 static const double scale_least = 0.02;  /* lower bound on the robust scale, mm */

@@ -23,7 +23,7 @@ enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 /* Sums over one of the PARTS of the vertices. */
 typedef struct tally {
   double field2;         /* sum of the squared displacements at gain 1, mm^2 */
-  supine_tally error;    /* errors at gain 1, mm */
+  supine_tally error;    /* errors of displacements at gain 1, mm */
   supine_tally error_mm; /* errors at equal volumes, mm */
 } tally;
 

@@ -25,7 +25,7 @@ typedef struct supine_compared_posture {
 typedef struct supine_comparison {
   const char *path;    /* file of the basis */
   const char *command; /* name of the command, for its messages */
-  const char *made_by; /* whole command line, for the report's last section */
+  const char *made_by; /* command line, which the report prints */
   bool allow_folds;
   const supine_basis *basis;
   supine_state state; /* supine at the volume at which all postures are compared */

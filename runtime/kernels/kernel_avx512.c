@@ -14,7 +14,7 @@ typedef struct writer {
   float *to;
   size_t offset; /* number of floats from the start of a cache line to `to` */
   bool stream;
-  bool shared; /* the next line to store begins before the array */
+  bool shared; /* the first cache line also holds data in front of the array */
 } writer;
 
 static inline __attribute__((always_inline)) writer writer_open(const supine_target *target) {

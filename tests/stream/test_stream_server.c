@@ -467,7 +467,7 @@ TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   (void)close(honest);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.peers, 4);
-  assert_int_equal(counts.lost, 0); /* a peer that vanishes does not count as lost */
+  assert_int_equal(counts.lost, 0); /* `lost` excludes peers that close the connection */
   (void)close(stuck);
   (void)close(half);
   stage_destroy(s);

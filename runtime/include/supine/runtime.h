@@ -70,8 +70,8 @@ typedef struct supine_basis_options {
   size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
-  bool without_normals; /**< ignore the file's normals, to save 12 bytes for each vertex and three
-                           modes of the normals */
+  bool without_normals; /**< do not load normals; saves 4 Q bytes per vertex for Q modes of the
+                           normals */
 } supine_basis_options;
 
 /** The content of an open basis. The basis owns the struct and all arrays. */
