@@ -193,43 +193,30 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
   return SUPINE_OK;
 }
 
-/* Compute the expected error of points near a surface in three dimensions, RMS in mm, and their
- * mean displacement, mm. Without landmarks the displacement along the surface is not observed, so
- * the covariance of g is that of other patients. */
-static supine_status find_expected_error(const study *s, size_t triples,
-                                         const supine_patient_krige *fitted, double *expected,
-                                         double *mean, supine_error *error) {
+/* Compute the expected error, by `krige`, of points near a surface in three dimensions, RMS in mm;
+ * return the mean displacement of the points by the fitted law, mm. */
+static double find_expected_error(const study *s, const supine_patient_power *law,
+                                  supine_patient_krige *krige, double *expected) {
   const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
   const double share = 1.0 / ceil((double)s->row_count / (double)step);
-  supine_patient_fit_options options = s->options;
-  supine_patient_krige krige = {0};
   double variance = 0.0;
-  options.noise = fitted->noise;
-  if (triples == 0) {
-    options.sill = 1.0;
-    options.uncorrected = false;
-  }
-  const supine_status status =
-      supine_patient_krige_fit(&options, s->rows, s->row_count, &krige, error);
-  *mean = 0.0;
-  for (size_t i = 0; i < s->row_count && status == SUPINE_OK; i += step) {
+  double mean = 0.0;
+  for (size_t i = 0; i < s->row_count; i += step) {
     supine_patient_row row = s->rows[i];
     double u[3];
-    supine_patient_direction(&fitted->law, &row.place,
-                             supine_patient_force_at(&fitted->law, &row.place), u);
-    *mean += supine_length(u) * share;
+    supine_patient_direction(law, &row.place, supine_patient_force_at(law, &row.place), u);
+    mean += supine_length(u) * share;
     for (size_t a = 0; a < 3; ++a) {
       double axis_variance;
       for (size_t b = 0; b < 3; ++b) {
         row.axis[b] = a == b ? 1.0 : 0.0;
       }
-      (void)supine_patient_krige_predict(&krige, &row, &axis_variance);
+      (void)supine_patient_krige_predict(krige, &row, &axis_variance);
       variance += axis_variance * share;
     }
   }
   *expected = near_surface * sqrt(variance);
-  supine_patient_krige_free(&krige);
-  return status;
+  return mean;
 }
 
 static supine_patient_score baseline_of(const study *s) {
@@ -252,16 +239,26 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
   squares held_out = {.points = 0};
   double mean_displacement = 0.0;
   supine_patient_krige krige = {0};
+  supine_patient_krige population = {0}; /* by the covariance of other patients */
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
   if (status == SUPINE_OK) {
     add_residuals(s, s->rows, s->row_count, &krige, &fitted);
     s->options.sill = krige.sill;
     s->options.uncorrected = krige.sill == 0.0;
-    status =
-        find_expected_error(s, triples, &krige, &report->expected_point, &mean_displacement, error);
     supine_patient_krige_errors(&krige, report->error);
     supine_patient_krige_copy_law(&krige, patient);
+  }
+  if (status == SUPINE_OK && triples == 0) { /* the rows hold nothing of the sliding */
+    supine_patient_fit_options options = s->options;
+    options.sill = 1.0;
+    options.noise = krige.noise;
+    options.uncorrected = false;
+    status = supine_patient_krige_fit(&options, s->rows, s->row_count, &population, error);
+  }
+  if (status == SUPINE_OK) {
+    mean_displacement = find_expected_error(s, &krige.law, triples == 0 ? &population : &krige,
+                                            &report->expected_point);
   }
   if (status == SUPINE_OK) {
     status = hold_all_out(s, &held_out, error);
@@ -277,6 +274,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
         mean_displacement > 0.0 ? pow(report->expected_point, 2.0) / mean_displacement : 0.0;
     report->band = held_out.points > 0.0 ? 100.0 * held_out.within / held_out.points : 0.0;
   }
+  supine_patient_krige_free(&population);
   supine_patient_krige_free(&krige);
   return status;
 }
