@@ -141,6 +141,12 @@ TEST(test_load_ply_strips_refused) {
               "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
               "end_header\n3 0 1 2\n0 0 0\n1 0 0\n0 1 0\n",
               SUPINE_ERROR_MESH, "save the mesh as triangles");
+  refuse_text(state, "mixed.ply",
+              "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+              "property float z\nelement face 1\nproperty list int int vertex_indices\n"
+              "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+              "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 2\n",
+              SUPINE_ERROR_MESH, "strips of triangles");
 }
 
 /* A flat concave face of any size is cut within its outline: all triangles face the same way and

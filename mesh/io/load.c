@@ -104,10 +104,11 @@ static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_err
   *reader = find_reader(file->path);
   return *reader != NULL
              ? SUPINE_OK
-             : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: no importer for this ending; give the mesh as PLY, OBJ, STL "
-                                "or VTP",
-                                file->path);
+             : supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: no importer for the ending of its name; give the mesh as .ply, .obj, .stl "
+                   "or .vtp",
+                   file->path);
 }
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,

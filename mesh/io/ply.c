@@ -7,7 +7,7 @@
 enum { ELEMENTS_MAX = 32, PROPERTIES_MAX = 256 };
 
 typedef enum encoding { ASCII, LITTLE, BIG, ENCODINGS } encoding;
-typedef enum kind { VERTICES, FACES, OTHER } kind;
+typedef enum kind { VERTICES, FACES, STRIPS, OTHER } kind;
 /* Use of a property: a coordinate, the corners of a face, or none. */
 typedef enum role { X, Y, Z, CORNERS, NONE } role;
 
@@ -48,7 +48,7 @@ static int find_name(mesh_text word, const char *const *names) {
 }
 
 static bool add_element(ply *in, mesh_text name, mesh_text count) {
-  static const char *const kinds[] = {"vertex", "face", NULL};
+  static const char *const kinds[] = {"vertex", "face", "tristrips", NULL};
   if (in->element_count == ELEMENTS_MAX) {
     return false;
   }
@@ -153,6 +153,10 @@ static supine_status check_header(const ply *in) {
           in->error, SUPINE_ERROR_FORMAT,
           "%s: element %zu of the PLY header has no property; save the mesh again", path, e + 1);
     }
+    if (in->elements[e].kind == STRIPS && in->elements[e].count > 0) {
+      return supine_error_set(in->error, SUPINE_ERROR_MESH,
+                              "%s: it has strips of triangles; save the mesh as triangles", path);
+    }
   }
   if (in->encoding == ASCII && !supine_mesh_guard_text(in->file, in->error)) {
     return SUPINE_ERROR_FORMAT;
@@ -192,7 +196,7 @@ static bool take(ply *in, const mesh_type *type, double *value) {
 }
 
 static supine_status cut_short(const ply *in, const element *of, uint64_t item) {
-  static const char *const names[] = {"vertex", "face", "item"};
+  static const char *const names[] = {"vertex", "face", "tristrips", "item"};
   return supine_error_set(
       in->error, SUPINE_ERROR_FORMAT,
       "%s: truncated or malformed at %s %llu of the %llu in the PLY header; save the mesh again",

@@ -255,7 +255,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   if (status == SUPINE_OK && !(lung->mask >= least_lung && longest <= longest_lung)) {
     supine_labels_mask_free(&mask);
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "%s: the %s lung holds %.2g mL in a box %.3g mm long, which is "
+                            "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is "
                             "impossible for a lung: check --labels and the voxel size in the "
                             "header",
                             w->path, name, lung->mask, longest);

@@ -245,8 +245,7 @@ SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose
 SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose *pose,
                                     size_t begin, size_t end, float *xyz);
 
-/** Compute supine_deform_range for many poses, at about the speed of a matrix product, as each
- * vertex is read from memory only once.
+/** Compute supine_deform_range for many poses. Each vertex is read from memory only once.
  * @param poses  [count]
  * @param xyz    [count, end - begin, 3] mm, written */
 SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
