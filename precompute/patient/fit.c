@@ -206,7 +206,7 @@ static double find_expected_error(const study *s, const supine_patient_power *la
     double u[3];
     supine_patient_direction(law, &row.place, supine_patient_force_at(law, &row.place), u);
     mean += supine_length(u) * share;
-    for (size_t a = 0; a < 3; ++a) {
+    for (size_t a = 0; a < 3 && s->components == 1; ++a) { /* else held-out points give it */
       double axis_variance;
       for (size_t b = 0; b < 3; ++b) {
         row.axis[b] = a == b ? 1.0 : 0.0;
@@ -239,6 +239,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
   squares held_out = {.points = 0};
   double mean_displacement = 0.0;
   supine_patient_krige krige = {0};
+  const bool sliding_unseen = triples == 0 && s->options.region_count == 0;
   supine_patient_krige population = {0}; /* by the covariance of other patients */
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
@@ -249,7 +250,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
     supine_patient_krige_errors(&krige, report->error);
     supine_patient_krige_copy_law(&krige, patient);
   }
-  if (status == SUPINE_OK && triples == 0) { /* the rows hold nothing of the sliding */
+  if (status == SUPINE_OK && sliding_unseen) { /* the rows hold nothing of the sliding */
     supine_patient_fit_options options = s->options;
     options.sill = 1.0;
     options.noise = krige.noise;
@@ -257,7 +258,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
     status = supine_patient_krige_fit(&options, s->rows, s->row_count, &population, error);
   }
   if (status == SUPINE_OK) {
-    mean_displacement = find_expected_error(s, &krige.law, triples == 0 ? &population : &krige,
+    mean_displacement = find_expected_error(s, &krige.law, sliding_unseen ? &population : &krige,
                                             &report->expected_point);
   }
   if (status == SUPINE_OK) {

@@ -171,6 +171,7 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
   memcpy(further->scale, w->x, sizeof further->scale);
   further->gain = w->x[GAIN];
   for (size_t without = 0; without < EIGHTHS && further->fits_gain; ++without) {
+    memcpy(w->x, further->scale, sizeof further->scale);
     (void)fit(w, true, without);
     const double change_of_gain = w->x[GAIN] - further->gain;
     sum += change_of_gain;
