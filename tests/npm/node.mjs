@@ -112,5 +112,5 @@ for (let round = 0; round < 5; ++round) {
   }
 }
 const ratios = fastest[0].map((taken, i) => taken / fastest[1][i]);
-console.log(`x.toFixed(2))}; in plain C ${fastest[1]}; ${ratios.map((x) => x.toFixed(2))} times => ns per vertex of deform and deformLit: ${fastest[0].map((x) => x.toFixed(2))}; in plain C ${fastest[1]}; ratios ${ratios.map((x) => x.toFixed(2))} => x.toFixed(2))}; in plain C ${fastest[1]}; ${ratios.map((x) => x.toFixed(2))} times`);
+console.log(`ns per vertex of deform and deformLit: ${fastest[0].map((x) => x.toFixed(2))}; in plain C ${fastest[1]}; ratios ${ratios.map((x) => x.toFixed(2))}`);
 assert.ok(Math.max(...ratios) <= 2.5);
