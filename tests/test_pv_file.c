@@ -80,6 +80,8 @@ TEST(test_load_missing_file_or_folder_reports_read_error) {
                    SUPINE_ERROR_READ);
   assert_non_null(strstr(error.message, "/nonexistent/s.csv"));
   assert_int_equal(supine_breath_load("/nonexistent/p.csv", &pv, &error), SUPINE_ERROR_READ);
+  assert_int_equal(supine_breath_load(folder, &pv, &error), SUPINE_ERROR_READ);
+  assert_non_null(strstr(error.message, folder));
 }
 
 static supine_status load(const char *text, supine_pv *pv, supine_error *error) {
@@ -144,6 +146,7 @@ TEST(test_load_malformed_parameters_message_names_fault) {
     supine_pv pv;
     supine_error error = {0};
     assert_int_equal(load(bad[i].text, &pv, &error), SUPINE_ERROR_FORMAT);
+    assert_non_null(strstr(error.message, "make the file with 'supine pv fit'"));
     if (strstr(error.message, bad[i].expected) == NULL || strstr(error.message, path) == NULL) {
       fail_msg("the message '%s' lacks '%s'", error.message, bad[i].expected);
     }

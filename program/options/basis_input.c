@@ -7,8 +7,7 @@
 #include "program/options/basis_input.h"
 
 const supine_option supine_options_as_scanned[] = {
-    {"as-scanned", 0, NULL,
-     "write in the axes and units of the scan, to overlay it; default LPS and mm",
+    {"as-scanned", 0, NULL, "write in the axes and units of the scan instead of LPS and mm",
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
@@ -45,7 +44,7 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
   return SUPINE_OK;
 }
 
-/* Convert positions [N, 3] to doubles; return NULL if out of memory. */
+/* Return positions [N, 3] as doubles, or NULL if out of memory. */
 static double *to_doubles(const supine_basis *basis, const float *xyz) {
   const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
   double *converted = malloc(count * sizeof *converted);

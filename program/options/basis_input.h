@@ -12,27 +12,27 @@
 
 #include "program/options/command.h"
 
-/* Table of --as-scanned, which sets a bool: write outputs in the axes and units of the scan. */
+/* Table of the option --as-scanned, which sets a bool. */
 extern const supine_option supine_options_as_scanned[];
 
-/* Open a basis without its stored normals, as commands compute normals from the triangles. Close
- * the basis also after a failure.
+/* Open a basis of a closed surface without its stored normals: commands compute normals from the
+ * triangles. The caller must close the basis even if this fails.
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume
  * @retval any status of supine_basis_open_with */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
                                         supine_basis **basis, supine_error *error);
 
-/* Check that the surface of a basis, read from the file `path`, encloses a volume.
+/* Check that the surface of a basis encloses a volume. `path` names the file in the message.
  * @retval SUPINE_ERROR_OPEN_SURFACE */
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
                                           supine_error *error);
 
-/* If `wanted`, set the axes and unit of `save` to those of the scan.
- * @retval SUPINE_ERROR_FORMAT  the basis does not state them */
+/* If `wanted`, set the axes and the unit of `save` to those of the scan.
+ * @retval SUPINE_ERROR_FORMAT  the basis does not state the axes and the unit of its scan */
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
 
-/* Return the positions [N, 3] of a pose, which the caller frees; NULL if out of memory. */
+/* Return the positions [N, 3] of a pose, or NULL if out of memory. The caller frees them. */
 double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose);
 
 /* Copy the reference surface into a mesh; release the mesh with supine_mesh_free.
@@ -47,20 +47,20 @@ supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *
 
 /* Expected errors. Initialise with zeros, and release with supine_options_expected_free. */
 typedef struct supine_expected {
-  float *sigma;        /* [N] expected error of each vertex, mm; NULL: unknown */
-  double rms, largest; /* RMS and maximum over the vertices, mm */
-  bool turned;         /* the two states differ in posture */
+  float *sigma;        /* [N] expected error of each displacement, mm; NULL if unknown */
+  double rms, largest; /* RMS and maximum of `sigma` over the vertices, mm */
+  bool turned;         /* the posture changes between the two states */
 } supine_expected;
 
-/* Compute the expected errors of the displacements from one state to another. For fields of another
- * simulator and for open surfaces they are unknown, and `expected` keeps its value.
+/* Compute the expected errors of the displacements from one state to another. They are unknown for
+ * open surfaces and for displacements computed by another simulator; `expected` is then unchanged.
  * @retval SUPINE_ERROR_MEMORY, or any status of supine_basis_pose */
 supine_status supine_options_expected_find(const supine_basis *basis, const supine_state *state,
                                            const supine_state *from, supine_expected *expected,
                                            supine_error *error);
 void supine_options_expected_free(supine_expected *expected);
 
-/* Print the RMS and maximum of the errors in one line, or nothing if they are unknown. */
+/* Print the RMS and the largest of the errors in one line, or nothing if they are unknown. */
 void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

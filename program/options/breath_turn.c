@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute gravity while the body turns, and the state of the lungs at a volume of a breath. */
+/* Compute the direction of gravity while the body turns, and make the state for a volume. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "program/options/breath_turn.h"
 #include "program/options/state_options.h"
 
-/* Compute the direction at 90 degrees from `from`, towards `to`. */
+/* Compute the unit vector perpendicular to `from` in the plane of the turn, towards `to`. */
 static void find_quarter(const breath_turn *turn, double quarter[3]) {
   static const double left[3] = {1.0, 0.0, 0.0};
   static const double back[3] = {0.0, 1.0, 0.0};
@@ -17,10 +17,10 @@ static void find_quarter(const breath_turn *turn, double quarter[3]) {
   double axis[3];
   supine_cross(from, turn->to, axis);
   const double sine = supine_length(axis);
-  if (sine < 1e-9) { /* opposite directions leave the axis open */
+  if (sine < 1e-9) { /* opposite directions do not determine the axis */
     const double *over = fabs(from[2]) > 0.5 ? back : left;
     supine_cross(from, over, axis);
-    if (supine_dot(axis, axis) < 1e-9) { /* a turn from one side to the other */
+    if (supine_dot(axis, axis) < 1e-9) { /* `from` is parallel to `left` */
       supine_cross(from, back, axis);
     }
   }
@@ -57,7 +57,7 @@ supine_status supine_breath_turn_read(const char *text, void *turn, supine_error
   }
   if (!supine_options_parse_number(seconds, &made->seconds) || !(made->seconds > 0.0)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "'%s' needs a time above 0 s, as in supine:left:5s", text);
+                            "'%s': the time must be above 0 s, as in supine:left:5s", text);
   }
   const supine_status status = supine_options_posture(from, made->from, error);
   return status == SUPINE_OK ? supine_options_posture(to, made->to, error) : status;

@@ -109,7 +109,7 @@ bool supine_options_parse_count(const char *text, size_t *value) {
 
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
-  size_t fewest = 1 + strlen(text) / 2; /* edits allowed at first, then the fewest found */
+  size_t fewest = 1 + strlen(text) / 2; /* candidates with more edits are not suggested */
   for (size_t i = 0; i < count; ++i) {
     const size_t edits = supine_words_distance(text, candidates[i]);
     if (edits < fewest || (edits == fewest && best == NULL)) {
@@ -120,24 +120,23 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
   return best;
 }
 
-/* orderly: 1 if the command stops by itself after a signal; interrupted: 1 once it must stop. */
-static volatile sig_atomic_t orderly, interrupted;
-static volatile time_t interrupted_at; /* time of the first signal, s since 1970 */
+static volatile sig_atomic_t stops_by_itself, interrupted;
+static volatile time_t interrupted_at; /* s since 1970 */
 
-/* Ask the command to stop, if it can stop by itself; else end the program. A later signal ends the
- * program too, except within a second of the first, as timeout(1) sends each signal twice. */
+/* If the command stops by itself, ask it to stop; otherwise end the program. A second signal also
+ * ends the program, unless it comes within a second: timeout(1) sends each signal twice. */
 static void on_signal(int number) {
   const time_t now = time(NULL);
-  if (orderly != 0 && interrupted == 0) {
+  if (stops_by_itself != 0 && interrupted == 0) {
     interrupted = 1;
     interrupted_at = now;
   }
-  if (orderly != 0 && now - interrupted_at < 2) {
+  if (stops_by_itself != 0 && now - interrupted_at < 2) {
     return;
   }
   supine_output_abandon_all();
   (void)signal(number, SIG_DFL);
-  (void)raise(number); /* takes effect when this handler returns */
+  (void)raise(number); /* the signal is delivered when this handler returns */
 }
 
 void supine_options_signals_catch(bool orderly_end) {
@@ -145,11 +144,11 @@ void supine_options_signals_catch(bool orderly_end) {
   struct sigaction action = {0};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
-  orderly = orderly_end ? 1 : 0;
+  stops_by_itself = orderly_end ? 1 : 0;
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     (void)sigaction(numbers[i], &action, NULL);
   }
-  (void)signal(SIGXFSZ, SIG_IGN); /* a write beyond the size limit then fails */
+  (void)signal(SIGXFSZ, SIG_IGN); /* then a write beyond the file size limit fails */
 }
 
 bool supine_options_interrupted(void) {
@@ -164,8 +163,8 @@ supine_progress supine_options_progress_begin(const char *label) {
 bool supine_options_progress_step(void *progress, double fraction) {
   supine_progress *state = progress;
   const double time = supine_clock_seconds();
-  if (state->terminal && time - state->shown > 0.1) {
-    state->shown = time;
+  if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
+    state->shown_at = time;
     const double spent = time - state->start;
     (void)fprintf(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);
     if (fraction > 0.02 && spent > 1.0) {
@@ -177,7 +176,7 @@ bool supine_options_progress_step(void *progress, double fraction) {
 }
 
 void supine_options_progress_end(supine_progress *progress) {
-  if (progress->terminal) {
+  if (progress->stderr_is_terminal) {
     (void)fputs("\r\033[K", stderr);
     (void)fflush(stderr);
   }

@@ -33,48 +33,46 @@ extern const supine_command *const supine_command_list[];
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
-/* Print the message of an error, or if it is empty the status in words; return the exit code. */
+/* Print the message of an error, or its status if the message is empty; return the exit code. */
 int supine_options_fail(const char *command, supine_status status, const supine_error *error);
 
 /* Flush standard output; return SUPINE_EXIT_OUTPUT if the disk is full or the pipe is closed. */
 int supine_options_finish(const char *command);
 
-/* Print a JSON object, or a list of objects, to standard output and release it. As text, each
- * member is a line and each list of objects a table. A failure to write is reported when the
- * command ends. */
+/* Print a JSON object or a list of objects to standard output, and release it. As text, each member
+ * is one line, and each list of objects is a table. supine_options_finish reports failed writes. */
 void supine_options_print(json_t *value, bool json);
 
-/* Return a text from outside, such as a file name, as a JSON string; invalid UTF-8 is replaced. */
+/* Return a text such as a file name as a JSON string; replace bytes that are not UTF-8 by "?". */
 json_t *supine_options_json_text(const char *text);
 
 /* Return numbers as a JSON array; numbers that are not finite become null. */
 json_t *supine_options_json_numbers(size_t count, const double *numbers);
 
-/* Write the command line into `text` [size], for the metadata of a file; paths are shortened to the
- * part after the last slash. */
+/* Write the command line into `text` [size]; shorten paths to the part after the last slash. */
 void supine_options_describe(int argc, char **argv, char *text, size_t size);
 
-/* Read a text that is a finite number, or a whole number of at least 0; return false for other
- * texts. */
+/* Read a finite number; return false for any other text. */
 bool supine_options_parse_number(const char *text, double *value);
+/* Read a whole number of at least 0; return false for any other text. */
 bool supine_options_parse_count(const char *text, size_t *value);
 
-/* Read a text of `count` finite numbers, separated by commas; return false for other texts. */
+/* Read `count` finite numbers separated by commas; return false for any other text. */
 bool supine_options_parse_numbers(const char *text, size_t count, double *values);
 
-/* Return the candidate that is the fewest edits away from `text`; NULL if all differ too much. */
+/* Return the candidate nearest to `text` by edit distance, or NULL if all differ too much. */
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count);
 
 /* Progress and remaining time, shown in one line of stderr if stderr is a terminal. */
 typedef struct supine_progress {
   const char *label;
-  double start;  /* when the work began, s of supine_clock_seconds */
-  double shown;  /* when the line was last written, s */
-  bool terminal; /* stderr is a terminal */
+  double start;    /* time at which the work began, s by supine_clock_seconds */
+  double shown_at; /* time at which the line was last written, s */
+  bool stderr_is_terminal;
 } supine_progress;
 
 supine_progress supine_options_progress_begin(const char *label);
-/* Show the fraction of the work done, 0 to 1; return false if the user interrupted it. */
+/* Show the fraction of the work done, 0 to 1; return false if the user has interrupted the work. */
 bool supine_options_progress_step(void *progress, double fraction);
 void supine_options_progress_end(supine_progress *progress);
 

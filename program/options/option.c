@@ -10,11 +10,11 @@
 
 #include "program/options/command.h"
 
-enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* getopt code of row i: FIRST_LONG + i */
+enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* row i has the getopt() code FIRST_LONG + i */
 
 typedef struct row {
   const supine_option *option;
-  char *begin; /* struct within the request that the option fills */
+  char *filled; /* struct within the request that the option fills */
   bool given;
   const char *value;
 } row;
@@ -24,14 +24,14 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
-  char standard[16]; /* replaces the output "-": its ending is added, as in "-.ply" */
-  int help;          /* 0: run the command; 'h' or HELP_ALL: print help */
+  char standard_output[16]; /* the output name "-" with an ending, such as "-.ply" */
+  int help;                 /* 'h' or HELP_ALL to print help; 0 to run the command */
 } reading;
 
 static void collect(void *context, const supine_option *option, size_t base) {
   reading *r = context;
   if (option->name != NULL && r->count < ROWS_MAX) {
-    r->rows[r->count++] = (row){.option = option, .begin = r->request + base};
+    r->rows[r->count++] = (row){.option = option, .filled = r->request + base};
   }
 }
 
@@ -84,8 +84,7 @@ static supine_status read_value(const supine_option *option, const char *text, v
   return SUPINE_ERROR_ARGUMENT;
 }
 
-/* Describe the values that the option takes. */
-static void say_wanted(const supine_option *option, char *text, size_t size) {
+static void describe_valid_values(const supine_option *option, char *text, size_t size) {
   if (option->wants != NULL) {
     (void)snprintf(text, size, "%s", option->wants);
   } else if (option->choices != NULL) {
@@ -108,10 +107,10 @@ static void say_wanted(const supine_option *option, char *text, size_t size) {
 static supine_status read_row(const row *target, const char *text, supine_error *error) {
   const supine_option *option = target->option;
   supine_error reason = {.message = ""};
-  const supine_status status = read_value(option, text, target->begin + option->offset, &reason);
+  const supine_status status = read_value(option, text, target->filled + option->offset, &reason);
   if (status == SUPINE_ERROR_ARGUMENT && reason.message[0] == '\0') {
     char wanted[384];
-    say_wanted(option, wanted, sizeof wanted);
+    describe_valid_values(option, wanted, sizeof wanted);
     return supine_error_set(error, status, "--%s takes %s, not '%s'", option->name, wanted, text);
   }
   return status == SUPINE_ERROR_ARGUMENT
@@ -123,9 +122,9 @@ static supine_status read_row(const row *target, const char *text, supine_error 
 static supine_status read_given(reading *r, row *target, const char *text, supine_error *error) {
   const supine_option *option = target->option;
   if (option->file == SUPINE_FILE_OUT && option->endings != NULL && strcmp(text, "-") == 0) {
-    (void)snprintf(r->standard, sizeof r->standard, "-%.*s", (int)strcspn(option->endings, ", "),
-                   option->endings);
-    text = r->standard;
+    (void)snprintf(r->standard_output, sizeof r->standard_output, "-%.*s",
+                   (int)strcspn(option->endings, ", "), option->endings);
+    text = r->standard_output;
   }
   for (size_t i = 0; option->rivals != NULL && i < r->count; ++i) {
     const supine_option *other = r->rows[i].option;
@@ -139,7 +138,7 @@ static supine_status read_given(reading *r, row *target, const char *text, supin
   target->given = true;
   target->value = text;
   if (option->given != 0) {
-    *(bool *)(target->begin + option->given - 1) = true;
+    *(bool *)(target->filled + option->given - 1) = true;
   }
   return read_row(target, text, error);
 }
@@ -178,7 +177,7 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
   }
   names[n++] = (struct option){"help", no_argument, NULL, 'h'};
   names[n] = (struct option){"help-all", no_argument, NULL, HELP_ALL};
-  optind = 0; /* restarts getopt_long(), which accepts any order */
+  optind = 0; /* restarts getopt_long() */
   opterr = 0;
   supine_status status = SUPINE_OK;
   for (int got;
@@ -199,7 +198,7 @@ static supine_status read_options(reading *r, int argc, char **argv, supine_erro
   return status;
 }
 
-/* Return whether a file name has one of the endings ".ply, .obj or .stl", in any letter case. */
+/* Return whether `path` has an ending in `endings` (".ply, .obj or .stl"), in any letter case. */
 static bool has_ending(const char *path, const char *endings) {
   const char *dot = strrchr(path, '.');
   if (dot == NULL || dot == path || dot[-1] == '/') {

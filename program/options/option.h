@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Declare a command and the table of its options, from which parsing, --help, suggestions, manual
- * pages and completions are derived. A complete command:
+/* Declare a command and the table of its options. Parsing, --help, suggestions, manual pages and
+ * completions all use the table. A complete command:
  *
  *     typedef struct request { const char *output; size_t vertices; } request;
  *
@@ -32,7 +32,7 @@
 
 /* Kind of a value; SUPINE_FILLS derives it from the type of the field. */
 typedef enum supine_option_kind {
-  SUPINE_OPTION_OWN,     /* another type, read by the option's `read` */
+  SUPINE_OPTION_OWN,     /* any other type, for which the option must set `read` */
   SUPINE_OPTION_FLAG,    /* bool, without a value: true if the option is given */
   SUPINE_OPTION_NUMBER,  /* double: a finite number within the range */
   SUPINE_OPTION_NUMBERS, /* double[n]: n numbers separated by commas */
@@ -42,17 +42,16 @@ typedef enum supine_option_kind {
 } supine_option_kind;
 
 /* Role of a file that an option names. Before the command runs, each output is checked: it must be
- * writable and not be an input. */
+ * writable and must not be an input. */
 typedef enum supine_option_file {
   SUPINE_FILE_NONE,
   SUPINE_FILE_IN,
   SUPINE_FILE_OUT
 } supine_option_file;
 
-/* Read `text` into `field`, the option's field, or the struct that the table fills if the option
- * has no field.
- * @retval SUPINE_ERROR_ARGUMENT  the text is invalid; printed as "--NAME: MESSAGE", or if there is
- *                                no message, as "--NAME takes WANTS, not 'TEXT'" */
+/* Read `text` into `field`: the option's field, or if it has none, the struct that the table fills.
+ * @retval SUPINE_ERROR_ARGUMENT  the text is invalid. The user sees "--NAME: MESSAGE", or without a
+ *                                message, "--NAME takes WANTS, not 'TEXT'" */
 typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
 static inline supine_status supine_options_fits(bool fits) {
   return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
@@ -60,24 +59,24 @@ static inline supine_status supine_options_fits(bool fits) {
 
 /* Row of a table: an option, a heading or another table. A row of zeros ends the table. */
 typedef struct supine_option {
-  const char *name;     /* long name; NULL: a heading or a table */
+  const char *name;     /* long name; NULL if the row is a heading or a table */
   char letter;          /* short name, or 0 */
-  const char *argument; /* name of the value in the help; NULL: no value */
+  const char *argument; /* name of the value in the help; NULL if there is no value */
   const char *help;     /* description, or the heading; "\n" begins a new line */
   supine_option_kind kind;
   size_t offset, size; /* offset and size of the field in its struct, bytes */
-  size_t given;        /* 1 + offset of a bool that is set if the option is given; 0: none */
+  size_t given;        /* 1 + offset of a bool that records that the option is given; or 0 */
   supine_option_reader *read;
-  const char *standard;       /* default, read like a value and shown in the help; NULL: zero */
-  double range[2];            /* limits of numbers and counts; both 0: no limits */
-  bool open;                  /* the limits themselves are excluded */
-  const char *wants;          /* description of valid values; NULL: derived from kind and range */
-  const char *const *choices; /* valid words, then NULL; with `read`, for shell completion only */
-  const char *rivals;         /* group of options, of which one may be given, and only once */
+  const char *standard; /* default, as the user would write it; NULL if none */
+  double range[2];      /* limits of numbers and counts; {0, 0} if there are none */
+  bool open;            /* true if the limits themselves are invalid */
+  const char *wants;    /* description of valid values; NULL to derive it from kind and range */
+  const char *const *choices; /* valid words, then NULL; if `read` is set, for completion only */
+  const char *rivals;         /* name of a group of options; only one of them may be given, once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
-  const char *endings;               /* valid endings of the file name: ".ply, .obj or .stl" */
+  const char *endings; /* valid endings of the file name, such as ".ply, .obj or .stl" */
   const struct supine_option *table; /* a shared table, which fills the struct at `offset` */
 } supine_option;
 
@@ -105,14 +104,14 @@ typedef struct supine_arguments {
 typedef struct supine_command {
   const char *name;
   const char *summary; /* a few words, for the list of commands */
-  const char *usage;   /* text after "supine NAME "; "\n" begins another usage */
+  const char *usage;   /* text after "supine NAME "; one usage per line */
   const char *about;   /* purpose; lines are wrapped unless they begin with a space */
   const supine_option *options;
   const char *notes; /* text below the options, examples last; wrapped like `about` */
   size_t operands_least, operands_most;
-  const char *operands_missing; /* message if there are fewer or more operands */
+  const char *operands_missing; /* message if the number of operands is wrong */
   size_t request_size;
-  void (*begin)(void *request); /* sets defaults that rows cannot express; NULL: none */
+  void (*begin)(void *request); /* sets defaults that rows cannot express; may be NULL */
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
 
@@ -123,23 +122,22 @@ typedef struct supine_command {
   .operands_least = 1, .operands_most = 1,                                                         \
   .operands_missing = "name one basis file (made by 'supine precompute')"
 
-/* Read the options into a request and run the command; return an exit code. argv[0] is the
- * command's name. */
+/* Read the options and run the command; return an exit code. argv[0] names the command. */
 int supine_options_run(const supine_command *command, int argc, char **argv);
 
-/* Return SUPINE_ERROR_ARGUMENT if an output is the same file as an input. Commands call it for
- * inputs named in a list file or within an option's value; other inputs are checked before they
- * run. */
+/* Return SUPINE_ERROR_ARGUMENT if an output is the same file as an input. Commands call this for
+ * inputs that are named in a list file or inside an option's value. All other inputs are checked
+ * before the command runs. */
 supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 
-/* Call `each` for every row of a table and of the tables in it, in order; `base` is the offset in
- * the request of the struct that the row fills. */
+/* Call `each` for every option and heading of a table and of the tables within it, in order. `base`
+ * is the offset in the request of the struct that the option fills. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
 void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
                           void *context);
 
-/* Print the help of a command, with every option if `all`, else without those that set `more`. */
+/* Print the help of a command. Unless `all` is true, omit the options that set `more`. */
 void supine_options_print_help(const supine_command *command, bool all, FILE *file);
 
 #endif

@@ -70,7 +70,7 @@ static bool is_row(json_t *object) {
   return json_is_object(object);
 }
 
-/* Labels of members. `parent` is the key of the object with the member; NULL: any object. */
+/* Labels of members. `parent` is the key of the object with the member, or NULL for any object. */
 static const struct {
   const char *parent, *key, *label;
 } labels[] = {{NULL, "additions", "additions per vertex"},
@@ -81,7 +81,7 @@ static const struct {
               {NULL, "blocks", "blocks of 40 mm"},
               {"force", "box", "cx, cy, cz"},
               {NULL, "confidence", "confidence level"},
-              {NULL, "constants_percent", "constants within, %"},
+              {NULL, "constants_percent", "error of constants, at most, %"},
               {NULL, "control", "control parameters c1 to c5"},
               {NULL, "control_interval", "  confidence interval, +-"},
               {NULL, "corrected", "law and kriging"},
@@ -132,7 +132,7 @@ static const struct {
               {NULL, "paper", "Santhanam 2008 found"},
               {NULL, "pressure_cmH2O", "pressure, from and to, cmH2O"},
               {NULL, "reach_mm", "reach of a force, mm"},
-              {NULL, "rest_part", "errors in mm at (0 full, 1 rest)"},
+              {NULL, "rest_part", "errors in mm at (0: full, 1: rest)"},
               {NULL, "resting_shares", "volume at rest, share of full"},
               {NULL, "rms", "RMS"},
               {NULL, "rms_after_mm", "distance after the fit, RMS, mm"},
@@ -148,7 +148,7 @@ static const struct {
               {NULL, "standard_errors", "standard errors of c1 to c9"},
               {"linearity", "states", "states"},
               {NULL, "states", "state"},
-              {NULL, "surface_mm", "surfaces within, mm"},
+              {NULL, "surface_mm", "distance of surfaces, at most, mm"},
               {NULL, "turned_over_percent", "triangles turned over, %"},
               {NULL, "unseen_regions", "regions not determined"},
               {"states", "landmarks", "distance between landmarks"},
@@ -174,7 +174,7 @@ static void write_label(const char *parent, const char *key, char text[TEXT_MAX]
   size_t length = strlen(key);
   const char *unit = "";
   for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
-    if (supine_text_ends_in(key, units[i][0])) {
+    if (supine_text_ends_in_any_case(key, units[i][0])) {
       unit = units[i][1];
       length -= strlen(units[i][0]);
     }
@@ -190,7 +190,7 @@ static void print_table(const json_t *rows) {
   json_t *first = json_array_get(rows, 0);
   size_t width[COLUMNS_MAX] = {0};
   char text[TEXT_MAX];
-  for (int pass = 0; pass < 2; ++pass) { /* measure the columns, then print */
+  for (int pass = 0; pass < 2; ++pass) { /* first measure the columns, then print */
     for (size_t i = 0; i <= json_array_size(rows); ++i) {
       const char *name;
       json_t *member;
@@ -248,8 +248,8 @@ static void print_member(const char *parent, const char *name, json_t *value, in
   }
 }
 
-/* Print the members of the object with the key `parent`; if every member is an object on one row,
- * print one table, with a label for each row. */
+/* Print the members of the object with the key `parent`. If each member is an object that fits in a
+ * row, print them as one table, with a label for each row. */
 static void print_object(const char *parent, json_t *object, int indent) {
   const char *name;
   json_t *member;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Fit a lung's pressure-volume relation (supine/breath.h) to samples; read its parameters. The
- * functions are thread-safe. Turn off GSL's default error handler first: it would abort. */
+ * functions are thread-safe. Before any call, turn off GSL's default error handler: it aborts. */
 #ifndef SUPINE_PV_H
 #define SUPINE_PV_H
 
@@ -9,7 +9,7 @@
 
 #include <supine/breath.h>
 
-/** Unknowns of a fit: the control parameters and the volumes at the two ends. */
+/** Unknowns of a fit: the control parameters, and the volumes at the two ends of the curve. */
 enum { SUPINE_PV_UNKNOWNS = SUPINE_PV_CONTROLS + 2 };
 
 typedef struct supine_pv_sample {
@@ -20,24 +20,24 @@ typedef struct supine_pv_sample {
 
 /** Quality of the fit of one limb. */
 typedef struct supine_pv_report {
-  size_t samples; /**< number; 0: the limb has the other limb's curve */
-  double control_interval[SUPINE_PV_CONTROLS]; /**< half-width of the confidence interval of c_i */
-  double volume_interval[2];                   /**< confidence half-widths of V_low, V_high, mL */
+  size_t samples; /**< number of samples; 0 if the limb takes the other limb's curve */
+  double control_interval[SUPINE_PV_CONTROLS]; /**< half-width of each confidence interval */
+  double volume_interval[2];                   /**< half-widths for the volumes at both ends, mL */
   double rms;                                  /**< root mean square residual, mL */
   double rms_percent; /**< rms as a percentage of the samples' range of volumes */
 } supine_pv_report;
 
-/** Fit the curve of a limb to samples:
+/** Fit the curve V of a limb to samples (P_j, V_j) by Levenberg-Marquardt:
  *
  *     minimise over c, V_low, V_high:  sum of (V(P_j) - V_j)^2
  *
- * by Levenberg-Marquardt; intervals are Student's t with the covariance at the minimum. The curve
- * covers the range of the samples' pressures. Where a limb is flat over much of its range, the
- * samples determine some parameters poorly: these stay within +-SUPINE_PV_CONTROL_MAX and have wide
- * intervals, while the curve itself still fits.
+ * The curve has the control parameters c, covers the range of the samples' pressures, and rises
+ * from V_low to V_high. Confidence intervals use Student's t and the covariance at the minimum. If
+ * the curve is nearly flat over much of its range, the samples determine some parameters poorly;
+ * these stay within +-SUPINE_PV_CONTROL_MAX and have wide intervals.
  *
- * Pressures must keep rising or keep falling. Volumes must rise with pressure except for noise: a
- * volume may be less than a volume at a lower pressure by up to 10 % of the range of volumes.
+ * Pressures must keep rising or keep falling. Volumes must rise with pressure, except for noise: a
+ * volume may be less than one at a lower pressure by at most 10 % of the range of volumes.
  *
  * @param name        the samples' file, for messages
  * @param count       at least SUPINE_PV_UNKNOWNS + 1
@@ -53,9 +53,9 @@ supine_status supine_breath_fit(const char *name, size_t count, const supine_pv_
 /** Fit both limbs to a file of samples. A limb without samples takes the other limb's curve.
  *
  * The file is CSV with the columns pressure_cmH2O, volume_mL and, optionally, limb (inhale or
- * exhale; without it all samples are inhale).
+ * exhale). Without that column all samples belong to inhale.
  * @param reports  [SUPINE_PV_LIMB_COUNT]
- * @retval SUPINE_ERROR_READ; else as supine_breath_fit */
+ * @retval SUPINE_ERROR_READ, or any status of supine_breath_fit */
 supine_status supine_breath_fit_file(const char *path, double confidence, supine_pv *pv,
                                      supine_pv_report *reports, supine_error *error);
 

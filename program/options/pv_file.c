@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read samples of a pressure-volume relation (CSV), and its parameters (JSON). */
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,16 +10,14 @@
 
 #include "program/options/pv.h"
 
-/* Read which limb a row belongs to: inhale if the file has no such column. */
+/* Read the limb of a row; it is inhale if the file has no column "limb". */
 static supine_status read_limb(const supine_csv *csv, supine_pv_limb *limb, supine_error *error) {
   const char *text = supine_csv_text(csv, 2);
-  *limb = SUPINE_PV_INHALE;
-  if (text == NULL || strcmp(text, supine_breath_limb_name(SUPINE_PV_INHALE)) == 0) {
-    return SUPINE_OK;
-  }
-  *limb = SUPINE_PV_EXHALE;
-  if (strcmp(text, supine_breath_limb_name(SUPINE_PV_EXHALE)) == 0) {
-    return SUPINE_OK;
+  for (int i = 0; i < SUPINE_PV_LIMB_COUNT; ++i) {
+    *limb = (supine_pv_limb)i;
+    if (text == NULL || strcmp(text, supine_breath_limb_name(*limb)) == 0) {
+      return SUPINE_OK;
+    }
   }
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
                           "%s:%zu: limb \"%s\" is unknown: give inhale or exhale", csv->path,
@@ -107,19 +106,27 @@ supine_status supine_breath_load(const char *path, supine_pv *pv, supine_error *
   supine_pv found = {0};
   json_t *limbs[SUPINE_PV_LIMB_COUNT];
   supine_status status = SUPINE_OK;
-  json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &why);
-  if (root == NULL) {
-    return supine_error_set(error, why.line < 0 ? SUPINE_ERROR_READ : SUPINE_ERROR_FORMAT,
-                            "%s:%d: %s: give a file made by 'supine pv fit'", path,
-                            why.line < 0 ? 0 : why.line, why.text);
+  FILE *file = fopen(path, "rb");
+  json_t *root = file == NULL ? NULL : json_loadf(file, JSON_REJECT_DUPLICATES, &why);
+  if (file == NULL || ferror(file) != 0) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(errno));
+  } else if (root == NULL) {
+    status =
+        supine_error_set(error, SUPINE_ERROR_FORMAT,
+                         "%s:%d: %s: make the file with 'supine pv fit'", path, why.line, why.text);
+  }
+  if (file != NULL) {
+    (void)fclose(file);
   }
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
     const char *name = supine_breath_limb_name((supine_pv_limb)limb);
     supine_error wrong;
     limbs[limb] = json_object_get(root, name);
     if (limbs[limb] != NULL && read_curve(limbs[limb], &found.limb[limb], &wrong) != SUPINE_OK) {
-      status =
-          supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s: %.300s", path, name, wrong.message);
+      status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                "%s: %s: %.300s: make the file with 'supine pv fit'", path, name,
+                                wrong.message);
     }
   }
   if (status == SUPINE_OK && limbs[0] == NULL && limbs[1] == NULL) {

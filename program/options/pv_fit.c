@@ -24,9 +24,9 @@ typedef struct problem {
   supine_pv_sample *sample; /* [count] sorted by rising pressure */
   gsl_multifit_nlinear_workspace *work;
   gsl_matrix *covariance;
-  double *x; /* [count] pressures mapped to -1 to 1 */
-  double *v; /* [count] volumes less the first volume, divided by the range of volumes */
-  double *q; /* [count] values of the curve, scaled to rise from 0 to 1 */
+  double *x; /* [count] pressures, mapped linearly to -1 to 1 */
+  double *v; /* [count] (volume - first volume) / range of volumes */
+  double *q; /* [count] curve at `x`, scaled to rise from 0 to 1 */
 } problem;
 
 static supine_status refuse(const problem *limb, const supine_pv_sample *sample, const char *why,
@@ -84,16 +84,16 @@ static supine_status check_falls(const problem *limb, double span, supine_error 
   return SUPINE_OK;
 }
 
-/* Compute q at the samples; return false if a control parameter is beyond its bounds. */
+/* Compute the curve at the samples, from 0 to 1; return false if a parameter is out of bounds. */
 static bool find_shape(const problem *limb, const double *control, double *q) {
   supine_pv_curve curve = {{-1.0, 1.0}, {0.0, 1.0}, {0.0}};
   memcpy(curve.control, control, sizeof curve.control);
   return supine_breath_curve_evaluate(&curve, limb->count, limb->x, q, NULL, NULL) == SUPINE_OK;
 }
 
-/* Compute the residuals V(x_j) - V_j, where V = (1 - q) V_low + q V_high. */
+/* Compute the residuals: the curve (1 - q) V_low + q V_high less the samples' volumes. */
 static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector *residual) {
-  static const double wall = 1e6; /* residual beyond the bounds; makes the search step back */
+  static const double wall = 1e6; /* residual outside the bounds, too large to be accepted */
   const problem *limb = context;
   if (!find_shape(limb, unknowns->data, limb->q)) {
     gsl_vector_set_all(residual, wall);
@@ -107,8 +107,8 @@ static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector 
   return GSL_SUCCESS;
 }
 
-/* Compute dV/dc_i by central differences, which are accurate to about 1e-10, and the derivatives of
- * V with respect to V_low and V_high, in which V is linear. */
+/* Compute the derivatives of V: with respect to the control parameters by central differences,
+ * accurate to about 1e-10; with respect to V_low and V_high exactly. */
 static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *jacobian) {
   static const double step = 1e-5;
   const problem *limb = context;
@@ -156,7 +156,7 @@ static void describe(const problem *limb, double span, double confidence,
   }
 }
 
-/* Minimise by Levenberg-Marquardt, from the straight line between the first and last samples. */
+/* Minimise by Levenberg-Marquardt, starting from the line between the first and last samples. */
 static supine_status minimise(problem *limb) {
   enum { STEPS_MAX = 300 };
   static const double tolerance = 1e-13;
@@ -175,7 +175,7 @@ static supine_status minimise(problem *limb) {
     code = gsl_multifit_nlinear_driver(STEPS_MAX, tolerance, tolerance, 0.0, NULL, NULL, &info,
                                        limb->work);
   }
-  /* GSL_ENOPROG: the minimum is reached to rounding, so that no step improves it. */
+  /* GSL_ENOPROG: the minimum is reached, and rounding hides any further decrease. */
   return code == GSL_SUCCESS || code == GSL_ENOPROG ? SUPINE_OK : SUPINE_ERROR_NUMERICAL;
 }
 

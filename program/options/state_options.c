@@ -7,10 +7,10 @@
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
 
-/* Limits of plausible volumes, as fractions of full inflation. Tissue alone has about 0.1. */
+/* Limits of plausible volumes, as fractions of full inflation. Tissue alone fills about 0.1. */
 static const double least_of_full = 0.1;
 static const double most_of_full = 1.2;
-/* Fraction of triangles turned over, above which a surface is implausible. */
+/* Largest plausible fraction of triangles that turn over. */
 static const double folded_limit = 0.01;
 
 supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error) {
@@ -51,7 +51,8 @@ const supine_option supine_options_orientation[] = {
     {"posture", 0, "POSTURE",
      "supine, prone, left or right (left or right lateral decubitus), upright, inverted (head "
      "down), or a DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. "
-     "+DEGREES turns gravity from the back towards the head: supine+15 is Trendelenburg",
+     "+DEGREES turns gravity about the left-right axis, from the back towards the head: supine+15 "
+     "is Trendelenburg",
      GRAVITY, .read = read_posture, .choices = postures},
     {"gravity", 0, "X,Y,Z",
      "instead of a posture, the direction of gravity in body axes: x to the left, y to the back, z "
@@ -106,14 +107,14 @@ supine_status supine_options_read_volume(const char *text, void *field, supine_e
 
 static supine_status read_from(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
-  *state = (supine_state){.gravity = {0.0}}; /* supine_options_reference sets the posture */
+  *state = (supine_state){.gravity = {0.0}}; /* supine_options_reference sets the posture later */
   return supine_state_parse(text, state, error);
 }
 
 const supine_option supine_options_folds[] = {
     {"allow-folds", 0, NULL,
-     "allow volumes below 10 % or above 120 % of full inflation, and surfaces of which more "
-     "than 1 % of the triangles turn over",
+     "allow volumes below 10 % or above 120 % of full inflation, and surfaces with more than 1 % "
+     "of their triangles turned over",
      .kind = SUPINE_OPTION_FLAG, .size = sizeof(bool)},
     {.name = NULL}};
 
@@ -144,7 +145,8 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     const double *g = from->state.gravity;
     const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
     state = from->state;
-    if (!posed) { /* the scan's posture for the scan's volume, else supine */
+    if (!posed) { /* no posture was given: take the scan's for the volume of the scan, else supine
+                   */
       const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
       const supine_state in = supine_basis_scan(basis);
       const double supine[3] = {0.0, 1.0, 0.0};
@@ -168,7 +170,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   return SUPINE_OK;
 }
 
-/* Return the fraction of the triangles that turn over in a pose; -1 if out of memory. */
+/* Return the fraction of the triangles that turn over in a pose, or -1 if out of memory. */
 static double turned_over(const supine_basis *basis, const supine_pose *pose) {
   supine_mesh mesh = {0};
   double *moved = supine_options_basis_positions(basis, pose);

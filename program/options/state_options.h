@@ -15,7 +15,7 @@ typedef struct supine_orientation {
   double gravity[3]; /* unit vector in body axes */
 } supine_orientation;
 
-/* Parse a posture, such as "prone", "supine+15" (tilted by 15 degrees towards the head) or
+/* Parse a posture, such as "prone", "supine+15" (Trendelenburg, 15 degrees head down) or
  * "0.6:0:-0.8" (gravity in body axes), into a unit vector along gravity. Statuses as
  * supine_state_parse_posture. */
 supine_status supine_options_posture(const char *text, double gravity[3], supine_error *error);
@@ -40,15 +40,15 @@ typedef struct supine_posture_list {
 
 #define SUPINE_POSTURE_LIST_HELP                                                                   \
   "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
-  "position), a name with a tilt towards the head in degrees (supine+15: Trendelenburg), "         \
-  "or a gravity in body axes, X:Y:Z (0.6:0:-0.8)."
+  "position), a name with degrees by which gravity turns from the back towards the head "          \
+  "(supine+15: Trendelenburg), or a gravity in body axes, X:Y:Z (0.6:0:-0.8)."
 
 /* Parse a list of postures, such as "supine,prone,supine+15,0.6:0:-0.8".
  * @retval SUPINE_ERROR_ARGUMENT */
 supine_status supine_options_posture_list_parse(const char *text, supine_posture_list *list,
                                                 supine_error *error);
 
-/* Return a posture's name in words: "left side" for "left"; other names unchanged. */
+/* Return "left side" for "left", "right side" for "right", and any other name unchanged. */
 const char *supine_options_posture_label(const char *name);
 
 /* Table of --volume and --allow-folds, which fills a supine_volume_options. */
@@ -92,9 +92,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
-/* Check that a pose is plausible: that its volume is 10 % to 120 % of full inflation, if rest is
- * known, and that its surface does not fold. If rest is known and folds are not allowed, an
- * implausible pose is an error, SUPINE_ERROR_NUMERICAL; otherwise a warning. */
+/* Check that a pose is plausible: its surface must not fold, and if rest is known, its volume must
+ * be 10 % to 120 % of full inflation. If a pose is implausible, return SUPINE_ERROR_NUMERICAL if
+ * rest is known and folds are not allowed; otherwise print a warning. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);

@@ -30,9 +30,9 @@ const supine_option supine_options_surface_frame[] = {
      SUPINE_FILLS(supine_mesh_load_options, axes), .read = read_axes,
      .wants = "three letters, one each of L or R, P or A, S or I, such as LPS"},
     {"units", 0, "UNIT",
-     "unit of the files: mm, cm, m, um, in, or a number of millimetres; default mm",
+     "unit of the coordinates: mm, cm, m, um, in, or a number of millimetres; default mm",
      SUPINE_FILLS(supine_mesh_load_options, millimetres_per_unit), .read = read_units,
-     .wants = "mm, cm, m, um, in or millimetres per unit"},
+     .wants = "mm, cm, m, um, in, or a number of millimetres"},
     {.name = NULL}};
 
 #define FILLS(member) SUPINE_FILLS(supine_landmark_options, member)

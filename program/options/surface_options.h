@@ -12,9 +12,9 @@
 /* Table of --axes and --units, which fills a supine_mesh_load_options. */
 extern const supine_option supine_options_surface_frame[];
 
-/* Matched points in two scans of one person, and the motion between the scans that is fitted. */
+/* Matched points in two scans of one person, and the kind of motion to fit between the scans. */
 typedef struct supine_landmark_options {
-  const char *path; /* CSV file; NULL: no landmarks */
+  const char *path; /* CSV file; NULL if there are no landmarks */
   bool reverse, translation, rigid;
 } supine_landmark_options;
 
@@ -22,7 +22,7 @@ typedef struct supine_landmark_options {
  * supine_landmark_options. */
 extern const supine_option supine_options_landmarks[];
 
-/* Print the findings about an input to stderr, one on each line. */
+/* Print the findings about an input to stderr, one per line. */
 void supine_options_say_findings(const char *command, const supine_findings *findings);
 
 #endif

@@ -19,7 +19,7 @@ namespace Supine
         readonly TcpClient client;
         readonly NetworkStream stream;
         readonly Thread reader;
-        readonly object turn = new object();
+        readonly object guard = new object();
         float[] newest;
         ulong stamp;
         bool closing;
@@ -40,7 +40,7 @@ namespace Supine
         /// frame was received since the last call.</summary>
         public float[] TakeNewest(out ulong poseStamp)
         {
-            lock (turn)
+            lock (guard)
             {
                 float[] taken = newest;
                 newest = null;
@@ -128,7 +128,7 @@ namespace Supine
             if (body[0] != Float32 || body[1] != 1 || body.Length != 4 + 4 * count) return;
             float[] values = new float[count];
             for (int i = 0; i < count; ++i) values[i] = GetFloat(body, 4 + 4 * i);
-            lock (turn)
+            lock (guard)
             {
                 newest = values;
                 stamp = poseStamp;
@@ -223,11 +223,11 @@ namespace Supine
         public int VertexCount { get; private set; }
         public int TriangleCount { get; private set; }
 
-        /// <summary>Positions [3 N] of a frame, mm, LPS: left, back, head.</summary>
+        /// <summary>Computes the positions [3 N] of a frame, mm, LPS: left, back, head.</summary>
         public void Deform(float[] frame, float[] xyz)
         {
             if (frame.Length != modes + 3 * lungs || xyz.Length != 3 * VertexCount)
-                throw new ArgumentException("the frame belongs to another basis: give the file of the server");
+                throw new ArgumentException("the frame belongs to another basis: open the basis file of the server");
             for (int i = 0; i < frame.Length; ++i) pose[PoseIndex(i)] = frame[i];
             supine_deform(handle, pose, xyz);
         }

@@ -59,8 +59,8 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
       bind(s, (const struct sockaddr *)&address->where, address->size) != 0 || listen(s, 64) != 0 ||
       getsockname(s, (struct sockaddr *)&given, &size) != 0) {
     (void)supine_error_set(error, SUPINE_ERROR_WRITE,
-                           "cannot listen on port %d: %s: give another port", address->port,
-                           strerror(errno));
+                           "cannot listen on port %d: %s: give another port or address",
+                           address->port, strerror(errno));
     if (s >= 0) {
       (void)close(s);
     }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute CRC-64: 256 or 64 bytes per step if the processor has carry-less multiplication, else
- * byte by byte. */
+/* Compute CRC-64: 256 or 64 bytes per step with carry-less multiplication, else byte by byte. */
 #include <pthread.h>
 #include <stdbool.h>
 
@@ -11,13 +10,14 @@
 
 #include "program/stream/message.h"
 
-static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* generator P without its term x^64 */
+static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* P of message.h without its term x^64 */
 
-/* Sizes of the steps in which messages are folded, bytes. */
+/* Distances, in bytes, over which fold() moves a part of the message. */
 enum { NEAR, FAR, FARTHEST, STEPS };
-static const size_t step[STEPS] = {16, 64, 256};
+static const size_t distance[STEPS] = {16, 64, 256};
 
-/* Computed once, mod P: table[b] = b(x) x^64; power[i] = x^n, x^(n + 64), n = 8 step[i]. */
+/* Tables mod P, computed once: table[b] = b(x) x^64, where b(x) has the bits of b as coefficients;
+ * power[i] = {x^n, x^(n + 64)}, where n = 8 distance[i]. */
 static struct { uint64_t table[256], power[STEPS][2]; } known;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
@@ -33,7 +33,7 @@ static uint64_t multiply(uint64_t a, uint64_t b) {
   return product;
 }
 
-/* Compute x^(8 size) mod P, the factor of a checksum when `size` bytes follow. */
+/* Compute x^(8 size) mod P. Appending `size` bytes to a message multiplies its checksum by this. */
 static uint64_t power_of(size_t size) {
   uint64_t power = 1;
   uint64_t square = 1u << 8; /* in turn x^8, x^16, x^32, ... */
@@ -57,8 +57,8 @@ static void make_tables(void) {
     known.table[b] = value;
   }
   for (int i = 0; i < STEPS; ++i) {
-    known.power[i][0] = power_of(step[i]);
-    known.power[i][1] = power_of(step[i] + 8);
+    known.power[i][0] = power_of(distance[i]);
+    known.power[i][1] = power_of(distance[i] + 8);
   }
 }
 
@@ -75,24 +75,25 @@ typedef __m512i lanes;
 
 #define CARRY_LESS __attribute__((target("pclmul,ssse3")))
 #define WIDE __attribute__((target("vpclmulqdq,avx512bw")))
-#define FRONT _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define REVERSED _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 
 /* Load 16 bytes in reverse order. */
 CARRY_LESS static lane take(const void *at) {
-  return _mm_shuffle_epi8(_mm_loadu_si128(at), FRONT);
+  return _mm_shuffle_epi8(_mm_loadu_si128(at), REVERSED);
 }
 
 WIDE static lanes take_wide(const void *at) {
-  return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(FRONT));
+  return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(REVERSED));
 }
 
-/* Compute a x^n + next, where a = a_high x^64 + a_low and powers = x^n, x^(n + 64) mod P. */
+/* Return 128 bits congruent to a x^n + next mod P: the low and high half of `a` times the two
+ * `powers`, x^n and x^(n + 64), plus `next`. */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
 }
 
-/* Extend a CRC by `size` bytes: at least 64, and a multiple of 16. */
+/* Extend a CRC by `size` bytes. `size` must be a multiple of 16 and at least 64. */
 CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, size_t size) {
   const lane far = _mm_loadu_si128((const void *)known.power[FAR]);
   const lane near = _mm_loadu_si128((const void *)known.power[NEAR]);
@@ -114,7 +115,7 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   return by_bytes(0, (const void *)&remainder, sizeof remainder);
 }
 
-/* Extend a CRC by `size` bytes: at least 256, and a multiple of 256. */
+/* Extend a CRC by `size` bytes. `size` must be a multiple of 256 and at least 256. */
 WIDE static uint64_t by_wide_folding(uint64_t crc, const unsigned char *at, size_t size) {
   const lanes powers = _mm512_broadcast_i32x4(_mm_loadu_si128((const void *)known.power[FARTHEST]));
   lanes part[4];

@@ -18,16 +18,16 @@
 /* clang-format on */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } meshopt;
 
-/* PIECE: number of vertices computed together, so that they stay in the L1 cache. GRAIN: smallest
+/* BATCH: number of vertices computed together, so that they stay in the L1 cache. GRAIN: smallest
  * number of vertices for which a thread is worth starting. */
-enum { PIECE = 2048, GRAIN = 32 * PIECE, THREADS_MAX = 256, HUGE_PAGE = 1 << 21 /* bytes */ };
+enum { BATCH = 2048, GRAIN = 32 * BATCH, THREADS_MAX = 256, HUGE_PAGE = 1 << 21 /* bytes */ };
 
 struct supine_stream_frames {
   const supine_basis *basis;
   const supine_basis_info *info;
   char device[21];
   bool ras;
-  uint64_t number;    /* number of the newest frame */
+  uint64_t newest_number;
   uint32_t *strips;   /* for each triangle strip: number of corners, then corners; big-endian */
   size_t strips_size; /* bytes */
   size_t strips_count;
@@ -37,8 +37,8 @@ struct supine_stream_frames {
 
 const char *const supine_stream_content_names[] = {"weights", "points", "surface", "nothing", NULL};
 
-/* Convert the triangles to strips. Corners i, i + 1 and i + 2 of a strip form a triangle, reversed
- * if i is odd; degenerate triangles join others. */
+/* Convert the triangles to strips. Corners i, i + 1 and i + 2 of a strip form a triangle, whose
+ * orientation is reversed if i is odd. Degenerate triangles only join the others. */
 static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
   static const uint32_t restart = UINT32_MAX; /* separates strips in the output of stripify() */
   const size_t corners = 3 * f->info->triangle_count;
@@ -80,8 +80,8 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   f->info = supine_basis_get_info(basis);
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
-  /* Compute the strips now. They take 0.1 s for a million triangles, and if the first request for a
-   * surface computed them, every peer would wait. */
+  /* Compute the strips now, which takes 0.1 s for a million triangles. At the first request for a
+   * surface, this would make every peer wait. */
   const supine_status status = make_strips(f, error);
   if (status != SUPINE_OK) {
     supine_stream_frames_destroy(f);
@@ -124,13 +124,13 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
       return NULL;
     }
     if (page == HUGE_PAGE) {
-      (void)madvise(points, whole, MADV_HUGEPAGE); /* reduces address translations */
+      (void)madvise(points, whole, MADV_HUGEPAGE); /* fewer pages need fewer address translations */
     }
     frame->points = points;
     frame->errors = (unsigned char *)(points + 3 * count);
   }
   frame->users = 1;
-  frame->number = ++frames->number;
+  frame->number = ++frames->newest_number;
   frame->snapshot = *snapshot;
   frame->points_crc = 0;
   return frame;
@@ -144,7 +144,7 @@ void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_fra
   }
 }
 
-/* Convert points to big-endian floats, in RAS if the frames are in RAS. */
+/* Convert points to big-endian floats. If the frames are in RAS, also convert them to RAS. */
 static void encode_points(const supine_stream_frames *f, size_t count, float *xyz) {
   for (size_t i = 0; f->ras && i < count; ++i) {
     xyz[3 * i] = -xyz[3 * i];
@@ -153,8 +153,7 @@ static void encode_points(const supine_stream_frames *f, size_t count, float *xy
   supine_stream_encode_floats(3 * count, xyz);
 }
 
-/* Compute the positions of lungs located from observed points, and their expected errors; return
- * false on failure. */
+/* Compute the positions and expected errors of located lungs; return false on failure. */
 static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
@@ -168,19 +167,19 @@ static bool compute_located_points(supine_stream_frames *f, supine_stream_frame 
   return true;
 }
 
-/* Work of the threads that compute points: each writes the checksum and size of its part. */
+/* Data of the threads that compute points. Each thread writes the checksum and size of its part. */
 typedef struct points_work {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
   uint64_t crc[THREADS_MAX];
-  size_t size[THREADS_MAX]; /* size of each thread's part, bytes; 0: no part */
+  size_t size[THREADS_MAX]; /* size of each thread's part, bytes; 0 if it has none */
 } points_work;
 
 static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
   points_work *p = context;
   p->size[thread] = 12 * (end - begin);
-  for (; begin < end; begin += PIECE) {
-    const size_t next = begin + PIECE < end ? begin + PIECE : end;
+  for (; begin < end; begin += BATCH) {
+    const size_t next = begin + BATCH < end ? begin + BATCH : end;
     float *xyz = p->frame->points + 3 * begin;
     supine_deform_range(p->frames->basis, &p->frame->snapshot.pose, begin, next, xyz);
     encode_points(p->frames, next - begin, xyz);
@@ -188,7 +187,7 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute the points of a frame from the location; without one, or if that fails, from the pose. */
+/* Compute the points of a frame from its location; if it has none or that fails, from its pose. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
   points_work p = {.frames = f, .frame = frame};
   if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {

@@ -5,7 +5,7 @@
  * A weights message is an NDARRAY of K + 3 G floats: the K weights, then the gains x, y, z of each
  * of the G lungs. A surface message is a POLYDATA; if the lungs were located from observed points,
  * it has the expected error of each vertex as an attribute. The triangle strips and their checksum
- * are computed once; the checksum of a message is joined from those of its parts. */
+ * are computed once. The checksum of a message is combined from the checksums of its parts. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
 
@@ -33,22 +33,23 @@ typedef struct supine_stream_snapshot {
   double volume;     /**< volume of all lungs together, gas and tissue, mL */
   double above;   /**< volume above rest in the posture, or above the scan if rest is unknown, mL */
   uint64_t stamp; /**< time of the newest pose, as in supine_stream_header */
-  double received; /**< when the newest message was received, s of supine_clock_seconds; < 0: none
-                        since the previous frame */
-  double pose_received; /**< when a pose or observed point was last received, s; < 0: never */
+  double received; /**< time of receipt of the newest message, s by supine_clock_seconds; negative
+                      if none was received since the previous frame */
+  double pose_received; /**< time of the newest pose or observed point, s; negative if none */
   supine_pose pose;
-  const supine_location *location; /**< lungs located from observed points; NULL: none */
+  const supine_location *location; /**< location from observed points; NULL if there is none */
 } supine_stream_snapshot;
 
 /** A frame, which peers share. */
 typedef struct supine_stream_frame {
-  size_t users;    /**< number of peers that it is sent to, plus 1 while it is the newest frame */
+  size_t users;    /**< number of peers being sent the frame, plus 1 while it is the newest */
   uint64_t number; /**< serial number: 1, 2, ... */
   supine_stream_snapshot snapshot;
   bool has_points; /**< `points` and `points_crc` are computed */
   float *points;   /**< [N, 3] positions as sent, big-endian */
   uint64_t points_crc;
-  unsigned char *errors;            /**< expected errors as sent, valid if the lungs were located */
+  unsigned char
+      *errors; /**< message part with the expected errors; valid if the lungs were located */
   struct supine_stream_frame *next; /**< next frame in the list of unused frames */
 } supine_stream_frame;
 
@@ -57,22 +58,22 @@ typedef struct supine_stream_frames supine_stream_frames;
 /** Create the data shared by the frames of a basis.
  * @param basis   must outlive the frames
  * @param device  device name of the messages, up to 20 characters
- * @param ras     true: points are sent in RAS; false: in LPS
+ * @param ras     true to send points in RAS, false to send them in LPS
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_stream_frames_create(const supine_basis *basis, const char *device, bool ras,
                                           supine_stream_frames **frames, supine_error *error);
 /** Release the data and every frame; NULL is legal. */
 void supine_stream_frames_destroy(supine_stream_frames *frames);
 
-/** Return a frame of a snapshot, with one user; NULL if out of memory. The memory of frames without
- * users is reused. */
+/** Return a frame of a snapshot, with one user; NULL if out of memory. May reuse an unused
+ * frame. */
 supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
                                                  const supine_stream_snapshot *snapshot);
 /** Remove one user of a frame; NULL is legal. */
 void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_frame *frame);
 
-/** Largest number of pieces of a message, and size of the first piece, bytes, which is enough for a
- * whole message of weights. */
+/** Largest number of pieces of a message; size of the first piece, bytes. The first piece is large
+ * enough for a whole message of weights. */
 enum {
   SUPINE_STREAM_PIECES = 4,
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + 40 + 4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX)
@@ -82,14 +83,14 @@ enum {
 typedef struct supine_stream_packet {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];
-  int first, count; /**< index of the first piece not sent completely; number of pieces */
+  int first, count; /**< index of the first piece with unsent bytes; number of pieces */
   size_t size;      /**< size of the whole message, bytes */
 } supine_stream_packet;
 
 /** Make the message of a frame, with a header of version 1, which all peers can read. The positions
- * of a frame are computed for the first message that contains them.
+ * of a frame are computed when a message first contains them.
  * @param content    not SUPINE_STREAM_SILENCE
- * @param triangles  true: a POLYDATA also contains the triangles */
+ * @param triangles  true if a POLYDATA must also contain the triangles */
 void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
                               supine_stream_content content, bool triangles,
                               supine_stream_packet *packet);

@@ -8,10 +8,10 @@
 #include "program/options/breath_turn.h"
 #include "program/stream/gravity.h"
 
-/* Largest deviation from a rotation at which a matrix counts as exact. Rounding to 32-bit floats
- * causes 1e-6, the arithmetic of trackers up to about 1e-4. */
-static const double slack = 1e-3;
-static const double uneven_max = 0.1; /* largest stretch or shear that is repaired */
+/* A matrix counts as exact if it deviates from a rotation by at most this. Rounding to 32-bit
+ * floats causes 1e-6, the arithmetic of trackers up to about 1e-4. */
+static const double exact_max = 1e-3;
+static const double repaired_max = 0.1; /* largest stretch or shear that is repaired */
 
 supine_stream_setup supine_stream_setup_default(void) {
   return (supine_stream_setup){.down = {0, 0, -1}, .body = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -42,7 +42,7 @@ static void apply_transpose(const double m[9], const double v[3], double out[3])
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why) {
-  double product[9]; /* R^T R; for a scaled rotation, the squared scale times the identity */
+  double product[9]; /* R^T R, which is the squared scale times I for a scaled rotation */
   for (int i = 0; i < 3; ++i) {
     const double column[3] = {rotation[i], rotation[3 + i], rotation[6 + i]};
     apply_transpose(rotation, column, product + 3 * i);
@@ -52,26 +52,27 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
   if (!(squared_scale > 1e-12) || !isfinite(squared_scale)) {
     return SUPINE_STREAM_REFUSED;
   }
-  double uneven = 0.0;
+  double strain = 0.0;
   for (int i = 0; i < 9; ++i) {
-    uneven = fmax(uneven, 0.5 * fabs(product[i] / squared_scale - (i % 4 == 0 ? 1.0 : 0.0)));
+    strain = fmax(strain, 0.5 * fabs(product[i] / squared_scale - (i % 4 == 0 ? 1.0 : 0.0)));
   }
-  *why = "its matrix contains stretch or shear; send a rotation";
-  if (!(uneven <= uneven_max)) {
+  *why = "its matrix has stretch or shear; send a rotation";
+  if (!(strain <= repaired_max)) {
     return SUPINE_STREAM_REFUSED;
   }
-  *why = "its matrix contains a reflection; send a rotation";
+  *why = "its matrix has a reflection; send a rotation";
   if (supine_triple(rotation, rotation + 3, rotation + 6) < 0.0) {
     return SUPINE_STREAM_REFUSED;
   }
-  double down[3]; /* direction of gravity in tracker axes */
-  apply_transpose(rotation, setup->down, down);
-  const supine_stream_verdict verdict = supine_stream_gravity_down(setup, down, gravity, why);
+  double tracker_down[3];
+  apply_transpose(rotation, setup->down, tracker_down);
+  const supine_stream_verdict verdict =
+      supine_stream_gravity_down(setup, tracker_down, gravity, why);
   if (verdict != SUPINE_STREAM_EXACT ||
-      (uneven <= slack && fabs(sqrt(squared_scale) - 1.0) <= slack)) {
+      (strain <= exact_max && fabs(sqrt(squared_scale) - 1.0) <= exact_max)) {
     return verdict;
   }
-  *why = uneven <= slack ? "its scale is not 1" : "its matrix contains slight stretch or shear";
+  *why = strain <= exact_max ? "its scale is not 1" : "its matrix has slight stretch or shear";
   return SUPINE_STREAM_REPAIRED;
 }
 
@@ -89,7 +90,7 @@ supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup
   }
   const supine_stream_verdict verdict =
       supine_stream_gravity_rotation(setup, rotation, gravity, why);
-  if (verdict != SUPINE_STREAM_EXACT || fabs(sqrt(squared_length) - 1.0) <= slack) {
+  if (verdict != SUPINE_STREAM_EXACT || fabs(sqrt(squared_length) - 1.0) <= exact_max) {
     return verdict;
   }
   *why = "the length of its quaternion is not 1";

@@ -31,7 +31,7 @@ typedef enum supine_stream_verdict {
 } supine_stream_verdict;
 
 /** Compute the direction of gravity from the matrix R, row by row. A matrix within 0.001 of a
- * rotation is exact. One with another scale, or with stretch or shear of at most a tenth, is
+ * rotation is exact. A matrix with another scale, or with stretch or shear of at most a tenth, is
  * repaired; the direction then errs by less than 13 degrees. A matrix that is not finite, is
  * singular, contains a reflection, or has more stretch or shear is refused.
  * @param why  set to the reason if the pose is repaired or refused, else to NULL */
@@ -39,8 +39,8 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
                                                      const double rotation[9], double gravity[3],
                                                      const char **why);
 
-/** Compute the direction of gravity from a quaternion (w, x, y, z). One that is zero or not finite
- * is refused; one whose length differs from 1 by more than 0.001 is repaired. */
+/** Compute the direction of gravity from a quaternion (w, x, y, z). It is refused if it is zero or
+ * not finite, and repaired if its length differs from 1 by more than 0.001. */
 supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why);
@@ -53,8 +53,8 @@ supine_stream_verdict supine_stream_gravity_down(const supine_stream_setup *setu
 /** Rotate `smooth` towards `gravity` by the fraction 1 - exp(-step / seconds) of the angle between
  * them. This first-order low-pass filter follows a steady rotation with a delay of `seconds`.
  * @param step     time since the last call, s
- * @param seconds  time constant; 0: `smooth` becomes `gravity`
- * @return the angle that remains between the two, radians */
+ * @param seconds  time constant, s; if it is 0, `smooth` becomes `gravity`
+ * @return the angle that remains between `smooth` and `gravity`, radians */
 double supine_stream_gravity_smooth(const double gravity[3], double step, double seconds,
                                     double smooth[3]);
 

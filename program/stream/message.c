@@ -46,7 +46,7 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
 void supine_stream_header_write(const supine_stream_header *header,
                                 unsigned char bytes[SUPINE_STREAM_HEADER]) {
   put(bytes, 2, header->version);
-  memcpy(bytes + 2, header->type, sizeof header->type - 1); /* with zeros after the text */
+  memcpy(bytes + 2, header->type, sizeof header->type - 1); /* the zeros after the text, too */
   memcpy(bytes + 14, header->device, sizeof header->device - 1);
   put(bytes + 34, 8, header->stamp);
   put(bytes + 42, 8, header->size);
@@ -71,10 +71,10 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 }
 
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
-  /* The protocol requires an even length, here that of the text with its NUL. */
+  /* The protocol requires an even length; this text and its NUL have 18 bytes. */
   static const char text[] = "expected_error_mm";
   _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "size of type, count and name");
-  put(bytes, 2, 1); /* type 0, a scalar; 1 component */
+  put(bytes, 2, 1); /* type 0 (a scalar) and 1 component */
   put(bytes + 2, 4, points);
   memcpy(bytes + 6, text, sizeof text);
   return SUPINE_STREAM_ATTRIBUTE;
@@ -194,7 +194,7 @@ static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, 
   uint64_t count = 1;
   for (uint64_t i = 0; i < dimension; ++i) {
     const uint64_t size = whole(c, 2);
-    count = count > SUPINE_STREAM_BODY_MAX ? count : count * size; /* too small to overflow */
+    count = count > SUPINE_STREAM_BODY_MAX ? count : count * size; /* the product is below 2^32 */
   }
   if (count != expected || (type != 10 && type != 11)) {
     return;
@@ -276,7 +276,7 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
     transform(&c, header->device, ours, message);
   } else if (type == POINT) {
     points(&c, message);
-  } else if (type == POSITION && ours && size > 12) { /* 12 bytes hold no rotation */
+  } else if (type == POSITION && ours && size > 12) { /* a body of 12 bytes has no quaternion */
     (void)pass(&c, 12);
     quaternion(&c, message);
   } else if (type == NDARRAY && ours) {
@@ -286,7 +286,7 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
     message->kind = SUPINE_STREAM_NOTHING;
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: a body of size %zu is too short for its content: correct the sender", header->type,
+        "%s: a body of %zu bytes is too short for its content: correct the sender", header->type,
         size);
   }
   return SUPINE_OK;

@@ -5,10 +5,10 @@
  *
  *     header     version (2), type (12), device (20), time (8), body size (8), body CRC (8)
  *     body       in version 1: content; in version 2: extension, content, metadata
- *     extension  its size, at least 12 (2), metadata index size (2), metadata size (4), number (4)
+ *     extension  its size (2), metadata index size (2), metadata size (4), message number (4)
  *
- * The protocol's library lays out the extension in this way; its specification differs. Lengths in
- * messages are checked against the bytes received before anything is read. */
+ * The extension has this layout in the protocol's library; the specification differs. Its size is
+ * at least 12. Every length in a message is checked against the bytes received. */
 #ifndef SUPINE_STREAM_MESSAGE_H
 #define SUPINE_STREAM_MESSAGE_H
 
@@ -20,21 +20,21 @@
 enum {
   SUPINE_STREAM_HEADER = 58,
   SUPINE_STREAM_EXTENSION = 12,
-  SUPINE_STREAM_BODY_MAX = 65536 /* largest body that is read, bytes; larger ones are skipped */
+  SUPINE_STREAM_BODY_MAX = 65536 /* largest body that is read, bytes; larger bodies are skipped */
 };
 
 typedef struct supine_stream_header {
   unsigned version;
   char type[13];
   char device[21];
-  uint64_t stamp; /**< time since 1970 in units of 2^-32 s; 0: unknown */
+  uint64_t stamp; /**< time since 1970 in units of 2^-32 s; 0 if unknown */
   uint64_t size;  /**< size of the body, bytes */
   uint64_t crc;   /**< checksum of the body */
 } supine_stream_header;
 
 /** Read a header.
- * @retval SUPINE_ERROR_FORMAT  the version is not 1 or 2, or the type is not text; where the next
- *                              message begins is then unknown */
+ * @retval SUPINE_ERROR_FORMAT  the version is not 1 or 2, or the type is not text. The start of
+ *                              the next message is then unknown */
 supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_HEADER],
                                         supine_stream_header *header, supine_error *error);
 void supine_stream_header_write(const supine_stream_header *header,
@@ -45,8 +45,8 @@ typedef enum supine_stream_kind {
   SUPINE_STREAM_NOTHING = 0, /**< message of another type or device, to be ignored */
   SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row;
                                   number[9..11]: position, mm; text: name of the device */
-  SUPINE_STREAM_POSITION,    /**< as ROTATION, but from a device whose pose is not followed */
-  SUPINE_STREAM_POINT_LIST,  /**< points: to be decoded by supine_stream_message_point */
+  SUPINE_STREAM_POSITION,    /**< like ROTATION, but from a device whose pose is not followed */
+  SUPINE_STREAM_POINT_LIST,  /**< points: decoded by supine_stream_message_point */
   SUPINE_STREAM_QUATERNION,  /**< number[0..3]: w, x, y, z of the rotation to world axes */
   SUPINE_STREAM_DOWN,        /**< number[0..2]: direction of gravity in tracker axes */
   SUPINE_STREAM_VOLUME,      /**< number[0]: volume above rest in the posture, mL */
@@ -58,44 +58,43 @@ typedef struct supine_stream_message {
   supine_stream_kind kind;
   double number[12];
   char text[64];
-  const unsigned char *points; /**< [point_count] points as received, within the body */
+  const unsigned char *points; /**< [point_count] points as received, part of the body */
   size_t point_count;
 } supine_stream_message;
 
-/** Decode the name and position, mm, of one point of a POINT_LIST, whose body must be in memory. */
+/** Decode the name and position, mm, of one point of a POINT_LIST, whose body must still exist. */
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]);
 
 /** Return whether supine_stream_message_read decodes messages of the header's type. */
 int supine_stream_message_is_known(const supine_stream_header *header);
 
-/** Decode the body of a message. Its numbers may be infinite or not-a-number. Messages used, by the
- * device that sends them:
+/** Decode the body of a message. Its numbers may be infinite or not-a-number. These messages are
+ * used, depending on the device that sends them:
  *
  *     `device`  TRANSFORM, POSITION, NDARRAY of 3 (direction of gravity), QTDATA (last instrument)
  *     any       TRANSFORM and POINT (observed points), QTDATA (instrument named `device`)
  *     "VOLUME"  NDARRAY of 1 (mL above rest), STRING (such as rest+500)
  *     "SEND"    STRING (name of the content that the peer asks for)
  *
- * @param device  name of the device whose poses are followed; NULL: every device
+ * @param device  name of the device whose poses are followed; NULL for every device
  * @retval SUPINE_ERROR_FORMAT  the checksum is wrong, or lengths contradict each other */
 supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
                                          supine_stream_message *message, supine_error *error);
 
-/** Write the part of an NDARRAY before its `count` 32-bit floats; return the size of that part, 4
- * bytes. */
+/** Write the first 4 bytes of an NDARRAY, which precede its `count` 32-bit floats; return 4. */
 size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 
-/** Write the part of a POLYDATA before its points; return the size of that part, 40 bytes.
+/** Write the first 40 bytes of a POLYDATA, which precede its points; return 40.
  * @param points, strips  number of points, number of triangle strips
  * @param size            size of the triangle strips, bytes
  * @param attributes      number of attributes after the triangle strips, 0 or 1 */
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes);
 
-/** Write the part of the attribute "expected_error_mm" before its floats, one for each point;
- * return the size of that part, SUPINE_STREAM_ATTRIBUTE bytes. */
+/** Write the first bytes of the attribute "expected_error_mm", which precede one float for each
+ * point; return their number, SUPINE_STREAM_ATTRIBUTE. */
 enum { SUPINE_STREAM_ATTRIBUTE = 24 };
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 
@@ -106,12 +105,12 @@ void supine_stream_encode_floats(size_t count, float *values);
  *
  *     crc(M) = M(x) x^64 mod P,     P = x^64 + 0x42F0E1EBA9EA3693
  *
- * It is linear: the checksums of two parts give the checksum of the whole. */
+ * It is linear: the checksum of a whole follows from the checksums of its parts. */
 
-/** Extend the checksum `crc` of earlier bytes (0: none) by `size` bytes. Thread-safe. */
+/** Extend `crc`, the checksum of the bytes so far, by `size` bytes; begin with 0. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
 
-/** Return the checksum of A followed by B, which has `size` bytes: crc(A) x^(8 size) + crc(B). */
+/** Return the checksum of bytes A followed by `size` bytes B: crc(A) x^(8 size) + crc(B). */
 uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size);
 
 #endif

@@ -5,15 +5,14 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "program/stream/peer.h"
 
-/* Largest body that is skipped, such as an image, bytes; a larger body is an error. */
-static const uint64_t body_max = 256u << 20;
+/* Largest body, such as an image, that is skipped, bytes. A larger body is an error. */
+static const uint64_t skipped_max = 256u << 20;
 
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_content content, double now,
@@ -33,9 +32,7 @@ supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, boo
 }
 
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames) {
-  if (peer->socket >= 0) {
-    (void)close(peer->socket);
-  }
+  (void)close(peer->socket);
   supine_stream_frame_release(frames, peer->frame);
   free(peer->body);
   *peer = (supine_stream_peer){.socket = -1};
@@ -49,13 +46,13 @@ static ssize_t receive_bytes(int socket, void *bytes, size_t size) {
                                                                                   : -1;
 }
 
-/* Parse a complete header, and decide whether to skip the body; return false if it is invalid. */
+/* Parse a complete header and decide whether to skip the body; return false if it is invalid. */
 static bool begin_body(supine_stream_peer *peer, uint64_t *skipped, supine_error *error) {
   if (supine_stream_header_read(peer->header_bytes, &peer->header, error) != SUPINE_OK) {
     return false;
   }
   const uint64_t size = peer->header.size;
-  if (size > body_max) {
+  if (size > skipped_max) {
     (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
                            "a message has %llu bytes: send at most 256 MiB",
                            (unsigned long long)size);
@@ -81,7 +78,7 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
         (peer->in_body ? (size_t)peer->header.size : SUPINE_STREAM_HEADER) - peer->received;
     if (peer->to_skip > 0) {
       into = peer->body;
-      size = peer->to_skip < allowed ? (size_t)peer->to_skip : allowed;
+      size = (size_t)peer->to_skip;
     }
     ssize_t got = 0;
     if (size > 0) {
@@ -116,8 +113,7 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
 
 bool supine_stream_peer_ready(const supine_stream_peer *peer) {
   int queued = 0;
-  return peer->frame == NULL && !peer->connecting && peer->content != SUPINE_STREAM_SILENCE &&
-         ioctl(peer->socket, SIOCOUTQNSD, &queued) == 0 && queued == 0;
+  return ioctl(peer->socket, SIOCOUTQNSD, &queued) == 0 && queued == 0;
 }
 
 void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,

@@ -2,7 +2,7 @@
 /** @file
  * Receive messages from one peer, and send frames to it, without blocking.
  *
- * A slow peer misses frames: when it has received a frame, it is sent the newest one. */
+ * A slow peer misses frames: after each complete frame it is sent the newest one. */
 #ifndef SUPINE_STREAM_PEER_H
 #define SUPINE_STREAM_PEER_H
 
@@ -19,7 +19,7 @@ typedef struct supine_stream_address {
 } supine_stream_address;
 
 /** Parse "PORT" (on 127.0.0.1), "HOST:PORT" or "[HOST]:PORT".
- * @param numeric  true: refuse host names
+ * @param numeric  true to refuse host names
  * @retval SUPINE_ERROR_ARGUMENT  the text is not an address, or the host is unknown */
 supine_status supine_stream_address_read(const char *text, bool numeric,
                                          supine_stream_address *address, supine_error *error);
@@ -33,21 +33,21 @@ int supine_stream_address_listen(const supine_stream_address *address, int *port
 int supine_stream_address_connect(const supine_stream_address *address);
 
 typedef struct supine_stream_peer {
-  int socket;      /**< -1: no peer */
-  bool connecting; /**< the connection is not complete yet */
+  int socket; /**< -1 if there is no peer */
+  bool connecting;
   /* received data */
   unsigned char header_bytes[SUPINE_STREAM_HEADER];
   size_t received; /**< bytes received of the body if `in_body`, else of the header */
   bool in_body;
   supine_stream_header header;
-  uint64_t to_skip;    /**< bytes of a skipped body that are not received yet */
+  uint64_t to_skip;    /**< bytes of a skipped body that are still to be received */
   unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] */
-  double emptied;      /**< when the socket was last found empty, s of supine_clock_seconds */
+  double emptied;      /**< time at which the socket was last empty, s by supine_clock_seconds */
   /* data to send */
   supine_stream_content content;
-  bool knows_triangles;        /**< the peer has the triangles; POINTS messages omit them */
+  bool knows_triangles;        /**< the peer has the triangles, so that POINTS messages omit them */
   uint64_t last_frame;         /**< number of the last frame given to the peer */
-  supine_stream_frame *frame;  /**< frame being sent; NULL: none */
+  supine_stream_frame *frame;  /**< frame being sent; NULL if none */
   supine_stream_packet packet; /**< unsent part of the message of `frame` */
 } supine_stream_peer;
 
@@ -59,7 +59,7 @@ typedef enum supine_stream_outcome {
 
 /** Initialise a peer, which then owns the socket. The kernel closes the connection if sent data
  * stays unacknowledged for 20 s.
- * @param now  current time, s of supine_clock_seconds
+ * @param now  current time, s by supine_clock_seconds
  * @retval SUPINE_ERROR_MEMORY  the caller still owns the socket */
 supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, bool connecting,
                                        supine_stream_content content, double now,
@@ -71,15 +71,14 @@ void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *fram
 typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
 /** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages of
- * unknown types, or above SUPINE_STREAM_BODY_MAX, are skipped.
+ * unknown types, or with larger bodies than SUPINE_STREAM_BODY_MAX, are skipped.
  * @param skipped  incremented for each skipped message
  * @param error    set if the peer sent invalid data or more than 256 MiB at once, else unchanged */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
                                               supine_stream_receive *receive, void *context,
                                               uint64_t *skipped, supine_error *error);
 
-/** Return whether a frame can be sent: the peer wants frames, and the kernel holds no unsent bytes
- * of earlier ones. */
+/** Return whether the kernel has sent all bytes of earlier frames. */
 bool supine_stream_peer_ready(const supine_stream_peer *peer);
 
 /** Prepare the message of a frame, which supine_stream_peer_send then sends. */

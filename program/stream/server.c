@@ -2,7 +2,6 @@
 /* Run the main loop: read messages, compute a frame for the newest pose, send the frame. */
 #include <errno.h>
 #include <math.h>
-#include <netinet/in.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,36 +15,36 @@
 #include "sh/base/clock.h"
 
 /* Intervals in seconds. */
-static const double frame_interval = 15e-3; /* between frames while the lungs move without poses */
+static const double frame_interval = 15e-3; /* between frames while lungs move and no pose comes */
 static const double send_interval = 20e-3;  /* between checks whether a socket's queue is empty */
 static const double connect_interval = 1.0; /* between attempts to connect or accept */
 static const double stop_interval = 0.1;    /* between calls of options->stop */
 
-/* All times are in seconds of supine_clock_seconds. */
+/* All times are in seconds by supine_clock_seconds. */
 struct supine_stream_server {
   const supine_stream_options *options;
   supine_stream_counts counts;
   supine_stream_patient patient;
   supine_stream_frames *frames;
   supine_stream_frame *latest;
-  double frame_time; /* when `latest` was made */
-  int listener;      /* listening socket; -1: none */
+  double frame_time; /* time at which `latest` was made */
+  int listener;      /* listening socket; -1 if none */
   int port;
   supine_stream_address target;
-  double connect_at;              /* when to connect next; INFINITY: never */
-  double accept_at;               /* when to accept peers again, after a failure */
-  supine_stream_peer *connected;  /* connected or connecting peer of --connect; NULL: none */
+  double connect_at;              /* time of the next attempt to connect; INFINITY if none */
+  double accept_at;               /* time at which to accept peers again after a failure */
+  supine_stream_peer *connected;  /* peer of --connect, connected or connecting; NULL if none */
   supine_stream_peer *peer;       /* [options->peers] */
   struct pollfd *polled;          /* [options->peers + 2] peers, listener, live page */
   supine_stream_peer **owner;     /* [options->peers + 2] peer of each polled socket, or NULL */
   size_t replayed;                /* number of recorded poses replayed so far */
-  double replay_begun;            /* when the replay began; < 0: not yet */
-  double waited;                  /* when ppoll() was last called */
-  double woke;                    /* when ppoll() last returned */
-  supine_stream_latency *latency; /* [2]: one of weights, one of points and surfaces */
+  double replay_begun;            /* time at which the replay began; negative before */
+  double wait_begun;              /* time at which ppoll() was last called */
+  double woke;                    /* time at which ppoll() last returned */
+  supine_stream_latency *latency; /* [2]: first of weights, then of points and surfaces */
 };
 
-/* Return whether the newest frame is to be sent to a peer. */
+/* Return whether a peer must still be sent the newest frame. */
 static bool needs_frame(const supine_stream_server *s, const supine_stream_peer *peer) {
   return peer->socket >= 0 && !peer->connecting && peer->frame == NULL &&
          peer->content != SUPINE_STREAM_SILENCE && s->latest != NULL &&
@@ -138,8 +137,8 @@ static void receive(void *context, supine_stream_peer *peer) {
     take_request(s, peer, message.text);
     return;
   }
-  /* If ppoll() returned at once, the message may have come any time after the socket was empty. */
-  const bool waited = s->woke - s->waited > 50e-6;
+  /* If ppoll() returned at once, the message may have waited since the socket was last empty. */
+  const bool waited = s->woke - s->wait_begun > 50e-6;
   supine_stream_patient_receive(&s->patient, &message, waited ? s->woke : peer->emptied,
                                 peer->header.stamp);
 }
@@ -183,7 +182,7 @@ static double frame_due(const supine_stream_server *s) {
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* Arriving messages trigger frames themselves; wait two intervals in case the messages stop. */
+  /* Messages that arrive trigger frames by themselves: wait two intervals, in case they stop. */
   const bool driven = s->woke - s->patient.received < 2.0 * frame_interval;
   return fmax(soonest, s->frame_time + (driven ? 2.0 : 1.0) * frame_interval);
 }
@@ -191,7 +190,8 @@ static double frame_due(const supine_stream_server *s) {
 static bool make_frame(supine_stream_server *s) {
   supine_stream_snapshot snapshot;
   supine_stream_patient_snapshot(&s->patient, s->woke, &snapshot);
-  supine_stream_frame_release(s->frames, s->latest); /* the next frame reuses its cached memory */
+  supine_stream_frame_release(
+      s->frames, s->latest); /* the new frame then reuses memory that is in the cache */
   s->latest = supine_stream_frame_acquire(s->frames, &snapshot);
   if (s->latest == NULL) {
     return false;
@@ -335,7 +335,7 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
   while (s->woke < end && !replay_over(s)) {
     const nfds_t count = gather(s);
     const struct timespec timeout = find_timeout(s, end);
-    s->waited = supine_clock_seconds();
+    s->wait_begun = supine_clock_seconds();
     if (ppoll(s->polled, count, &timeout, NULL) < 0 && errno != EINTR) {
       return supine_error_set(error, SUPINE_ERROR_WRITE, "cannot wait for the sockets: %s",
                               strerror(errno));
@@ -406,8 +406,7 @@ void supine_stream_server_destroy(supine_stream_server *server) {
   if (server == NULL) {
     return;
   }
-  for (size_t i = 0; server->peer != NULL && server->frames != NULL && i < server->options->peers;
-       ++i) {
+  for (size_t i = 0; server->frames != NULL && i < server->options->peers; ++i) {
     if (server->peer[i].socket >= 0) {
       supine_stream_peer_end(&server->peer[i], server->frames);
     }

@@ -15,8 +15,9 @@ typedef struct supine_stream_observed {
   const supine_basis *inside; /**< basis made by 'supine embed' */
   size_t count;
   const char *name[SUPINE_LOCATE_POINTS_MAX];
-  supine_observation last[SUPINE_LOCATE_POINTS_MAX]; /**< last position; not-a-number: not seen */
-  bool ras;      /**< positions in messages are in RAS, else LPS */
+  /** Newest observation of each point; its position is not-a-number if the point is not seen. */
+  supine_observation last[SUPINE_LOCATE_POINTS_MAX];
+  bool ras;      /**< true if positions in messages are in RAS, false if in LPS */
   double *space; /**< [supine_locate_space(count)] workspace */
   supine_location location;
 } supine_stream_observed;
@@ -79,31 +80,31 @@ typedef struct supine_stream_server supine_stream_server;
 typedef struct supine_stream_volume supine_stream_volume; /* defined in tracked_patient.h */
 
 typedef struct supine_stream_options {
-  const char *listen; /**< "PORT" (for this machine alone) or "ADDRESS:PORT"; port 0: any free port;
-                         NULL: do not listen */
-  const char *connect; /**< "HOST:PORT" of a peer, tried until it accepts; NULL: do not connect */
-  const char *device;  /**< name of the device whose poses are followed; NULL: every device */
+  const char *listen;  /**< "PORT" (for this machine alone) or "ADDRESS:PORT"; port 0 chooses a free
+                          port; NULL if the server does not listen */
+  const char *connect; /**< "HOST:PORT" of a peer, tried until it accepts; NULL if none */
+  const char *device;  /**< name of the device whose poses are followed; NULL for every device */
   const char *name;    /**< device name in the messages sent */
   supine_stream_setup setup;
   supine_stream_volume *volume;      /**< volume or breath at the start; messages may change it */
-  supine_stream_observed *observed;  /**< points whose positions come in messages; NULL: none */
+  supine_stream_observed *observed;  /**< points whose positions come in messages; NULL if none */
   supine_stream_content content;     /**< content sent to peers that have not asked for any */
   bool ras;                          /**< send points in RAS */
   double rate;                       /**< maximum number of frames a second */
   size_t peers;                      /**< maximum number of peers, 1 to 1000 */
-  double smooth;                     /**< time constant of smoothing, s; 0: no smoothing */
-  double seconds;                    /**< duration of the run; 0: until `stop` returns true */
+  double smooth;                     /**< time constant of smoothing, s; 0 for no smoothing */
+  double seconds;                    /**< duration of the run; 0 to run until `stop` returns true */
   const supine_stream_poses *replay; /**< recorded poses, replayed once a peer or viewer has
-                                        connected; NULL: none */
-  FILE *record;                      /**< file to which each pose is written; NULL: none */
-  supine_stream_web *web;            /**< live page; NULL: none */
+                                        connected; NULL if none */
+  FILE *record;                      /**< file to which each pose is written; NULL if none */
+  supine_stream_web *web;            /**< live page; NULL if none */
   void (*warn)(void *context, const char *text);
   bool (*stop)(void *context); /**< called every 100 ms or so; true ends the run */
   void *context;
 } supine_stream_options;
 
 /** Create a server and open its sockets.
- * @param options  kept by the caller until the server is destroyed
+ * @param options  must outlive the server
  * @retval SUPINE_ERROR_ARGUMENT  an invalid address or port
  * @retval SUPINE_ERROR_WRITE     the port is taken
  * @retval SUPINE_ERROR_MEMORY */
@@ -122,10 +123,10 @@ supine_status supine_stream_server_run(supine_stream_server *server, supine_erro
 
 const supine_stream_counts *supine_stream_server_counts(const supine_stream_server *server);
 
-/** Return the latencies of frames, from receiving the newest message to passing the frame to the
- * kernel: for weights, or for points and surfaces together. Frames without a new message do not
- * count. If a message may have waited unread, its latency begins when the peer's socket was
- * last found empty, so that no latency is underestimated. */
+/** Return the latencies of frames of weights, or of points and surfaces together. A latency is the
+ * time from receiving the newest message to passing the frame to the kernel. Frames without a new
+ * message do not count. If a message may have waited unread, its latency begins when the peer's
+ * socket was last found empty, so that no latency is underestimated. */
 const supine_stream_latency *supine_stream_server_latency(const supine_stream_server *server,
                                                           supine_stream_content content);
 

@@ -12,8 +12,8 @@ then, in Slicer's Python console:
     follow = Follow("PatientToRoom")   # a linear transform node with the patient's orientation
     follow.stop()
 
-Slicer's axes are right, front, head (RAS). The identity is a patient who lies on the back; gravity points
-along -y of the room."""
+Slicer's axes are right, front, head (RAS). The identity transform means a patient who lies on the
+back; gravity points along -y of the room."""
 from supine_link import Link, corners, unpack
 
 SERVER_OPTIONS = ["--send", "points", "--space", "ras", "--world-down", "0,-1,0",

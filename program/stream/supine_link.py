@@ -32,7 +32,7 @@ _TABLE = _crc_table()
 
 
 def crc64(data, crc=0):
-    """Return the CRC-64 (ECMA-182, most significant bit first) of data that follows bytes with the CRC `crc`."""
+    """Extend `crc`, a CRC-64 (ECMA-182, most significant bit first), by data."""
     for byte in data:
         crc = ((crc << 8) & 0xFFFFFFFFFFFFFFFF) ^ _TABLE[(crc >> 56) ^ byte]
     return crc
@@ -95,8 +95,8 @@ def corners(words):
 
 
 def unpack(kind, content):
-    """Decode the content of a message. NDARRAY: a tuple of floats. POLYDATA: (flat array of x, y, z,
-    array of strips for `corners`). STRING: text. Other types: the bytes."""
+    """Decode the content of a message: an NDARRAY to a tuple of floats, a POLYDATA to (flat array of x, y, z,
+    array of strips for `corners`), a STRING to text. Return the bytes of other types unchanged."""
     if kind == "NDARRAY":
         scalar, dimension = content[0], content[1]
         count = 1
@@ -114,7 +114,7 @@ def unpack(kind, content):
 
 
 class Link:
-    """A connection. `newest` returns the last frame received; earlier ones are dropped."""
+    """A connection. `newest` returns the last frame received and drops earlier frames."""
 
     def __init__(self, host="localhost", port=18944, version=1, check=False):
         self.socket = socket.create_connection((host, port), timeout=10)
@@ -183,8 +183,8 @@ class Link:
 
 
 class Basis:
-    """A basis file, for peers that receive weights w: x_j = p_j + A_j (w . c) d_j on each axis j. The file must
-    store one direction d of displacement for each vertex, with a coefficient c for each mode."""
+    """A basis file, for peers that receive weights w and gains A. A vertex p moves to x_j = p_j + A_j (w . c) d_j on
+    each axis j. The file must store a direction d and the coefficients c of the modes for each vertex."""
 
     def __init__(self, path):
         with open(path, "rb") as file:

@@ -49,18 +49,18 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
   return (supine_stream_patient){.basis = basis,
                                  .options = options,
                                  .counts = counts,
-                                 .begun = now,
+                                 .breath_begun = now,
                                  .gravity = {0, 1, 0},
-                                 .smooth = {0, 1, 0},
-                                 .smoothed = now,
+                                 .smoothed_gravity = {0, 1, 0},
+                                 .smoothed_at = now,
                                  .pose_received = -1.0,
                                  .received = -1.0,
-                                 .warned = now - 1.0};
+                                 .warned_at = now - 1.0};
 }
 
 void supine_stream_patient_warn(supine_stream_patient *patient, double now, const char *format,
                                 ...) {
-  if (now - patient->warned < 1.0) {
+  if (now - patient->warned_at < 1.0) {
     return;
   }
   char text[512];
@@ -68,7 +68,7 @@ void supine_stream_patient_warn(supine_stream_patient *patient, double now, cons
   va_start(arguments, format);
   (void)vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
-  patient->warned = now;
+  patient->warned_at = now;
   patient->options->warn(patient->options->context, text);
 }
 
@@ -82,8 +82,8 @@ static void store_pose(supine_stream_patient *p, const double gravity[3], double
                        uint64_t stamp) {
   memcpy(p->gravity, gravity, sizeof p->gravity);
   if (p->counts->poses == 0) { /* the first pose is not smoothed */
-    memcpy(p->smooth, gravity, sizeof p->smooth);
-    p->smoothed = received;
+    memcpy(p->smoothed_gravity, gravity, sizeof p->smoothed_gravity);
+    p->smoothed_at = received;
     p->first_pose = received;
   }
   note_message(p, received);
@@ -107,13 +107,13 @@ static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
   }
   if (verdict == SUPINE_STREAM_REPAIRED) {
     ++p->counts->repaired;
-    supine_stream_patient_warn(p, received, "a pose is repaired, as it is not a rotation: %s", why);
+    supine_stream_patient_warn(p, received, "a pose is repaired: %s; send a rotation", why);
   }
   store_pose(p, gravity, received, stamp);
 }
 
-/* Store the position of an observed point (not-a-number: the point is not seen); return false if no
- * point has that name. */
+/* Store the position of an observed point, which is not-a-number if the point is not seen; return
+ * false if no point has that name. */
 static bool store_position(supine_stream_patient *p, const char *name, const double position[3],
                            double received, uint64_t stamp) {
   supine_stream_observed *observed = p->options->observed;
@@ -141,7 +141,8 @@ static void store_positions(supine_stream_patient *p, const supine_stream_messag
     double position[3];
     supine_stream_message_point(message, i, name, position);
     if (!store_position(p, name, position, received, stamp) && p->options->observed != NULL) {
-      supine_stream_patient_warn(p, received, "the file of --points has no point '%s'", name);
+      supine_stream_patient_warn(p, received,
+                                 "the file of --points has no point '%s': rename the sensor", name);
     }
   }
 }
@@ -229,13 +230,13 @@ static double total_volume(const supine_basis *basis, const supine_pose *pose) {
   return sum;
 }
 
-/* Compute the gains for the current volume, or keep the last gains if it is out of reach; then
- * compute the volumes that result. */
+/* Compute the gains for the current volume, or keep the last gains if that is out of reach. Then
+ * compute the resulting volumes. */
 static void find_gains(supine_stream_patient *patient, double now,
                        supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;
-  const supine_state state = supine_stream_volume_at(patient->options->volume, basis,
-                                                     snapshot->gravity, now - patient->begun);
+  const supine_state state = supine_stream_volume_at(
+      patient->options->volume, basis, snapshot->gravity, now - patient->breath_begun);
   const supine_state rest = supine_breath_state(basis, snapshot->gravity, 0.0);
   supine_error error;
   if (supine_basis_gains(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
@@ -255,7 +256,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   snapshot->above += snapshot->volume;
 }
 
-/* Fit the pose to the points that are seen, if any; fit the volume too unless it is fixed. */
+/* Fit the pose to the observed points that are seen. Fit the volume too, unless it is fixed. */
 static void find_location(supine_stream_patient *patient, double now,
                           supine_stream_snapshot *snapshot) {
   const supine_stream_volume *volume = patient->options->volume;
@@ -297,12 +298,12 @@ static void find_location(supine_stream_patient *patient, double now,
 void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,
                                     supine_stream_snapshot *snapshot) {
   const double angle =
-      supine_stream_gravity_smooth(patient->gravity, fmax(0.0, now - patient->smoothed),
-                                   patient->options->smooth, patient->smooth);
+      supine_stream_gravity_smooth(patient->gravity, fmax(0.0, now - patient->smoothed_at),
+                                   patient->options->smooth, patient->smoothed_gravity);
   *snapshot = (supine_stream_snapshot){0};
-  patient->smoothed = now;
+  patient->smoothed_at = now;
   patient->turning = angle > 1e-6; /* a smaller angle displaces points by less than 1 um */
-  memcpy(snapshot->gravity, patient->smooth, sizeof snapshot->gravity);
+  memcpy(snapshot->gravity, patient->smoothed_gravity, sizeof snapshot->gravity);
   snapshot->received = patient->pending ? patient->received : -1.0;
   snapshot->pose_received = patient->pose_received;
   snapshot->stamp = patient->stamp != 0 ? patient->stamp : stamp_now();

@@ -10,7 +10,7 @@
 
 /** How the volume is determined. */
 struct supine_stream_volume {
-  bool breathes;      /**< true: `pv` and `breath` give the volume; false: `fixed` does */
+  bool breathes;      /**< the volume follows `pv` and `breath`; otherwise it is `fixed` */
   supine_state fixed; /**< fixed volume; its gravity is not used */
   supine_pv pv;
   supine_pv_breath breath;
@@ -33,18 +33,18 @@ typedef struct supine_stream_patient {
   const supine_basis *basis;
   const supine_stream_options *options;
   supine_stream_counts *counts;
-  /* Times are in seconds of supine_clock_seconds. */
-  double begun;         /* when the breath began */
-  double first_pose;    /* when the first pose was received: time 0 of a recording */
-  double pose_received; /* when the newest pose or point was received; < 0: none yet */
-  double received;      /* when the newest message was received */
-  bool pending;         /* no frame shows the newest message yet */
-  uint64_t stamp;       /* time stamp of the newest pose or point, from its header; 0: none */
-  double gravity[3];    /* direction of gravity in the newest pose */
-  double smooth[3];     /* smoothed direction of gravity, which frames show */
-  double smoothed;      /* when `smooth` was computed */
-  bool turning;         /* `smooth` has not reached `gravity` yet */
-  double warned;        /* when the last warning was given */
+  /* Times are in seconds by supine_clock_seconds. */
+  double breath_begun;
+  double first_pose;          /* time of the first pose, at which a recording begins */
+  double pose_received;       /* time of the newest pose or observed point; negative if none */
+  double received;            /* time of receipt of the newest message */
+  bool pending;               /* no frame shows the newest message yet */
+  uint64_t stamp;             /* time stamp in the header of the newest pose or point; 0 if none */
+  double gravity[3];          /* direction of gravity in the newest pose */
+  double smoothed_gravity[3]; /* direction of gravity that frames show */
+  double smoothed_at;
+  bool turning; /* `smoothed_gravity` has not reached `gravity` yet */
+  double warned_at;
   double gains[SUPINE_LUNGS_MAX][3]; /* gains of the last volume that could be reached */
 } supine_stream_patient;
 
@@ -67,7 +67,7 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
 void supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
                                 double received);
 
-/* Return whether the lungs move without new messages. */
+/* Return whether the lungs move even without new messages. */
 bool supine_stream_patient_moves(const supine_stream_patient *patient);
 
 /* Compute the state of the lungs at `now`, and mark the newest message as shown. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Serve the live page and its WebSocket with libwebsockets, in another thread. */
+/* Serve the live page and its WebSocket with libwebsockets, in a thread of its own. */
 #include <fcntl.h>
 #include <jansson.h>
 #include <libwebsockets.h>
@@ -30,7 +30,7 @@
  * OpenSSL and three libraries of event loops. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 
-/* Sizes, bytes. TEXT: a state as JSON; RECEIVED: the largest message; CHUNK: a part of the page. */
+/* Sizes, bytes. TEXT: a state as JSON; RECEIVED: a received message; CHUNK: a part of the page. */
 enum { TEXT = 256, RECEIVED = 512, CHUNK = 65536 };
 
 struct supine_stream_web {
@@ -43,22 +43,22 @@ struct supine_stream_web {
   atomic_bool ending;
   atomic_size_t viewers;
   pthread_mutex_t lock; /* protects the fields below */
-  uint64_t number;      /* number of the state in `text`: 1, 2, ... */
-  char text[TEXT];      /* state as JSON; age and the final brace are added when it is sent */
+  uint64_t number;      /* serial number of the state in `text`: 1, 2, ... */
+  char text[TEXT];      /* state as JSON, to which sending appends the age and the final brace */
   double pose_received; /* as in supine_stream_snapshot */
 };
 
 /* A received pose, as written to the pipe. */
 typedef struct web_pose {
   double gravity[3];
-  double received; /* time of receipt, s of supine_clock_seconds */
+  double received; /* time of receipt, s by supine_clock_seconds */
 } web_pose;
 
-/* State of a connection, to a browser that loads the page or to a viewer. */
+/* State of a connection to a viewer, or to a browser that loads the page. */
 typedef struct session {
   size_t sent;     /* bytes of the page sent so far */
   uint64_t number; /* number of the last state sent */
-  bool counted;    /* the connection is counted in `viewers` */
+  bool counted_in_viewers;
 } session;
 
 static supine_stream_web *web_of(struct lws *wsi) {
@@ -93,7 +93,7 @@ static void receive(supine_stream_web *web, const char *bytes, size_t size) {
     good = json_is_number(value) && isfinite(taken.gravity[i]);
   }
   json_decref(pose);
-  if (good) { /* if the pipe is full, the pose is lost, but newer ones follow */
+  if (good) { /* if the pipe is full, this pose is lost, but newer poses follow */
     (void)!write(web->poses[1], &taken, sizeof taken);
   }
 }
@@ -126,12 +126,12 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
     if (atomic_load(&web->viewers) >= web->site.viewers) {
       return -1;
     }
-    s->counted = true;
+    s->counted_in_viewers = true;
     (void)atomic_fetch_add(&web->viewers, 1);
     (void)lws.callback_on_writable(wsi);
     return 0;
   case LWS_CALLBACK_CLOSED:
-    if (s->counted) {
+    if (s->counted_in_viewers) {
       (void)atomic_fetch_sub(&web->viewers, 1);
     }
     return 0;

@@ -5,7 +5,7 @@
  *
  * Viewers receive the newest state: {"gravity":[x,y,z],"volume":mL,"above":mL,"age":s}
  *   above: volume above rest in the posture, or above the scan if rest is unknown
- *   age: time since the newest pose or observed point was received; -1: none yet
+ *   age: time since the newest pose or observed point was received; -1 if none was
  * A phone sends its pose: {"gravity":[x,y,z]} */
 #ifndef SUPINE_STREAM_WEB_H
 #define SUPINE_STREAM_WEB_H
@@ -19,8 +19,8 @@ typedef struct supine_stream_web supine_stream_web;
 /** Address and content of the server. There is no access control. */
 typedef struct supine_stream_site {
   const char *address;           /**< numeric address to listen on */
-  int port;                      /**< 0: any free port */
-  const char *certificate, *key; /**< paths of PEM files; NULL: no encryption */
+  int port;                      /**< 0 to choose a free port */
+  const char *certificate, *key; /**< paths of PEM files; NULL for no encryption */
   const void *page;              /**< HTML; must outlive the server */
   size_t page_size;
   size_t viewers; /**< maximum number of viewers */
@@ -41,11 +41,10 @@ int supine_stream_web_descriptor(const supine_stream_web *web);
 
 /** Read the newest pose that a viewer has sent since the last call; return false if there is none.
  * @param gravity   set to the direction of gravity, finite but of any length, even 0
- * @param received  set to the time at which the pose was received, s of supine_clock_seconds */
+ * @param received  set to the time at which the pose was received, s by supine_clock_seconds */
 bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *received);
 
-/** Send a state to each viewer as soon as the viewer can receive it, unless a newer state is given
- * before. */
+/** Send a state to each viewer as soon as the viewer is ready, unless a newer state replaces it. */
 void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot *snapshot);
 
 size_t supine_stream_web_viewers(supine_stream_web *web);

@@ -9,7 +9,7 @@ from answers import answer, faces  # noqa: E402
 from supine_link import Basis, Link, array, corners, crc64, instruments, quaternion, string, unpack  # noqa: E402
 
 port, basis = int(sys.argv[2]), Basis(sys.argv[3])
-MM = 5e-3  # largest error of the library's packed storage, mm
+TOLERANCE_MM = 5e-3  # largest error of the library's packed storage, mm
 
 assert crc64(b"123456789") == 0x6C40DF5F0B497347  # published check value of CRC-64/ECMA-182
 
@@ -51,11 +51,11 @@ for version in (1, 2):
         kind, _, _, content = answer(link, stamp, lambda: link.send_pose(pose, stamp=stamp))
         points, strips = unpack(kind, content)
         assert not strips
-        assert far(points, basis.deform(frames[stamp - 100])) < MM
+        assert far(points, basis.deform(frames[stamp - 100])) < TOLERANCE_MM
         assert far(points, basis.vertices) > 1.0
     link.set_volume("full")  # full inflation is the surface of the file, except upright
     kind, _, _, content = answer(link, 203, lambda: link.send_pose(LEFT, stamp=203))
-    assert far(unpack(kind, content)[0], basis.vertices) < MM
+    assert far(unpack(kind, content)[0], basis.vertices) < TOLERANCE_MM
     link.send("STRING", "VOLUME", string("rest+400"))
     link.close()
 print("messages of both versions equal the description of the protocol")

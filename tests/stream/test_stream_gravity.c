@@ -82,7 +82,7 @@ TEST(test_gravity_tracker_matrices_give_postures) {
 TEST(test_gravity_tracker_quaternions_give_postures) {
   static const struct {
     const char *posture;
-    double q[4]; /* w, x, y, z: the cosine of half the angle, and its sine times the unit axis */
+    double q[4]; /* w, x, y, z: cos(angle / 2), then sin(angle / 2) times the unit axis */
   } turns[] = {
       {"upright", {1, 0, 0, 0}},
       /* Upright, rotated backwards about x. */

@@ -119,12 +119,12 @@ static void stage_destroy(stage *s) {
   free(s);
 }
 
-static void rest(double seconds) {
+static void sleep_for(double seconds) {
   const struct timespec time = {(time_t)seconds, (long)(1e9 * (seconds - floor(seconds)))};
   (void)nanosleep(&time, NULL);
 }
 
-static int dial(int port) {
+static int connect_peer(int port) {
   const int s = socket(AF_INET, SOCK_STREAM, 0);
   const struct sockaddr_in here = {.sin_family = AF_INET,
                                    .sin_port = htons((uint16_t)port),
@@ -162,10 +162,10 @@ static bool get(int s, void *bytes, size_t size) {
 
 /* Read until the server closes the connection; return false if it does not. */
 static bool closed_by_server(int s) {
-  unsigned char waste[4096];
+  unsigned char ignored[4096];
   ssize_t got = 0;
   do {
-    got = recv(s, waste, sizeof waste, 0);
+    got = recv(s, ignored, sizeof ignored, 0);
   } while (got > 0);
   return got == 0 || errno == ECONNRESET;
 }
@@ -199,7 +199,7 @@ static bool send_pose(int s, const double down[3], uint64_t stamp) {
   return send_bytes(s, bytes, make_pose(down, stamp, bytes));
 }
 
-static bool say(int s, const char *device, const char *text) {
+static bool send_text(int s, const char *device, const char *text) {
   unsigned char body[64] = {0, 3, 0, (unsigned char)strlen(text)};
   unsigned char bytes[128];
   memcpy(body + 4, text, strlen(text));
@@ -209,7 +209,7 @@ static bool say(int s, const char *device, const char *text) {
 /* Receive the next message and the first 4096 bytes of its body; return false if none arrives. */
 static bool receive(int s, supine_stream_header *header, unsigned char body[4096]) {
   unsigned char raw[SUPINE_STREAM_HEADER];
-  unsigned char waste[4096];
+  unsigned char ignored[4096];
   supine_error error;
   if (!get(s, raw, sizeof raw) || supine_stream_header_read(raw, header, &error) != SUPINE_OK) {
     return false;
@@ -222,11 +222,11 @@ static bool receive(int s, supine_stream_header *header, unsigned char body[4096
   }
   crc = supine_stream_crc64(0, body, first);
   for (left -= first; left > 0;) {
-    const size_t size = left < sizeof waste ? left : sizeof waste;
-    if (!get(s, waste, size)) {
+    const size_t size = left < sizeof ignored ? left : sizeof ignored;
+    if (!get(s, ignored, size)) {
       return false;
     }
-    crc = supine_stream_crc64(crc, waste, size);
+    crc = supine_stream_crc64(crc, ignored, size);
     left -= size;
   }
   assert_true(crc == header->crc);
@@ -289,7 +289,7 @@ static const double poses[4][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.6, 0, -0
 
 TEST(test_server_each_pose_answered_by_weights) {
   stage *s = stage_create();
-  const int peer = dial(stage_run(s));
+  const int peer = connect_peer(stage_run(s));
   supine_stream_header header;
   unsigned char body[4096];
   for (uint64_t i = 0; i < 40; ++i) {
@@ -300,7 +300,7 @@ TEST(test_server_each_pose_answered_by_weights) {
     assert_int_equal(header.version, 1);
     expect_weights(s, poses[i % 4], 30.0, body);
   }
-  assert_true(say(peer, "VOLUME", "rest-12"));
+  assert_true(send_text(peer, "VOLUME", "rest-12"));
   assert_true(send_pose(peer, poses[1], 200));
   (void)receive_stamp(peer, 200, &header, body);
   expect_weights(s, poses[1], -12.0, body);
@@ -312,8 +312,8 @@ TEST(test_server_each_pose_answered_by_weights) {
   assert_true(send_bytes(peer, bytes + size - 1, 1));
   (void)receive_stamp(peer, 300, &header, body);
   expect_weights(s, poses[2], -12.0, body);
-  rest(1.0); /* the latency of the next message must not include this second */
-  assert_true(say(peer, "VOLUME", "rest-11"));
+  sleep_for(1.0); /* the latency of the next message must not include this second */
+  assert_true(send_text(peer, "VOLUME", "rest-11"));
   assert_true(receive(peer, &header, body));
   expect_weights(s, poses[2], -11.0, body);
   (void)close(peer);
@@ -329,10 +329,10 @@ TEST(test_server_each_pose_answered_by_weights) {
 
 TEST(test_server_volume_above_rest_equals_basis_pose) {
   stage *s = stage_create();
-  const int peer = dial(stage_run(s));
+  const int peer = connect_peer(stage_run(s));
   supine_stream_header header;
   unsigned char body[4096];
-  assert_true(say(peer, "VOLUME", "rest+50"));
+  assert_true(send_text(peer, "VOLUME", "rest+50"));
   for (uint64_t i = 0; i < 4; ++i) {
     supine_state asked = {.volume = {SUPINE_VOLUME_REST, 50.0}};
     supine_pose pose;
@@ -346,7 +346,7 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
   /* A volume as an NDARRAY: 50.0 mL as a big-endian 64-bit float. */
   const unsigned char array[12] = {11, 1, 0, 1, 0x40, 0x49};
   unsigned char bytes[128];
-  assert_true(say(peer, "VOLUME", "rest"));
+  assert_true(send_text(peer, "VOLUME", "rest"));
   assert_true(
       send_bytes(peer, bytes, make_message("NDARRAY", "VOLUME", 0, array, sizeof array, bytes)));
   assert_true(send_pose(peer, poses[1], 10));
@@ -358,11 +358,11 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
   stage_destroy(s);
 }
 
-/* After a request for `points` the first frame has triangles; after one for `surface` every frame
- * has. */
+/* After a request for `points` only the first frame has triangles; after a request for `surface`
+ * every frame has them. */
 TEST(test_server_send_request_switches_content) {
   stage *s = stage_create();
-  const int peer = dial(stage_run(s));
+  const int peer = connect_peer(stage_run(s));
   const supine_basis_info *info = supine_basis_get_info(s->basis);
   supine_stream_header header;
   unsigned char body[4096];
@@ -370,9 +370,9 @@ TEST(test_server_send_request_switches_content) {
   size_t whole = 0;                          /* size of a body with points and triangles */
   assert_true(send_pose(peer, poses[3], 1)); /* until a peer asks for content, it gets weights */
   (void)receive_stamp(peer, 1, &header, body);
-  const char *const wishes[] = {"points", "surface"};
+  const char *const requests[] = {"points", "surface"};
   for (uint64_t w = 0; w < 2; ++w) {
-    assert_true(say(peer, "SEND", wishes[w]));
+    assert_true(send_text(peer, "SEND", requests[w]));
     bool first = true;
     for (uint64_t i = 0; i < 4; ++i) {
       const uint64_t stamp = 10 * (w + 1) + i;
@@ -393,10 +393,10 @@ TEST(test_server_send_request_switches_content) {
       }
     }
   }
-  assert_true(say(peer, "SEND", "nothing"));
-  assert_true(say(peer, "SEND", "everything")); /* an unknown request changes nothing */
+  assert_true(send_text(peer, "SEND", "nothing"));
+  assert_true(send_text(peer, "SEND", "everything")); /* an unknown request changes nothing */
   assert_true(send_pose(peer, poses[0], 77));
-  rest(0.1);
+  sleep_for(0.1);
   struct pollfd quiet = {peer, POLLIN, 0};
   assert_int_equal(poll(&quiet, 1, 200), 0);
   (void)close(peer);
@@ -408,7 +408,7 @@ TEST(test_server_many_poses_newest_answered) {
   enum { BURST = 1000 };
   stage *s = stage_create();
   s->options.rate = 100.0;
-  const int peer = dial(stage_run(s));
+  const int peer = connect_peer(stage_run(s));
   supine_stream_header header;
   unsigned char body[4096];
   unsigned char *burst = fixture_allocate(BURST, 128);
@@ -440,7 +440,7 @@ static int keep_rate(int peer, int count, uint64_t stamp) {
     if (receive_stamp(peer, stamp + (uint64_t)i, &header, body) > 60) {
       return i;
     }
-    rest(2e-3);
+    sleep_for(2e-3);
   }
   return count;
 }
@@ -450,21 +450,21 @@ static int keep_rate(int peer, int count, uint64_t stamp) {
 TEST(test_server_stuck_or_vanished_peers_delay_nobody) {
   stage *s = stage_create();
   const int port = stage_run(s);
-  const int honest = dial(port);
-  const int stuck = dial(port);
+  const int regular = connect_peer(port);
+  const int stuck = connect_peer(port);
   const int small = 4096;
   assert_int_equal(setsockopt(stuck, SOL_SOCKET, SO_RCVBUF, &small, sizeof small), 0);
-  assert_true(say(stuck, "SEND", "surface"));
-  const int vanished = dial(port);
-  assert_true(say(vanished, "SEND", "surface"));
-  const int half = dial(port);
+  assert_true(send_text(stuck, "SEND", "surface"));
+  const int vanished = connect_peer(port);
+  assert_true(send_text(vanished, "SEND", "surface"));
+  const int half = connect_peer(port);
   assert_true(send_bytes(half, "\0\1TRANS", 7));
-  assert_int_equal(keep_rate(honest, 20, 1000), 20);
+  assert_int_equal(keep_rate(regular, 20, 1000), 20);
   const struct linger reset = {1, 0};
   assert_int_equal(setsockopt(vanished, SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
   (void)close(vanished);
-  assert_int_equal(keep_rate(honest, 100, 2000), 100);
-  (void)close(honest);
+  assert_int_equal(keep_rate(regular, 100, 2000), 100);
+  (void)close(regular);
   const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.peers, 4);
   assert_int_equal(counts.lost, 0); /* `lost` excludes peers that close the connection */
@@ -482,9 +482,9 @@ TEST(test_server_fifty_peers_one_more_refused) {
   supine_stream_header header;
   unsigned char body[4096];
   for (int i = 0; i < MANY; ++i) {
-    peer[i] = dial(port);
+    peer[i] = connect_peer(port);
     if (i % 5 == 4) {
-      assert_true(say(peer[i], "SEND", "surface"));
+      assert_true(send_text(peer[i], "SEND", "surface"));
     }
   }
   for (uint64_t round = 0; round < 20; ++round) {
@@ -493,12 +493,12 @@ TEST(test_server_fifty_peers_one_more_refused) {
       (void)receive_stamp(peer[i], 500 + round, &header, body);
     }
   }
-  const int extra = dial(port); /* one peer too many: the server closes its connection */
+  const int extra = connect_peer(port); /* one peer too many: the server closes its connection */
   assert_true(closed_by_server(extra));
   (void)close(extra);
   (void)close(peer[0]);
-  rest(0.2);
-  peer[0] = dial(port); /* takes the place of the closed peer */
+  sleep_for(0.2);
+  peer[0] = connect_peer(port); /* takes the place of the closed peer */
   assert_true(send_pose(peer[0], poses[0], 900));
   (void)receive_stamp(peer[0], 900, &header, body);
   for (int i = 0; i < MANY; ++i) {
@@ -529,7 +529,7 @@ TEST(test_server_ten_thousand_mutated_messages_survives) {
               {"IMAGE", "Camera", 200, {0}, {0}}};
   stage *s = stage_create();
   const int port = stage_run(s);
-  const int honest = dial(port);
+  const int regular = connect_peer(port);
   supine_stream_header heard;
   unsigned char content[4096];
   uint64_t dice = 20081226;
@@ -559,21 +559,21 @@ TEST(test_server_ten_thousand_mutated_messages_survives) {
     }
     /* Use one connection per message, so that an error in one message does not hide the next
      * message. */
-    const int peer = dial(port);
+    const int peer = connect_peer(port);
     /* This fails if the server closes the connection after the header. */
     (void)send_bytes(peer, bytes, size);
     (void)shutdown(peer, SHUT_WR);
     assert_true(closed_by_server(peer)); /* the server closes the connection after the message */
     (void)close(peer);
     if (i % 1000 == 0) {
-      assert_true(say(honest, "VOLUME", "rest+30"));
-      assert_true(send_pose(honest, poses[0], 5000 + (uint64_t)i));
-      (void)receive_stamp(honest, 5000 + (uint64_t)i, &heard, content);
+      assert_true(send_text(regular, "VOLUME", "rest+30"));
+      assert_true(send_pose(regular, poses[0], 5000 + (uint64_t)i));
+      (void)receive_stamp(regular, 5000 + (uint64_t)i, &heard, content);
     }
   }
-  assert_true(send_pose(honest, poses[0], 100000));
-  (void)receive_stamp(honest, 100000, &heard, content);
-  (void)close(honest);
+  assert_true(send_pose(regular, poses[0], 100000));
+  (void)receive_stamp(regular, 100000, &heard, content);
+  (void)close(regular);
   const supine_stream_counts counts = stage_end(s);
   assert_true(counts.malformed > 1000);
   assert_true(counts.lost > 10);
@@ -592,14 +592,14 @@ TEST(test_server_absurd_sizes_refused) {
   strcpy(header.type, "TRANSFORM");
   strcpy(header.device, "Patient");
   supine_stream_header_write(&header, bytes);
-  int peer = dial(port);
+  int peer = connect_peer(port);
   assert_true(send_bytes(peer, bytes, sizeof bytes));
   assert_true(closed_by_server(peer));
   (void)close(peer);
   /* The body of a TRANSFORM of 8 MiB is skipped, not stored. */
   header.size = 8u << 20;
   supine_stream_header_write(&header, bytes);
-  peer = dial(port);
+  peer = connect_peer(port);
   assert_true(send_bytes(peer, bytes, sizeof bytes));
   for (int i = 0; i < 2048; ++i) {
     assert_true(send_bytes(peer, piece, sizeof piece));
@@ -661,7 +661,7 @@ TEST(test_server_replay_recorded_poses_same) {
   s->options.replay = &kept;
   s->options.record = record;
   supine_stream_poses_begin(record);
-  const int peer = dial(stage_run(s)); /* the connection starts the replay */
+  const int peer = connect_peer(stage_run(s)); /* the connection starts the replay */
   supine_stream_header header;
   unsigned char body[4096];
   unsigned char last[4096];
@@ -695,12 +695,12 @@ TEST(test_server_replay_recorded_poses_same) {
 TEST(test_server_moving_lungs_send_frames) {
   stage *s = stage_create();
   s->options.smooth = 0.1;
-  const int peer = dial(stage_run(s));
+  const int peer = connect_peer(stage_run(s));
   supine_stream_header header;
   unsigned char body[4096];
   assert_true(send_pose(peer, poses[0], 1));
   (void)receive_stamp(peer, 1, &header, body);
-  rest(0.05);
+  sleep_for(0.05);
   assert_true(send_pose(peer, poses[2], 2));
   int frames = 0;
   struct pollfd waiting = {peer, POLLIN, 0};
@@ -720,10 +720,10 @@ TEST(test_server_moving_lungs_send_frames) {
   assert_int_equal(
       supine_stream_volume_breathe(&s->volume, supine_breath_normal(), &breath, &error), SUPINE_OK);
   atomic_store(&s->ending, false);
-  const int other = dial(stage_run(s));
+  const int other = connect_peer(stage_run(s));
   float low = INFINITY;
   float high = -INFINITY;
-  for (int i = 0; i < 100; ++i) { /* frames of 15 ms for 1.5 breaths */
+  for (int i = 0; i < 100; ++i) { /* one frame every 15 ms, for 1.5 breaths */
     assert_true(receive(other, &header, body));
     const float gain = float_at(body + 4 + 4 * MODES);
     low = fminf(low, gain);
@@ -806,7 +806,6 @@ TEST(test_server_small_socket_buffer_frame_whole) {
       peer.packet.piece[peer.packet.count] =
           (struct iovec){bytes + begin, sizes[peer.packet.count]};
     }
-    peer.packet.size = size;
     size_t arrived = 0;
     supine_stream_outcome outcome = SUPINE_STREAM_MORE;
     for (int pass = 0; arrived < size && pass < 100000; ++pass) {

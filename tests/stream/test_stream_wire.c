@@ -107,7 +107,7 @@ TEST(test_read_transform_of_library_gives_rotation_or_position) {
       assert_true(m.number[k] == (double)(k + 1));
     }
   }
-  /* A TRANSFORM of another device gives a position, as for an observed point. */
+  /* A TRANSFORM of another device gives a position, like that of an observed point. */
   const supine_stream_message place = read_ok(&header, body, "Probe");
   assert_int_equal(place.kind, SUPINE_STREAM_POSITION);
   assert_string_equal(place.text, "Patient");
@@ -181,7 +181,7 @@ TEST(test_read_qtdata_of_library_gives_quaternion_of_device) {
   expect_quaternion(&m, 0.8, 0, 0.6, 0);
   m = read_ok(&header, body, "Probe");
   expect_quaternion(&m, 0.8, 0.6, 0, 0);
-  m = read_ok(&header, body, NULL); /* any device: the last one is taken */
+  m = read_ok(&header, body, NULL); /* NULL accepts any device: the last instrument counts */
   expect_quaternion(&m, 0.8, 0, 0, 0.6);
   assert_int_equal(read_ok(&header, body, "Nobody").kind, SUPINE_STREAM_NOTHING);
 }
@@ -338,7 +338,7 @@ TEST(test_header_invalid_refused) {
   assert_int_equal(supine_stream_header_read(bytes, &header, &error), SUPINE_ERROR_FORMAT);
 }
 
-/* Return the joined pieces of a message (malloc). */
+/* Return the joined pieces of a message, which the caller frees. */
 static unsigned char *gathered(const supine_stream_packet *packet) {
   unsigned char *bytes = fixture_allocate(packet->size, 1);
   size_t at = 0;
