@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Find which of the 48 possible axes fit the shape of lungs best.
  *
- * Their score is the sum of four terms in the third moments of volume about a lung's centre,
+ * The score of axes is the sum of four terms in the third moments of volume about a lung's centre,
  *
  *     m_abc = integral of a b c dV / (V sd_a sd_b sd_c)
  *
- * with x outwards from the midline. All terms were positive for nine lungs of five people and two
- * synthetic lungs:
+ * with volume V, standard deviation sd_a along a, and x outwards from the midline. The last column
+ * is the range of each term in nine lungs of five people and two synthetic lungs:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
  *     deepest at the back        m_yzz - m_yyy             0.49 to 0.89
@@ -21,27 +21,28 @@
 
 #include "mesh/anatomy.h"
 
-/* Smallest difference of two scores that counts as clear; the true axes led by 0.35 to 0.7. */
+/* Lead in score that makes axes clearly better; the true axes led by 0.35 to 0.7. */
 static const double least_lead = 0.2;
 /* Limit of |ln(V_right / V_left)| in the score, so that a collapsed lung does not decide alone. */
 static const double most_ratio = 0.25;
-/* A single lung is thin from side to side: its standard deviation along x is at most this multiple
- * of those along y and z. Measured ratios of x to y are 0.6 to 0.7. */
+/* Largest standard deviation of a single lung along x (side to side), divided by that along y or z.
+ * Measured quotients by that along y are 0.6 to 0.7. */
 static const double thin = 0.85;
-/* A surface holds two lungs if along one axis its standard deviation is over `wide` times those
- * along the other two, and its kurtosis is below that of a uniform distribution. */
+/* A surface holds two lungs if, along one axis, its standard deviation exceeds `wide` times each of
+ * the others and its kurtosis is less than `most_kurtosis`, that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
 /* Smallest |m_xxx - m_xyy - m_xzz| that determines the side of a single lung. */
 static const double least_side = 0.12;
 
 typedef struct shape {
-  double volume, centre[3], deviation[3]; /* volume, mm^3; centre and standard deviations, mm */
+  double volume;                  /* mm^3 */
+  double centre[3], deviation[3]; /* centre and standard deviation, mm */
   double kurtosis[3];
-  double third[3][3][3]; /* third moments m_abc */
+  double moments[3][3][3]; /* third moments m_abc */
 } shape;
 
-/* Add the monomials of degrees 1 to 3 of the coordinates of point p, times w, to the sums. */
+/* Add w p_a to sum[a], w p_a^2 to square[a], and w p_a p_b p_c to third[a][b][c]. */
 static void add_point(const double p[3], double w, double sum[3], double square[3],
                       double third[3][3][3]) {
   for (int a = 0; a < 3; ++a) {
@@ -58,8 +59,8 @@ static void add_point(const double p[3], double w, double sum[3], double square[
 /* Return the mean of x^4 over a tetrahedron whose corners have x = 0, a, b and c: the sum of all
  * monomials of degree 4 in a, b and c, divided by 35. */
 static double mean_fourth(double a, double b, double c) {
-  double ab = 1.0;  /* sum of all monomials of degree n in a and b */
-  double abc = 1.0; /* sum of all monomials of degree n in a, b and c */
+  double ab = 1.0;  /* sum of all monomials of degree n in a and b, when step n starts */
+  double abc = 1.0; /* sum of all monomials of degree n in a, b and c, when step n starts */
   double power = 1.0;
   for (int n = 0; n < 4; ++n) {
     power *= a;
@@ -69,8 +70,8 @@ static double mean_fourth(double a, double b, double c) {
   return abc / 35.0;
 }
 
-/* Integrate moments over the tetrahedra between `origin` and the triangles, by Keast's rule of five
- * points, which is exact for cubic polynomials. Return the signed volume. */
+/* Integrate moments over the tetrahedra between `origin` and each triangle, by Keast's rule of five
+ * points, which is exact for cubic polynomials. Return the sum of their signed volumes. */
 static double integrate(const supine_mesh *mesh, const double origin[3], double sum[3],
                         double square[3], double third[3][3][3], double fourth[3]) {
   static const double rule[5][4] = {{-0.8, 0.25, 0.25, 0.25},
@@ -134,7 +135,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
   for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the centroid */
-    s->volume = integrate(mesh, s->centre, sum, square, s->third, fourth);
+    s->volume = integrate(mesh, s->centre, sum, square, s->moments, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {
       return false;
@@ -149,13 +150,13 @@ static bool measure(const supine_mesh *mesh, shape *s) {
     const int a = i / 9;
     const int b = i / 3 % 3;
     const int c = i % 3;
-    s->third[a][b][c] /= s->volume * s->deviation[a] * s->deviation[b] * s->deviation[c];
+    s->moments[a][b][c] /= s->volume * s->deviation[a] * s->deviation[b] * s->deviation[c];
   }
   s->volume = fabs(s->volume);
   return isfinite(s->deviation[0]) && isfinite(s->deviation[1]) && isfinite(s->deviation[2]);
 }
 
-/* Axes to test: coordinate a in them is sign[a] times coordinate from[a] of the surface. */
+/* Axes to test: coordinate a in these axes is sign[a] times coordinate from[a] of the surface. */
 typedef struct view {
   int from[3];
   double sign[3];
@@ -175,7 +176,7 @@ static view view_of(supine_axes axes) {
 }
 
 static double moment(const shape *s, const view *v, int a, int b, int c) {
-  return v->sign[a] * v->sign[b] * v->sign[c] * s->third[v->from[a]][v->from[b]][v->from[c]];
+  return v->sign[a] * v->sign[b] * v->sign[c] * s->moments[v->from[a]][v->from[b]][v->from[c]];
 }
 
 static double hollow(const shape *s, const view *v) {
@@ -187,7 +188,7 @@ static double upright(const shape *s, const view *v) {
          moment(s, v, 1, 1, 2);
 }
 
-/* Score how axes fit a pair of lungs; -INFINITY if the lungs are not side by side in them. */
+/* Score axes for a pair of lungs; -INFINITY unless their centres lie farthest apart along x. */
 static double fit_pair(const shape s[2], const view *v) {
   double apart[3];
   for (int k = 0; k < 3; ++k) {

@@ -7,13 +7,13 @@
 
 typedef struct supine_mesh_anatomy {
   supine_axes axes; /**< axes that the shape fits best; LPS unless other axes are clearly better */
-  bool certain;     /**< whether no other axes fit nearly as well */
-  int side;         /**< side of a single lung in LPS: +1 left, -1 right, 0 unknown */
+  bool certain;     /**< whether `axes` fit clearly better than all other axes */
+  int side;         /**< +1 left, -1 right; 0 if unknown, for two lungs, or if `axes` are not LPS */
   bool joined;      /**< whether a single surface seems to hold both lungs */
 } supine_mesh_anatomy;
 
 /** Find the axes from third moments of volume: a lung is narrow at the head, reaches deepest at the
- * back and is hollow towards the heart; the right lung is larger, and the left lung gives way to
+ * back and is hollow towards the heart; the right lung is larger, and the left lung leaves room for
  * the heart.
  * @param lungs  [count] one or two surfaces, each a lung */
 supine_mesh_anatomy supine_mesh_anatomy_find(const supine_mesh *lungs, size_t count);

@@ -13,11 +13,11 @@
 
 #include <supine/status.h>
 
-/** Axes of a file's coordinates, one of 48: three letters, each the direction in which a coordinate
- * grows (Left, Right, Posterior, Anterior, Superior, Inferior), as in Slicer and nibabel. Values
- * without a name here are returned by supine_mesh_axes_parse. */
+/** Axes of a file's coordinates, one of 48. Three letters, as in Slicer and nibabel, name the
+ * direction in which each coordinate grows (Left, Right, Posterior, Anterior, Superior, Inferior).
+ * supine_mesh_axes_parse also returns values that have no name here. */
 typedef enum supine_axes {
-  SUPINE_AXES_AUTO = 0, /**< the axes of the file's SPACE tag; LPS without a tag */
+  SUPINE_AXES_AUTO = 0, /**< the axes of the file's SPACE tag, or LPS if it has none */
   SUPINE_AXES_LPS = 1,
   SUPINE_AXES_RAS = 4,
   SUPINE_AXES_COUNT = 49
@@ -25,15 +25,15 @@ typedef enum supine_axes {
 
 /** Parse three letters, such as "RAI"; return false for anything else. */
 bool supine_mesh_axes_parse(const char *letters, supine_axes *axes);
-/** Write the three letters of axes and a NUL; AUTO is LPS. */
+/** Write the three letters of axes and a NUL; AUTO counts as LPS. */
 void supine_mesh_axes_letters(supine_axes axes, char letters[4]);
-/** Find the signed permutation matrix that converts coordinates in `axes` to LPS; AUTO is LPS. */
+/** Find the signed permutation matrix that converts coordinates to LPS; AUTO counts as LPS. */
 void supine_mesh_axes_matrix(supine_axes axes, double matrix[3][3]);
 /** Convert a point or vector to LPS in place, and multiply it by `scale`. */
 void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]);
-/** Find the axes whose matrix is the product of the matrices of `then` and `first`. */
+/** Find the axes whose matrix is the matrix of `then` times the matrix of `first`. */
 supine_axes supine_mesh_axes_after(supine_axes first, supine_axes then);
-/** Return whether axes are left-handed: converted to LPS, triangles then face the other way. */
+/** Return whether axes are left-handed, so that conversion to LPS reverses the triangles. */
 bool supine_mesh_axes_mirrored(supine_axes axes);
 
 /** A triangle surface. Zero-initialise; release with supine_mesh_free. */
@@ -44,13 +44,12 @@ typedef struct supine_mesh {
   uint32_t *triangles; /**< [triangle_count, 3] counter-clockwise seen from outside */
 } supine_mesh;
 
-/** How to read a file. Zero-initialised: axes as the file says, units of 1 mm. */
+/** How to read a file. Zeros stand for the axes that the file names and units of 1 mm. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
-  double millimetres_per_unit; /**< length of the file's unit, mm; 0: 1 mm */
+  double millimetres_per_unit; /**< 0 stands for 1 */
 } supine_mesh_load_options;
 
-/** Result of loading. */
 typedef struct supine_mesh_report {
   size_t degenerate_faces;      /**< dropped faces with fewer than three different corners */
   size_t unreferenced_vertices; /**< dropped vertices that are part of no triangle */
@@ -59,14 +58,14 @@ typedef struct supine_mesh_report {
 } supine_mesh_report;
 
 /** Read one surface: PLY and VTP directly, OBJ, STL and other formats through assimp. Polygons are
- * cut into triangles, all nodes of a scene are joined, vertices at the same position are welded in
- * order of first appearance.
+ * cut into triangles, all nodes of a scene are joined, and vertices at the same position are
+ * welded, in the order of their first appearance.
  *
  * Counts are checked against the file's size, so truncated or corrupt files are refused. assimp
- * runs in its own process, so files on which an importer crashes or exceeds its limits are
- * refused too. Positions are rounded to float32.
+ * runs in its own process, so files on which an importer crashes or exceeds its limits are refused
+ * too. Positions are rounded to float32.
  *
- * @param options  NULL: defaults
+ * @param options  NULL for the defaults
  * @param mesh     zero-initialised; written only on success
  * @param report   optional
  * @retval SUPINE_ERROR_READ    the file is missing, a folder or unreadable
@@ -79,12 +78,12 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
 /** Return whether `side`, mm, is a possible longest side of the bounding box of lungs.
- * @param other  output: the unit other than mm in which `side` is most likely, as a string
- *             literal; NULL if `side` is impossible in every other unit */
+ * @param other  output, a string literal: the unit other than mm in which a length of `side` is
+ *             most likely; NULL if it is impossible in every other unit */
 bool supine_mesh_unit_is_likely(double side, const char **other);
 /** Find the length in mm of "mm", "cm", "m", "um" or "in"; return false for any other name. */
 bool supine_mesh_unit_find(const char *name, double *millimetres);
-/** Name a unit of length: "mm", "cm", "m", "um", "in" or, for any other, "2.5 mm".
+/** Name a unit of length: "mm", "cm", "m", "um", "in" or, for others, a text such as "2.5 mm".
  * @param text  [24] output */
 void supine_mesh_unit_name(double millimetres, char *text);
 
@@ -98,27 +97,28 @@ typedef struct supine_topology {
   size_t boundary_edges;     /**< edges that belong to one triangle */
   size_t non_manifold_edges; /**< edges shared by three or more triangles */
   size_t inconsistent_edges; /**< edges that two triangles run through in the same direction */
-  size_t component_count;    /**< connected components, over shared vertices */
-  uint32_t *component;       /**< [vertex_count] component of each vertex, in order of appearance */
+  size_t component_count;    /**< sets of vertices connected by edges */
+  uint32_t *component;       /**< [vertex_count] number of the component of each vertex */
   long euler_characteristic; /**< vertices - edges + triangles */
-  long genus; /**< genus (2 * component_count - euler_characteristic) / 2 of a closed surface; -1 if
-                 the surface is open or the formula gives no whole number >= 0 */
+  long genus;  /**< of a closed surface, (2 component_count - euler_characteristic) / 2; -1 if the
+                  surface is open or this is no whole number >= 0 */
   bool closed; /**< whether every edge joins exactly two triangles of the same orientation */
 } supine_topology;
 
-/** Find edges and components, in linear time and memory except for sorting each vertex's edges.
+/** Find edges and components in linear time, except for sorting the edges of each vertex.
  * @param topology  zero-initialised; written only on success
- * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or out of range, or there are
- *   more than 2^31 - 1 vertices
+ * @retval SUPINE_ERROR_ARGUMENT  a triangle names a vertex twice or out of range, or there are more
+ *             than 2^31 - 1 vertices
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
 
-/** Compute the enclosed volume in mm^3, (1/6) sum p0 . (p1 x p2) about the box centre: signed,
- * positive if the triangles face outwards; meaningful only for closed surfaces; 0 if empty. */
+/** Compute the volume that a closed surface encloses, mm^3, as the sum of p0 . (p1 x p2) / 6 with
+ * corners p relative to the box's centre: negative if triangles face inwards, 0 if there are
+ * none. */
 double supine_mesh_volume(const supine_mesh *mesh);
 
-/** Find the axis-aligned box, mm, and return its longest side; zeros without vertices. */
+/** Find the axis-aligned box, mm, and return its longest side; all are 0 without vertices. */
 double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
 
 /** Reverse the triangles, so that they face the other way. */
@@ -127,8 +127,8 @@ void supine_mesh_reverse(const supine_mesh *mesh);
 /** Compute the area of each vertex [vertex_count], mm^2: one third of the area of its triangles. */
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 
-/** Compute the unit normal of each vertex [vertex_count, 3], the area-weighted mean of the normals
- * of its triangles, normalised; 0 where the mean is 0. */
+/** Compute the unit normal of each vertex [vertex_count, 3]: the normalised mean of the normals of
+ * its triangles, weighted by area. It is 0 where the mean is 0. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
 /** Return the share, 0 to 1, of triangles whose normal turns by more than a right angle when the
@@ -144,50 +144,50 @@ typedef struct supine_mesh_field {
 
 /** How to write a file, and its optional content. */
 typedef struct supine_mesh_save_options {
-  supine_axes axes;    /**< axes of the file, written as its SPACE tag; AUTO: LPS */
-  const double *from;  /**< optional [vertex_count, 3] starting points of displacements, mm: VTP
-                            and PLY files then contain displacements and their magnitudes */
+  supine_axes axes;    /**< axes of the file, written as its SPACE tag; AUTO for LPS */
+  const double *from;  /**< optional [vertex_count, 3] starting points of displacements, mm: VTP and
+                          PLY files then hold displacements and their magnitudes */
   const char *comment; /**< optional note of one line */
-  double millimetres_per_unit; /**< unit of positions and displacements; 0: 1 mm */
-  const float *expected_error; /**< optional [vertex_count] in mm, whatever the file's unit: point
-                                  data "expected_error_mm" of VTP and PLY */
+  double millimetres_per_unit; /**< unit of positions and displacements; 0 stands for 1 */
+  const float *expected_error; /**< optional [vertex_count], always in mm: point data
+                                  "expected_error_mm" of VTP and PLY */
   /** @{ For VTP only, all optional. */
   const float *normals;            /**< [vertex_count, 3] point data "Normals" */
   const unsigned char *lung;       /**< [vertex_count] index of the lung, point data "lung" */
   const supine_mesh_field *fields; /**< [field_count] numbers for the field data */
   size_t field_count;
-  double rounding; /**< largest step of rounded lengths, mm: in the file's unit, the step is the
-                      next lower power of two. Normals are rounded to 1/256. 0: no rounding */
+  double rounding; /**< mm; lengths are rounded to a power of two in the file's unit, the largest up
+                      to this, and normals to 1/256; 0 for no rounding */
   /** @} */
 } supine_mesh_save_options;
 
-/** Write the surface in the format of the name's ending: .ply (binary), .obj, .stl (binary),
- * .vtp. The file appears completely or not at all.
- * @param options  NULL: LPS, no displacement, no comment
- * @retval SUPINE_ERROR_ARGUMENT  another ending, or the mesh is too large for the formats
+/** Write the surface in the format of the name's ending: .ply (binary), .obj, .stl (binary), .vtp.
+ * The file appears completely or not at all.
+ * @param options  NULL for LPS without displacements and comment
+ * @retval SUPINE_ERROR_ARGUMENT  the ending is unknown, or the mesh is too large to write
  * @retval SUPINE_ERROR_MESH      a coordinate is not finite
  * @retval SUPINE_ERROR_WRITE     the folder is missing or not writable, or the disk is full */
 supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
                                const supine_mesh_save_options *options, supine_error *error);
 
-/** A VTP file of a surface that moves over time, in the form that VTK and ParaView read: the
- * triangles once, every array compressed. The field data hold the times, "time_s", and all fields,
- * with one tuple for each frame. The file appears completely or not at all. */
+/** A VTP file of a surface that moves over time, in the form that VTK and ParaView read. The
+ * triangles are stored once; every array is compressed. The field data hold the times, "time_s",
+ * and all fields, with one tuple for each frame. The file appears completely or not at all. */
 typedef struct supine_mesh_series supine_mesh_series;
 
 /** Begin a series. All arguments must outlive it; before each frame the caller updates the arrays
  * `mesh->vertices` and `options->normals`.
  * @param times  [frames] in s
  * @retval SUPINE_ERROR_WRITE  also if the path is a pipe or device: offsets are written last
- * @retval those of supine_mesh_save
+ * @retval the statuses of supine_mesh_save
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options, size_t frames,
                                       const double *times, supine_mesh_series **series,
                                       supine_error *error);
-/** Add the next frame. Statuses as supine_mesh_save. */
+/** Add the next frame. Return the statuses of supine_mesh_save. */
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
-/** Complete the file after all frames and give it its name. Statuses as supine_mesh_save. */
+/** Complete the file, give it its name, and return the statuses of supine_mesh_save. */
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
 /** Free a series; if it was not committed, no file appears. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);

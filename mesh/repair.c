@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair small defects of surfaces: duplicate, loose and reversed triangles, touching surfaces,
- * specks. */
+ * small pieces. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,12 +9,12 @@
 
 #include "mesh/repair.h"
 
-/* Largest share of loose triangles that are dropped; with more, the mesh is not a surface. */
+/* Largest share of loose triangles that are dropped; a mesh with more of them is no surface. */
 static const double most_loose = 0.01;
 
 typedef struct links {
   uint32_t *parent; /* [triangles] union-find forest: a tree for each surface */
-  uint8_t *turned;  /* [triangles] 1 if a triangle faces against its parent, else 0 */
+  uint8_t *turned;  /* [triangles] 1 if a triangle faces the other way than its parent, else 0 */
 } links;
 
 /* Return the corner opposite a side. */
@@ -38,7 +38,7 @@ static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sid
   }
 }
 
-/* Mark triangles with no edge that exactly two triangles share, unless they exceed most_loose. */
+/* Mark triangles with no edge that exactly two triangles share; none if they exceed most_loose. */
 static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -68,7 +68,7 @@ static size_t drop_marked(supine_mesh *mesh, const uint8_t *drop) {
   return dropped;
 }
 
-/* Return the first triangle of t's surface; set `turned` to 1 if t faces against it, else 0. */
+/* Return the first triangle of t's surface; set `turned` to 1 if t faces the opposite way. */
 static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
   uint8_t sum = 0;
   uint32_t root = t;
@@ -77,7 +77,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
     root = l->parent[root];
   }
   *turned = sum;
-  while (l->parent[t] != root && t != root) { /* link the whole path to the root */
+  while (l->parent[t] != root && t != root) { /* link every triangle of the path to the root */
     const uint32_t next = l->parent[t];
     const uint8_t here = l->turned[t];
     l->parent[t] = root;
@@ -122,7 +122,7 @@ static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *side
   return sound;
 }
 
-/* Reverse the minority of each surface's triangles; return how many were reversed.
+/* Reverse the triangles of each surface that face the less frequent way; return how many.
  * @param count  [triangles, 2] zeros, used as work space */
 static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)[2]) {
   size_t reversed = 0;
@@ -149,21 +149,21 @@ static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)
 static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t *separated) {
   const size_t corners = 3 * mesh->triangle_count;
   size_t count = mesh->vertex_count;
-  uint32_t *owner = malloc((count + corners + 1) * sizeof *owner); /* surface of each vertex */
-  uint32_t *next = calloc(count + corners + 1, sizeof *next); /* next copy of a vertex; 0: none */
-  supine_status status = owner == NULL || next == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
+  uint32_t *surface_of = malloc((count + corners + 1) * sizeof *surface_of);
+  uint32_t *next_copy = calloc(count + corners + 1, sizeof *next_copy); /* 0 if none */
+  supine_status status = surface_of == NULL || next_copy == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
-    memset(owner, 0xFF, (count + corners) * sizeof *owner); /* UINT32_MAX: no owner yet */
+    memset(surface_of, 0xFF, (count + corners) * sizeof *surface_of); /* UINT32_MAX: unknown */
   }
   for (size_t i = 0; i < corners && status == SUPINE_OK; ++i) {
     uint8_t turned;
     const uint32_t root = find_root(l, (uint32_t)(i / 3), &turned);
     uint32_t v = mesh->triangles[i];
-    while (owner[v] != UINT32_MAX && owner[v] != root) {
-      next[v] = next[v] == 0 ? (uint32_t)count++ : next[v];
-      v = next[v];
+    while (surface_of[v] != UINT32_MAX && surface_of[v] != root) {
+      next_copy[v] = next_copy[v] == 0 ? (uint32_t)count++ : next_copy[v];
+      v = next_copy[v];
     }
-    owner[v] = root;
+    surface_of[v] = root;
     mesh->triangles[i] = v;
   }
   *separated = count - mesh->vertex_count;
@@ -172,18 +172,19 @@ static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t
     status = grown == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
     mesh->vertices = grown != NULL ? grown : mesh->vertices;
     for (size_t v = 0; v < mesh->vertex_count && status == SUPINE_OK; ++v) {
-      for (size_t c = next[v]; c != 0; c = next[c]) {
+      for (size_t c = next_copy[v]; c != 0; c = next_copy[c]) {
         memcpy(grown + 3 * c, grown + 3 * v, 3 * sizeof *grown);
       }
     }
     mesh->vertex_count = count;
   }
-  free(owner);
-  free(next);
+  free(surface_of);
+  free(next_copy);
   return status;
 }
 
-/* Reverse the triangles that face against their surface, and separate surfaces that touch. */
+/* Reverse triangles that face the other way than most of their surface, and separate surfaces that
+ * touch. */
 static supine_status mend_links(supine_mesh *mesh, const supine_mesh_side *sides,
                                 supine_mesh_repair_report *report) {
   const size_t n = mesh->triangle_count;
@@ -253,18 +254,18 @@ size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {
 }
 
 typedef struct piece {
-  double volume;  /* volume, mm^3; negative if the component faces inwards */
-  uint32_t first; /* first vertex of the component */
+  double volume; /* mm^3; negative if the component faces inwards */
+  uint32_t first_vertex;
 } piece;
 
 /* Find the first vertex and the volume of each component. */
 static void find_volumes(const supine_mesh *mesh, const supine_topology *topology, piece *pieces) {
   for (size_t i = mesh->vertex_count; i-- > 0;) {
-    pieces[topology->component[i]].first = (uint32_t)i;
+    pieces[topology->component[i]].first_vertex = (uint32_t)i;
   }
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     piece *of = &pieces[topology->component[mesh->triangles[3 * t]]];
-    const double *origin = mesh->vertices + 3 * (size_t)of->first;
+    const double *origin = mesh->vertices + 3 * (size_t)of->first_vertex;
     double corner[3][3];
     for (size_t k = 0; k < 9; ++k) {
       corner[k / 3][k % 3] =

@@ -16,7 +16,7 @@ typedef struct supine_mesh_repair_report {
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
-/** Drop vertices in no triangle, keeping the order of the others; return the number dropped.
+/** Drop vertices that are in no triangle, keeping the order of the others; return how many.
  * @param space  [vertex_count] work space */
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
@@ -30,7 +30,7 @@ supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *p
 /** One side of a triangle, between vertices low < high. */
 typedef struct supine_mesh_side {
   uint32_t low, high;
-  uint32_t at; /**< 3 * triangle + corner that the side starts at */
+  uint32_t at; /**< 3 * (index of the triangle) + corner, 0 to 2, where the side starts */
 } supine_mesh_side;
 
 /** Sort all triangles' sides by low, high, at; NULL if out of memory. The caller frees them. */

@@ -38,7 +38,7 @@ supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
     free(sides);
     return NULL;
   }
-  for (int pass = 0; pass < 2; ++pass) { /* 0: count the sides of each vertex; 1: store them */
+  for (int pass = 0; pass < 2; ++pass) { /* first count each vertex's sides, then store them */
     for (size_t i = 0; i < count; ++i) {
       const uint32_t a = mesh->triangles[i];
       const uint32_t b = mesh->triangles[i % 3 == 2 ? i - 2 : i + 1];

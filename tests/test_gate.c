@@ -155,8 +155,8 @@ TEST(test_gate_wrong_axes_option_proposes_right_one) {
 }
 
 TEST(test_gate_single_lung_side_found_by_shape) {
-  static const char *const said[] = {"taken for the left by its shape",
-                                     "taken for the right by its shape"};
+  static const char *const said[] = {"taken for the left lung by its shape",
+                                     "taken for the right lung by its shape"};
   for (int right = 0; right < 2; ++right) {
     supine_mesh mesh = left_lung();
     for (size_t i = 0; right != 0 && i < mesh.vertex_count; ++i) {
@@ -305,7 +305,7 @@ TEST(test_gate_impossible_size_refused_unless_units_given) {
   }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_ERROR_MESH);
-  assert_non_null(strstr(out.error.message, "its unit is likely --units m."));
+  assert_non_null(strstr(out.error.message, "impossible for lungs: add --units m."));
   const supine_lungs_source given = {
       .name = "small.ply", .axes = SUPINE_AXES_LPS, .units_given = true};
   out = pass(&mesh, &given);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Images in NRRD, NIfTI and MetaImage: round trips in every orientation and type, and invalid
  * files. */
+#include <sys/stat.h>
+
 #include "folder.h"
 #include "mesh/io/image.h"
 
@@ -240,6 +242,8 @@ TEST(test_image_bad_names_and_folders_refused) {
   assert_false(supine_image_supports("x.gz") || supine_image_supports(".nrrd"));
   check_refused("image.mhd", SUPINE_ERROR_FORMAT, ".nrrd");
   check_refused("absent.nrrd", SUPINE_ERROR_READ, "absent");
+  assert_int_equal(mkdir(in_folder("folder.nrrd"), 0700), 0);
+  check_refused("folder.nrrd", SUPINE_ERROR_READ, "not a regular file");
   assert_int_equal(supine_image_write(in_folder("x.mhd"), &image, NULL, &error),
                    SUPINE_ERROR_ARGUMENT);
   image.channels = 2;

@@ -625,9 +625,9 @@ TEST(test_labels_bad_maps_refused) {
       {"left=70000", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=-1", SUPINE_ERROR_ARGUMENT, "--labels takes"},
       {"left=1,right=2", SUPINE_ERROR_MESH, "Exchange the labels"},
-      {"left=2,right=3", SUPINE_ERROR_MESH, "gives the right lung"},
+      {"left=2,right=3", SUPINE_ERROR_MESH, "gives to the right lung"},
       {"totalsegmentator", SUPINE_ERROR_MESH, "the left lung; the labels present are 1, 2"},
-      {"left=9", SUPINE_ERROR_MESH, "gives the left lung"},
+      {"left=9", SUPINE_ERROR_MESH, "gives to the left lung"},
   };
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
@@ -655,7 +655,7 @@ TEST(test_labels_bad_maps_refused) {
     at[i] = at[i] == 0 ? 0 : i < voxels(&image) / 2 ? 1 : 2;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
-  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "does not lie left of the other");
+  refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "does not lie left of the right lung");
   memset(at, 0, voxels(&image));
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "every voxel is 0");

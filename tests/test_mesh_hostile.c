@@ -261,11 +261,14 @@ static void refuse_bytes(void **state, const void *bytes, size_t size, const cha
   assert_int_equal(unlink(path), 0);
 }
 
-TEST(test_ply_list_of_negative_length_refused) {
-  static const char ascii[] = PLY_ASCII
-      "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
-      "property list int int vertex_indices\nend_header\n1 2 3\n-3 0 0 0\n";
-  refuse_bytes(state, ascii, sizeof ascii - 1, "a list has the length -3");
+TEST(test_ply_list_of_impossible_length_refused) {
+#define LIST(length)                                                                               \
+  PLY_ASCII "element vertex 1\nproperty float x\nproperty float y\nproperty float z\n"             \
+            "element face 1\nproperty list int int vertex_indices\nend_header\n1 2 3\n" length
+  static const char below[] = LIST("-3 0 0 0\n");
+  static const char above[] = LIST("1000 0 0 0\n"); /* more numbers than the file has bytes */
+  refuse_bytes(state, below, sizeof below - 1, "a list has the length -3");
+  refuse_bytes(state, above, sizeof above - 1, "a list has the length 1000");
   unsigned char bytes[512] = {0};
   static const char *const types[] = {"char", "short", "int"};
   for (int k = 0; k < 3; ++k) {

@@ -541,7 +541,7 @@ TEST(test_load_vtp_bad_files_refused) {
       {"<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"4\" NumberOfStrips=\"1\">",
        "strips"},
       {VTP("compressor=\"vtkLZ4DataCompressor\"", "", "", ""), "not compressed by zlib"},
-      {"<VTKFile type=\"PolyData\"></VTKFile>", "no Piece"},
+      {"<VTKFile type=\"PolyData\"></VTKFile>", "no element Piece"},
       {"<VTKFile type=\"PolyData\"><Piece ></Piece><Piece ></Piece></VTKFile>", "several pieces"},
       {"<VTKFile type=\"PolyData\"><Piece NumberOfPoints=\"-3\"></Piece></VTKFile>", "invalid"},
       {VTP("", "", "", ""), "no array of points"},

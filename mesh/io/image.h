@@ -9,7 +9,6 @@
 
 #include "mesh/mesh.h"
 
-/** Storage type of a voxel. */
 typedef enum supine_image_voxel {
   SUPINE_VOXEL_I8 = 0,
   SUPINE_VOXEL_U8,
@@ -31,20 +30,20 @@ typedef enum supine_image_voxel {
 typedef struct supine_image {
   size_t size[3];
   double origin[3];  /**< centre of voxel (0, 0, 0), mm, LPS */
-  double step[3][3]; /**< vector from a voxel to the next on each axis, mm, LPS; independent */
+  double step[3][3]; /**< vector to the next voxel along each axis, mm, LPS; linearly independent */
   supine_image_voxel voxel;
   size_t channels; /**< numbers per voxel: 1 when read from a file, 3 in a displacement field */
   void *values;
   supine_axes axes;         /**< axes assumed for the header's coordinates */
-  const char *frame_source; /**< header field that gives the frame, a string literal: "sform",
-                               "qform", "space directions" or "TransformMatrix" */
-  bool frames_differ;       /**< NIfTI: qform and sform differ by half a voxel or more somewhere */
+  const char *frame_source; /**< header field that gives origin and steps, a string literal:
+                               "sform", "qform", "space directions" or "TransformMatrix" */
+  bool frames_differ;       /**< whether qform and sform differ by half a voxel or more */
 } supine_image;
 
 /** Return whether the name ends in .nrrd, .nii, .nii.gz or .mha. */
 bool supine_image_supports(const char *path);
 
-/** Return whether the name ends like an image's, readable or not (.mhd, .nhdr, .mgz, .dcm, ...). */
+/** Return whether the name ends like an image, even one that cannot be read (.mhd, .dcm, ...). */
 bool supine_image_is_named(const char *path);
 
 /** Read an image of one number per voxel. If a NIfTI header gives a slope and an intercept, the
@@ -52,16 +51,16 @@ bool supine_image_is_named(const char *path);
  * @param image  zero-initialised; written only on success
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  the file has an unsupported ending or type of voxels, is truncated
- * or malformed, states more voxels than it can hold, does not have three dimensions and one number
- * per voxel, has dependent axes or no orientation, or refers to other files
+ *             or malformed, states more voxels than it can hold, does not have three dimensions and
+ *             one number per voxel, has dependent axes or no orientation, or refers to other files
  * @retval SUPINE_ERROR_MEMORY
- * Memory: the voxels, at most 1,032 times the file's size (the most that gzip expands). */
+ * Memory: the voxels, at most 1,032 times the file's size, because gzip expands no further. */
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error);
 void supine_image_free(supine_image *image);
 
 /** Write an image in the format of its name's ending; .nrrd, .nii.gz and .mha are compressed. The
- * file appears completely or not at all. Three channels are a displacement, in mm and LPS in every
- * format, as ITK and ANTs expect.
+ * file appears completely or not at all. An image of three channels is a displacement; in every
+ * format it is in mm and LPS, as ITK and ANTs expect.
  * @param note  optional: one line for the header
  * @retval SUPINE_ERROR_ARGUMENT  the ending is not supported, or the image is too large or has too
  *             many channels for NIfTI-1
@@ -73,13 +72,13 @@ supine_status supine_image_write(const char *path, const supine_image *image, co
 size_t supine_image_voxel_size(supine_image_voxel voxel);
 /** Return values[index] as a double. */
 double supine_image_get(const supine_image *image, size_t index);
-/** Read values[from + index[k]] as doubles for 0 <= k < count. */
+/** Set values[k] to supine_image_get(image, from + index[k]) for 0 <= k < count. */
 void supine_image_gather(const supine_image *image, size_t from, const size_t *index, size_t count,
                          double *values);
-/** Store `count` numbers at values[begin] and after; integer types are rounded and clipped. */
+/** Set number begin + i of the image to values[i]; integer types are rounded and clipped. */
 void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
-/** Interpret the header's coordinates in `axes` instead of the header's axes; AUTO: no change. */
+/** Interpret the coordinates of the header in `axes`; do nothing if `axes` is AUTO. */
 void supine_image_set_axes(supine_image *image, supine_axes axes);
 
 /** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */

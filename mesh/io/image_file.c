@@ -11,7 +11,6 @@
 
 #include "mesh/io/image_formats.h"
 
-/* The formats: endings, readers and writers. */
 static const struct {
   const char *ending;
   image_describe *describe;
@@ -23,7 +22,7 @@ static const struct {
 
 enum { FORMATS = sizeof formats / sizeof *formats };
 
-/* Return the index of the format with the path's ending; FORMATS if there is none. */
+/* Return the index of the format with the path's ending, or FORMATS if there is none. */
 static size_t format_of(const char *path) {
   size_t f = 0;
   while (f < FORMATS && !supine_text_ends_in_any_case(path, formats[f].ending)) {
@@ -45,8 +44,8 @@ bool supine_image_is_named(const char *path) {
   return is;
 }
 
-/* Return whether the frame is finite and its steps are independent: the volume they span must
- * exceed a thousandth of the product of their lengths. */
+/* Return whether origin and steps are finite and the steps are linearly independent: the volume
+ * they span must exceed a thousandth of the product of their lengths. */
 static bool is_frame(const supine_image *image) {
   double lengths = 1.0;
   for (int a = 0; a < 3; ++a) {
@@ -72,7 +71,7 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   }
   if (stat(path, &file) != 0 || !S_ISREG(file.st_mode)) {
     return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path,
-                            strerror(errno == 0 ? EISDIR : errno)); /* NOLINT */
+                            file.st_mode == 0 ? strerror(errno) : "it is not a regular file");
   }
   supine_status status = formats[format_of(path)].describe(path, &read, &storage, error);
   if (status == SUPINE_OK && !is_frame(&read)) {

@@ -27,7 +27,7 @@
   EACH(ai, MultiplyMatrix4) EACH(ai, Matrix4Determinant)
 /* clang-format on */
 
-/* Functions of assimp, loaded when needed: loading takes longer than most commands run. */
+/* Functions of assimp, loaded only when needed, as loading takes longer than most commands. */
 typedef struct assimp {
   FUNCTIONS(SUPINE_LIBRARY_MEMBER)
 } assimp;
@@ -65,7 +65,7 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           length == 0 ? "the importer failed" : line);
 }
 
-/* Import a file: its bytes in the format `kind`, or, if `kind` is NULL, from its path. */
+/* Import a file: from its path if `kind` is NULL, else its bytes, in the format `kind`. */
 static const struct aiScene *import(const assimp *ai, const mesh_file *file, const char *kind) {
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Without this, importers add a surface to files that hold only a skeleton. */
@@ -235,8 +235,8 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
 }
 
 /* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
- * not; return the number of the first wrong line, or 0. Turn mtllib lines, which name a file of
- * colours, into comments. `last` is set to the first word of the last line. */
+ * not. Return the number of the first wrong line, or 0. Also turn mtllib lines, which name a file
+ * of colours, into comments, and set `last` to the first word of the last line. */
 static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;
@@ -272,7 +272,7 @@ supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *d
   return bad > 0 ? bad_line(file, bad, error) : import_file(file, "obj", mesh, dropped, error);
 }
 
-/* Read STL. A file without NUL bytes is text; some binary files begin with "solid" too. */
+/* Read STL: as text if the file has no NUL byte; binary files, too, may begin with "solid". */
 supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   mesh_text last = {0};

@@ -6,8 +6,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
+
+#include "sh/base/text.h"
 
 #include "mesh/io/read.h"
 
@@ -16,7 +17,7 @@ static supine_status cannot_read(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
 }
 
-/* Return the reader for the ending of the name; NULL if none. */
+/* Return the reader for the ending of the name, or NULL if there is none. */
 static mesh_reader *find_reader(const char *path) {
   static const struct {
     const char *ending;
@@ -25,13 +26,13 @@ static mesh_reader *find_reader(const char *path) {
                {".vtp", supine_mesh_read_vtp},
                {".stl", supine_mesh_read_stl},
                {".obj", supine_mesh_read_obj}};
-  const char *slash = strrchr(path, '/');
-  const char *ending = strrchr(slash == NULL ? path : slash, '.');
-  for (size_t i = 0; i < sizeof known / sizeof *known && ending != NULL; ++i) {
-    if (strcasecmp(ending, known[i].ending) == 0) {
+  for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
+    if (supine_text_ends_in_any_case(path, known[i].ending)) {
       return known[i].read;
     }
   }
+  const char *slash = strrchr(path, '/');
+  const char *ending = strrchr(slash == NULL ? path : slash, '.');
   return ending != NULL && supine_mesh_import_knows(ending) ? supine_mesh_import : NULL;
 }
 
@@ -145,7 +146,7 @@ static supine_status convert(const char *path, double scale, supine_axes axes, s
     }
     if (!(largest * scale <= farthest)) {
       return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "%s: vertex %zu of %zu lies %.3g mm from the origin; repair the "
+                              "%s: vertex %zu of %zu has a coordinate of %.3g mm; repair the "
                               "mesh, or give its --units",
                               path, i, mesh->vertex_count, largest * scale);
     }

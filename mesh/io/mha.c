@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* MetaImage with its voxels in the same file (.mha), as ITK, elastix and plastimatch write it:
+/* Read and write MetaImage files that hold their voxels (.mha), as ITK, elastix and plastimatch do:
  * lines "Key = value", the last of which is ElementDataFile, then the voxels. Axes are LPS. */
 #include <stdint.h>
 #include <stdio.h>
@@ -36,7 +36,7 @@ typedef struct header {
   size_t length; /* bytes before the voxels */
 } header;
 
-/* Find the last value of any of up to three keys (unused: ""); return "" if there is none. */
+/* Return the last value of any of three keys, or "" if there is none. An unused key is "". */
 static const char *value_of(const header *h, const char *key, const char *second,
                             const char *third) {
   const char *value = "";
@@ -53,7 +53,7 @@ static bool is_true(const char *value) {
   return strcasecmp(value, "true") == 0 || strcmp(value, "1") == 0;
 }
 
-/* Parse `count` numbers. If `text` is empty, change nothing; if it is malformed, return false. */
+/* Parse `count` numbers; return false if `text` is malformed. An empty `text` changes nothing. */
 static bool numbers(const char *text, double *values, size_t count) {
   bool good = true;
   for (size_t i = 0; i < count && good && *text != '\0'; ++i) {
@@ -65,13 +65,13 @@ static bool numbers(const char *text, double *values, size_t count) {
   return good;
 }
 
-/* Split the lines of `text`, which is modified; return NULL, or a message on failure. */
+/* Split `text`, which is modified, into keys and values. Return NULL, or a message on failure. */
 static const char *read_header(char *text, header *h) {
   *h = (header){0};
   for (char *line = text; h->count == 0 || strcmp(h->key[h->count - 1], "ElementDataFile") != 0;) {
     char *end = strchr(line, '\n');
     if (end == NULL || h->count == KEYS_MAX) {
-      return "no line ElementDataFile ends its header; write the image again";
+      return "its header does not end with ElementDataFile; write the image again";
     }
     *end = '\0';
     char *value = strchr(line, '=');
@@ -128,7 +128,7 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
       !numbers(value_of(h, "Offset", "Position", "Origin"), offset, n) ||
       !numbers(value_of(h, "TransformMatrix", "Rotation", "Orientation"), matrix, n * n) ||
       !numbers(value_of(h, "ElementNumberOfChannels", "", ""), &channels, 1)) {
-    return "a list of its header has too few numbers; save it again";
+    return "a line of its header has too few numbers; save it again";
   }
   if (channels != 1.0 || (n == 4 && size[3] != 1.0)) {
     return channels != 1.0 ? "it has several numbers per voxel; save one per voxel"
@@ -180,7 +180,7 @@ supine_status supine_image_describe_mha(const char *path, supine_image *image,
     *storage = (image_storage){
         .offset = (int64_t)h.length,
         .packed = is_true(value_of(&h, "CompressedData", "", "")),
-        .big = is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "")),
+        .big_endian = is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "")),
         .integer = !types[type].wide            ? 0
                    : types[type].name[4] != 'U' ? 1
                                                 : -1};
@@ -226,7 +226,7 @@ static void write_header(const supine_image *image, const char *note, size_t pac
 
 supine_status supine_image_write_mha(const char *path, const supine_image *image, const char *note,
                                      FILE *file, supine_error *error) {
-  char *packed = NULL; /* compressed in memory, as the header states the compressed size */
+  char *packed = NULL; /* compressed in memory first, as the header states the compressed size */
   size_t size = 0;
   FILE *memory = open_memstream(&packed, &size);
   supine_status status = memory == NULL

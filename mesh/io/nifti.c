@@ -34,7 +34,7 @@ static bool forms_differ(const nifti_image *nifti) {
   return nifti->sform_code > 0 && nifti->qform_code > 0 && farthest >= 0.5 * voxel;
 }
 
-/* Check size and type, and convert the frame from RAS, NIfTI's axes. */
+/* Check size and type. Convert origin and steps from RAS, NIfTI's axes, to LPS. */
 static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
                            image_storage *storage, supine_error *error) {
   const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
@@ -80,7 +80,7 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
   *storage = (image_storage){.offset = packed ? 0 : nifti->iname_offset,
                              .skip = packed ? nifti->iname_offset : 0,
                              .packed = packed,
-                             .big = nifti->byteorder != nifti_short_order(),
+                             .big_endian = nifti->byteorder != nifti_short_order(),
                              .integer = nifti->datatype == DT_INT64    ? 1
                                         : nifti->datatype == DT_UINT64 ? -1
                                                                        : 0,
@@ -140,9 +140,9 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
   memcpy(header, &h, sizeof h);
 }
 
-/* Copy the vectors, with each component stored contiguously; return NULL if out of memory. The
- * vectors stay in LPS: ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads
- * only the first component of NIFTI_INTENT_DISPVECT. */
+/* Copy the vectors: first all x, then all y, then all z. Return NULL if out of memory. The vectors
+ * stay in LPS: ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the
+ * first component of NIFTI_INTENT_DISPVECT. */
 static float *planes(const supine_image *image) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   float *made = malloc(3 * count * sizeof *made);

@@ -95,7 +95,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
     }
     image->origin[a] = (a < 2 ? turn : 1.0) * nrrd->spaceOrigin[a];
   }
-  storage->big = io->endian == airEndianBig;
+  storage->big_endian = io->endian == airEndianBig;
   storage->integer = !wide ? 0 : nrrd->type == nrrdTypeLLong ? 1 : -1;
   return SUPINE_OK;
 }

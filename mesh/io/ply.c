@@ -12,7 +12,7 @@ typedef enum kind { VERTICES, FACES, STRIPS, OTHER } kind;
 typedef enum role { X, Y, Z, CORNERS, NONE } role;
 
 typedef struct property {
-  const mesh_type *count; /* type of the length of a list; NULL: not a list */
+  const mesh_type *count; /* type of the length of a list; NULL if the property is no list */
   const mesh_type *type;
   role role;
 } property;
@@ -30,7 +30,7 @@ typedef struct ply {
   encoding encoding;
   mesh_text text; /* part of the file not yet read */
   mesh_text line;
-  unsigned present; /* bit 1 << role: an element with items has a property of this role */
+  unsigned present; /* bit 1 << role is set if an element with items has a property of this role */
   size_t element_count;
   size_t property_count;
   element elements[ELEMENTS_MAX];
@@ -38,7 +38,7 @@ typedef struct ply {
   mesh_faces faces;
 } ply;
 
-/* Find the index of a word in a NULL-terminated list; if it is absent, the index of the NULL. */
+/* Return the index of a word in a list that ends with NULL, or the index of the NULL. */
 static int find_name(mesh_text word, const char *const *names) {
   int index = 0;
   while (names[index] != NULL && !supine_mesh_text_is(word, names[index])) {
@@ -209,7 +209,7 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
   if (!take(in, list->count, &length)) {
     return cut_short(in, of, item);
   }
-  if (length < 0.0 || length > (double)INT64_MAX / 2) {
+  if (length < 0.0 || length > (double)in->file->size) {
     return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
                             "%s: a list has the length %.0f; save the mesh again", in->file->path,
                             length);
@@ -229,7 +229,6 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
              : SUPINE_OK;
 }
 
-/* Read the items of an element. */
 static supine_status take_items(ply *in, const element *of) {
   double *vertices = in->faces.mesh->vertices;
   supine_status status = SUPINE_OK;
@@ -257,7 +256,7 @@ static supine_status make_room(const ply *in, const element *of, supine_mesh *me
   uint64_t least = 0; /* smallest size of an item, bytes */
   for (size_t p = 0; p < of->property_count; ++p) {
     const property *item = &in->properties[of->first_property + p];
-    least += in->encoding == ASCII ? 2 /* the least is a digit and a blank */
+    least += in->encoding == ASCII ? 2 /* at least a digit and a blank */
              : item->count != NULL ? item->count->size
                                    : item->type->size;
   }

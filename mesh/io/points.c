@@ -24,7 +24,7 @@ static supine_status no_memory(const reading *r) {
   return supine_error_set(r->error, SUPINE_ERROR_MEMORY, "%s: out of memory", r->path);
 }
 
-/* Append a point given in the file's axes and unit, unless the options name others. */
+/* Append a point, given in the axes and unit of the file unless the options name others. */
 static supine_status add(reading *r, const double at[3], const char *name, supine_axes axes,
                          double unit) {
   supine_mesh_points *p = &r->points;
@@ -83,7 +83,7 @@ static supine_status read_csv(reading *r) {
   return status;
 }
 
-/* Read the control points of one list. */
+/* Read the control points of one markup. */
 static supine_status read_markup(reading *r, const json_t *markup) {
   const char *system = json_string_value(json_object_get(markup, "coordinateSystem"));
   const char *unit = json_string_value(json_object_get(markup, "coordinateUnits"));

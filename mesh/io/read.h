@@ -17,9 +17,10 @@ typedef struct mesh_text {
   const unsigned char *end;
 } mesh_text;
 
-/** Remove the next line from `text`; write it without LF or CRLF. Return false at the end. */
+/** Remove the next line from `text`, and set `line` to it without LF or CRLF. Return false at the
+ * end of the text. */
 bool supine_mesh_text_line(mesh_text *text, mesh_text *line);
-/** Remove the next word between blanks from `text`; return false at the end. */
+/** Remove the next word between blanks from `text`; return false at the end of the text. */
 bool supine_mesh_text_word(mesh_text *text, mesh_text *word);
 /** Return whether the word is `expected`, ignoring case. */
 bool supine_mesh_text_is(mesh_text word, const char *expected);
@@ -41,10 +42,9 @@ typedef struct mesh_type {
 
 /** Return the type that PLY or VTP calls `name`, ignoring case; NULL if there is none. */
 const mesh_type *supine_mesh_type_find(mesh_text name);
-/** Decode a number; `big` says that its most significant byte comes first. */
-double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big);
+/** Convert the bytes of a number to double. */
+double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian);
 
-/** A file being read. */
 typedef struct mesh_file {
   const char *path;
   unsigned char *bytes; /**< content of the file, then a NUL */
@@ -53,14 +53,14 @@ typedef struct mesh_file {
   supine_axes space; /**< axes that the tag names; AUTO if unknown */
 } mesh_file;
 
-/** Refuse a text with NUL bytes, or with a CR without an LF, which other readers would split
- * differently. Return false, with SUPINE_ERROR_FORMAT set, if it is refused. */
+/** Refuse a text with a NUL byte, or with a CR that no LF follows: other readers would split its
+ * lines differently. Return false, with SUPINE_ERROR_FORMAT set, if the text is refused. */
 bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 
-/* ---- faces.c: faces added to a mesh that has its vertices. ---- */
+/* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< limit for a face, as cutting takes quadratic time */
+  MESH_CORNERS_MAX = 1024, /**< limit for one face, as cutting takes quadratic time */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
@@ -73,17 +73,17 @@ typedef struct mesh_faces {
   size_t dropped;  /**< points and lines skipped */
 } mesh_faces;
 
-/** Cut a face into triangles, and add them. If `count` exceeds MESH_CORNERS_MAX, so that the face
- * is refused, `corners` may be shorter.
+/** Cut a face into triangles, and add them. A face of more than MESH_CORNERS_MAX corners is refused
+ * without reading `corners`.
  * @retval SUPINE_ERROR_FORMAT  a corner is not a vertex, or there are too many corners */
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 
 /* ---- ply.c, vtp_read.c, import.c: one function for each format. ---- */
 
-/** Read a surface in the file's units and axes, not welded, in single precision. The caller frees
- * `mesh`, also after a failure. `dropped` is set to the number of faces that are points or lines.
- * If the format has its own place for a SPACE tag, the tag is stored in `file`. */
+/** Read a surface in the file's units and axes, in single precision, without welding its vertices.
+ * The caller frees `mesh`, even after a failure. `dropped` is set to the number of faces that are
+ * points or lines. If the format has a place for a SPACE tag, the tag is stored in `file`. */
 typedef supine_status mesh_reader(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                   supine_error *error);
 mesh_reader supine_mesh_read_ply;
@@ -97,8 +97,8 @@ bool supine_mesh_import_knows(const char *ending);
 
 /* ---- weld.c ---- */
 
-/** Weld vertices at equal positions (the caller has turned -0 into 0), drop degenerate triangles,
- * then unused vertices, in place. Add their numbers to the counts of the report. */
+/** Weld vertices at equal positions, drop degenerate triangles, then drop unused vertices, all in
+ * place. No coordinate may be -0. The numbers of dropped items are added to the report. */
 supine_status supine_mesh_weld(supine_mesh *mesh, supine_mesh_report *report);
 
 #endif

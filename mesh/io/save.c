@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Save a surface in the format of the name's ending. */
-#include <string.h>
-#include <strings.h>
-
 #include "sh/base/output.h"
+#include "sh/base/text.h"
 
 #include "mesh/io/save.h"
 
@@ -14,10 +12,8 @@ static save_function *find_function(const char *path) {
     save_function *function;
   } known[] = {SUPINE_MESH_FORMATS(ROW, ROW)};
 #undef ROW
-  const size_t length = strlen(path);
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
-    const size_t ending = strlen(known[i].ending);
-    if (length > ending && strcasecmp(path + length - ending, known[i].ending) == 0) {
+    if (supine_text_ends_in_any_case(path, known[i].ending)) {
       return known[i].function;
     }
   }

@@ -12,13 +12,13 @@ typedef struct mesh_writer {
   FILE *out;
   const supine_mesh *mesh;
   supine_mesh_save_options options;
-  unsigned char source[3]; /**< axis of `mesh`, 0 to 2, of each coordinate in the file */
+  unsigned char source[3]; /**< axis of `mesh`, 0 to 2, that gives each coordinate of the file */
   double factor[3];        /**< sign of each coordinate, divided by the file's unit in mm */
-  bool mirrored;           /**< left-handed axes: triangles are written in reverse order */
-  double quantum;          /**< step of rounded lengths in the file's unit; 0: not rounded */
-  char space[4];           /**< letters of the axes: "LPS", "RAS", ... */
-  char unit[24];           /**< unit of lengths: "mm", "cm", ... */
-  char comment[256];       /**< one printable line, or "" */
+  bool mirrored; /**< whether axes are left-handed: triangles are then written in reverse order */
+  double step;   /**< step of rounded lengths in the file's unit; 0 if lengths are not rounded */
+  char space[4]; /**< letters of the axes: "LPS", "RAS", ... */
+  char unit[24]; /**< unit of lengths: "mm", "cm", ... */
+  char comment[256]; /**< one printable line, or "" */
 } mesh_writer;
 
 /** Compute the position of vertex i in the file's axes and unit. */
@@ -35,7 +35,7 @@ void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t c
 /** Fill a writer, except `out`, from the arguments of supine_mesh_save. */
 void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
                               mesh_writer *writer);
-/** Check that all formats can hold a surface; statuses as supine_mesh_save. */
+/** Check that all formats can hold a surface. Return the statuses of supine_mesh_save. */
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 

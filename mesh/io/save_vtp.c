@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Write VTK XML PolyData with compressed appended arrays, for one surface or a series of one
- * topology. The arrays of a series are written frame by frame; then the head is written again, with
- * their offsets. */
-#include <math.h>
+/* Write VTK XML PolyData with compressed appended arrays, for one surface or for a series: frames
+ * with the same triangles. The arrays of a series are written frame by frame. Then the head
+ * is written again, with the offsets of the arrays. */
 #include <stdlib.h>
-#include <string.h>
 
 #include <libdeflate.h>
 
@@ -20,14 +18,13 @@ typedef struct vtp vtp;
 /* Write the bytes of item `i` of an array to *at, and advance *at. */
 typedef void vtp_put(const vtp *file, size_t i, unsigned char **at);
 
-/* An array of the file, in all frames. */
 typedef struct vtp_array {
   const char *type;
   const char *name;
   unsigned components;
-  size_t item; /* bytes per point or triangle: 1, 4 or 12 */
+  size_t item_size; /* bytes per point or triangle: 1, 4 or 12 */
   size_t count;
-  bool constant; /* equal in all frames, so written once */
+  bool constant; /* the same in all frames, so written once */
   vtp_put *put;
 } vtp_array;
 
@@ -36,10 +33,10 @@ struct vtp {
   vtp_array arrays[VTP_ARRAYS]; /* points, connectivity, offsets, then point data */
   size_t array_count;
   size_t frames;
-  const double *times; /* [frames] times in s; NULL: one surface, without a time */
-  uint64_t *offsets;   /* [frames, array_count] positions of arrays, bytes after the head */
-  size_t next;         /* next frame to write */
-  uint64_t written;    /* bytes of arrays written */
+  const double *times; /* [frames] in s; NULL for one surface without a time */
+  uint64_t *offsets;   /* [frames, array_count] bytes from the end of the head to each array */
+  size_t next_frame;
+  uint64_t bytes_written;
   size_t threads;
   unsigned char *raw;    /* [threads, BLOCK] blocks before compression */
   unsigned char *packed; /* compressed blocks of one array */
@@ -47,8 +44,8 @@ struct vtp {
   const vtp_array *packing; /* array being compressed */
 };
 
-/* BLOCK: bytes compressed together, a multiple of every item's size. LEVEL of libdeflate: level 2
- * takes 1.5 times as long for files 5 % smaller. */
+/* BLOCK: bytes that are compressed together, a multiple of every item_size. LEVEL: level of
+ * libdeflate; level 2 takes 1.5 times as long and makes files 5 % smaller. */
 enum { BLOCK = 3 << 18, LEVEL = 1 };
 
 static size_t room_of_block(void) {
@@ -154,11 +151,11 @@ static void put_sizes(FILE *out, const uint64_t *sizes, size_t count) {
   }
 }
 
-/* Fill and compress blocks of an array, each into its own place in file->packed. */
+/* Fill and compress blocks of an array; file->packed has a place for each. */
 static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) {
   vtp *file = context;
   const vtp_array *array = file->packing;
-  const size_t each = BLOCK / array->item;
+  const size_t each = BLOCK / array->item_size;
   unsigned char *raw = file->raw + thread * BLOCK;
   for (size_t i = begin; i < end; ++i) {
     const size_t remaining = array->count - i * each;
@@ -168,7 +165,7 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
       array->put(file, i * each + k, &at);
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
-    file->sizes[3 + i] = /* 0 tells that memory ran out */
+    file->sizes[3 + i] = /* 0 if out of memory */
         compressor == NULL
             ? 0
             : libdeflate_zlib_compress(compressor, raw, (size_t)(at - raw),
@@ -177,10 +174,10 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Write an array: the number of blocks, the size of a block, the size of a shorter last block (0:
- * none), the compressed size of each block, and the blocks. */
+/* Write an array: the number of blocks, the size of a block, the size of the last block if it is
+ * shorter (else 0), the compressed size of each block, and the blocks. */
 static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
-  const size_t bytes = array->item * array->count;
+  const size_t bytes = array->item_size * array->count;
   const size_t blocks = (bytes + BLOCK - 1) / BLOCK;
   supine_status status = SUPINE_OK;
   file->packing = array;
@@ -189,10 +186,10 @@ static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
   file->sizes[1] = BLOCK;
   file->sizes[2] = bytes % BLOCK;
   put_sizes(out, file->sizes, blocks + 3);
-  file->written += 8 * (blocks + 3);
+  file->bytes_written += 8 * (blocks + 3);
   for (size_t i = 0; i < blocks; ++i) {
     (void)fwrite(file->packed + i * room_of_block(), 1, file->sizes[3 + i], out);
-    file->written += file->sizes[3 + i];
+    file->bytes_written += file->sizes[3 + i];
     status = file->sizes[3 + i] > 0 ? status : SUPINE_ERROR_MEMORY;
   }
   return status;
@@ -200,22 +197,22 @@ static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
 
 /* Write the arrays of the next frame. */
 static supine_status vtp_frame(vtp *file, FILE *out) {
-  const size_t frame = file->next++;
+  const size_t frame = file->next_frame++;
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < file->array_count && status == SUPINE_OK; ++i) {
     uint64_t *offset = &file->offsets[frame * file->array_count + i];
     if (frame > 0 && file->arrays[i].constant) {
       *offset = file->offsets[i];
     } else {
-      *offset = file->written;
+      *offset = file->bytes_written;
       status = put_array(file, &file->arrays[i], out);
     }
   }
   return status;
 }
 
-/* Write the DataArray elements of an array, one for each frame. Their length does not depend on the
- * offsets, so that the head can be written again. */
+/* Write the DataArray elements of an array, one for each frame. Offsets are padded to one length,
+ * so that the head can be written again with other offsets. */
 static void write_array(const vtp *file, size_t number, FILE *out) {
   const vtp_array *array = &file->arrays[number];
   for (size_t frame = 0; frame < file->frames; ++frame) {
@@ -232,8 +229,8 @@ static void write_array(const vtp *file, size_t number, FILE *out) {
   }
 }
 
-/* Write the axes, the unit and a comment as one XML comment, which must not hold "--". Non-ASCII
- * bytes become "?", as the comment may end within a character. */
+/* Write the axes, the unit and a comment as one XML comment, with blanks between hyphens, as it
+ * must not hold "--". Non-ASCII bytes become "?", as the comment may end within a character. */
 static void write_notes(const mesh_writer *writer, FILE *out) {
   (void)fprintf(out, "<!-- SPACE=%s %s ", writer->space, writer->unit);
   for (const char *c = writer->comment; *c != '\0'; ++c) {
@@ -273,7 +270,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
-  if (file->times != NULL) { /* named time_s, as TimeValue is the time of a file with one frame */
+  if (file->times != NULL) { /* not named TimeValue, which is the time of a file with one frame */
     write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
   }
   for (size_t i = 0; i < writer->options.field_count; ++i) {
@@ -282,7 +279,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("</FieldData>\n", out);
 }
 
-/* Write everything before the arrays; its length does not depend on their offsets. */
+/* Write everything before the arrays. Its length does not depend on the offsets of the arrays. */
 static void vtp_head(const vtp *file, FILE *out) {
   const mesh_writer *writer = &file->writer;
   (void)fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", out);
@@ -316,7 +313,7 @@ static void vtp_foot(FILE *out) {
   (void)fputs("\n</AppendedData>\n</VTKFile>\n", out);
 }
 
-/* Compress the arrays into memory first: their offsets precede them. */
+/* Compress the arrays into memory first, because the head states their offsets. */
 supine_status supine_mesh_save_vtp(const mesh_writer *writer) {
   vtp file = {.writer = *writer, .frames = 1};
   char *bytes = NULL;
@@ -400,7 +397,7 @@ supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *e
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
   vtp_foot(series->output.file);
-  (void)fseeko(series->output.file, 0, SEEK_SET); /* checked in supine_mesh_series_open */
+  (void)fseeko(series->output.file, 0, SEEK_SET); /* succeeds, as in supine_mesh_series_open */
   vtp_head(&series->file, series->output.file);
   return supine_output_commit(&series->output, error);
 }

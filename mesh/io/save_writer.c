@@ -6,7 +6,7 @@
 
 #include "mesh/io/save.h"
 
-/* Return whether float32 holds a value, so that the file can be loaded again. */
+/* Return whether a value is finite in float32. */
 static bool fits(double x) {
   return fabs(x) <= (double)FLT_MAX;
 }
@@ -60,15 +60,15 @@ void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_op
     }
   }
   if (chosen.rounding > 0.0) {
-    writer->quantum = exp2(floor(log2(chosen.rounding / unit)));
+    writer->step = exp2(floor(log2(chosen.rounding / unit)));
   }
   copy_comment(chosen.comment, writer->comment, sizeof writer->comment);
   supine_mesh_unit_name(unit, writer->unit);
 }
 
-/* Round a length to a multiple of writer->quantum, unless that is 0. */
+/* Round a length to a multiple of writer->step, unless that is 0. */
 static double rounded(const mesh_writer *writer, double length) {
-  return writer->quantum > 0.0 ? rint(length / writer->quantum) * writer->quantum : length;
+  return writer->step > 0.0 ? rint(length / writer->step) * writer->step : length;
 }
 
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
@@ -76,7 +76,7 @@ void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal
   for (size_t axis = 0; axis < 3; ++axis) {
     const double value = (double)writer->options.normals[3 * i + writer->source[axis]];
     const double turned = copysign(value, value * writer->factor[axis]);
-    normal[axis] = (float)((writer->quantum > 0.0 ? rint(steps * turned) / steps : turned) + 0.0);
+    normal[axis] = (float)((writer->step > 0.0 ? rint(steps * turned) / steps : turned) + 0.0);
   }
 }
 

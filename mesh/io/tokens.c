@@ -85,10 +85,10 @@ const mesh_type *supine_mesh_type_find(mesh_text name) {
   return NULL;
 }
 
-double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big) {
+double supine_mesh_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian) {
   uint64_t bits = 0;
   for (unsigned k = 0; k < type->size; ++k) {
-    bits = bits << 8 | bytes[big ? k : type->size - 1 - k];
+    bits = bits << 8 | bytes[big_endian ? k : type->size - 1 - k];
   }
   if (type->is_real && type->size == 8) {
     double value;

@@ -12,12 +12,12 @@
 
 enum { PIECE = 1 << 16, ANY_HEADER = 32 };
 
-/* Unpack a stream: skip `skip` bytes, keep the next `size` in `values`, and check checksums. */
+/* Unpack a stream, checking its checksums: drop `skip` bytes, store `size` bytes in `values`. */
 static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size) {
   unsigned char packed[PIECE];
-  unsigned char discarded[PIECE]; /* bytes that are not stored */
+  unsigned char discarded[PIECE];
   z_stream z = {.avail_in = 0};
-  uint64_t from = 0; /* bytes unpacked so far */
+  uint64_t unpacked = 0;
   const uint64_t end = skip + size;
   int result = inflateInit2(&z, ANY_HEADER + MAX_WBITS);
   while (result == Z_OK) {
@@ -25,14 +25,14 @@ static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_
       z.next_in = packed;
       z.avail_in = (unsigned)fread(packed, 1, PIECE, file);
     }
-    const bool wanted = from >= skip && from < end;
-    const uint64_t room = wanted ? end - from : from < skip ? skip - from : PIECE;
+    const bool wanted = unpacked >= skip && unpacked < end;
+    const uint64_t room = wanted ? end - unpacked : unpacked < skip ? skip - unpacked : PIECE;
     const unsigned given = (unsigned)(room < PIECE ? room : PIECE);
-    z.next_out = wanted ? values + (from - skip) : discarded;
+    z.next_out = wanted ? values + (unpacked - skip) : discarded;
     z.avail_out = given;
     result = inflate(&z, Z_NO_FLUSH); /* returns Z_BUF_ERROR at the end of the file */
-    from += given - z.avail_out;
-    if (result == Z_STREAM_END && from < end) { /* another compressed stream follows */
+    unpacked += given - z.avail_out;
+    if (result == Z_STREAM_END && unpacked < end) { /* another compressed stream follows */
       result = inflateReset(&z);
     }
   }
@@ -124,7 +124,7 @@ supine_status supine_image_read_voxels(const char *path, size_t file_size,
   if (file != NULL) {
     (void)fclose(file);
   }
-  if (status == SUPINE_OK && storage->big && !storage->text) {
+  if (status == SUPINE_OK && storage->big_endian && !storage->text) {
     swap_bytes(image->values, count, each);
   }
   if (status == SUPINE_OK && storage->integer != 0 && !storage->text) {

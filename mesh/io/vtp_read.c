@@ -12,8 +12,8 @@
 
 typedef struct vtp_file {
   const mesh_file *file;
-  const char *bytes, *end; /* `bytes` ends with a NUL, but may contain others */
-  const char *appended;    /* first byte of the appended data; NULL: none */
+  const char *bytes, *end; /* content of the file, with a NUL at `end` and perhaps others before */
+  const char *appended;    /* first byte of the appended data; NULL if there are none */
   bool appended_raw, compressed;
   size_t header_size; /* bytes of each integer in the header of an array: 4 or 8 */
 } vtp_file;
@@ -107,8 +107,8 @@ static size_t base64(const char *at, const char *end, unsigned char *bytes) {
 }
 
 /* Unpack the bytes of an array into out [wanted]. An uncompressed array is its size, then the
- * numbers. A compressed array is the number of blocks, the size of a block, the size of a shorter
- * last block (0: none), the compressed size of each block, and the blocks. */
+ * numbers. A compressed array is the number of blocks, the size of a block, the size of the last
+ * block if it is shorter (else 0), the compressed size of each block, and the blocks. */
 static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, size_t wanted,
                    unsigned char *out) {
   const size_t h = v->header_size;
@@ -217,7 +217,7 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   return SUPINE_OK;
 }
 
-/* Find an array by name, or the first if `name` is NULL, inside the element `within` of a piece. */
+/* Find an array in the element `within` of a piece: by name, or the first one if `name` is NULL. */
 static bool find_array(const vtp_file *v, const element *piece, const char *within,
                        const char *name, element *found) {
   element e;
@@ -251,7 +251,6 @@ static bool count_of(const element *piece, const char *name, size_t *count) {
   return end != text && *end == '\0' && text[0] != '-' && value <= MESH_VERTICES_MAX;
 }
 
-/* Read the polygons of a piece. */
 static supine_status take_polygons(const vtp_file *v, const element *piece, mesh_faces *faces,
                                    size_t count, supine_error *error) {
   element offsets;
@@ -312,7 +311,7 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   }
   const char *limit = v->appended != NULL ? v->appended : v->end;
   if (!find_element(root.body, limit, "Piece", piece)) {
-    return malformed(v, "no Piece; save the surface again", error);
+    return malformed(v, "no element Piece; save the surface again", error);
   }
   if (find_element(piece->body, limit, "Piece", &second)) {
     return malformed(v, "it has several pieces; save it as one", error);

@@ -19,7 +19,7 @@ static const struct {
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
 
-/* Find the centre, mm, of all voxels of the side `wanted`; false if there are none. */
+/* Find the centre, mm, of all voxels of the side `wanted`; return false if there are none. */
 static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
                       uint8_t wanted, double centre[3]) {
   double count = 0.0;
@@ -39,7 +39,8 @@ static bool centre_of(const supine_image *image, const labels_tally *tally, cons
   return count > 0.0;
 }
 
-/* List the labels present, as "1, 2 and 17 more"; with `side`, only those of side `wanted`. */
+/* List the labels present, such as "1, 2 and 17 more". If `side` is not NULL, list only the labels
+ * of the side `wanted`. */
 static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t wanted, char *text,
                         size_t size) {
   enum { SHOWN = 12 };
@@ -62,7 +63,7 @@ static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t 
   }
 }
 
-/* Parse labels such as "10+11", and set their sides. Return where they end; NULL if invalid. */
+/* Parse labels such as "10+11", and set their sides. Return where they end, NULL if invalid. */
 static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   for (;; ++at) {
     char *end;
@@ -78,7 +79,7 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   }
 }
 
-/* Parse "left=10+11,right=12" into the sides of the labels, initially 0; false if invalid. */
+/* Parse a list such as "left=10+11,right=12" into `side`, all 0 before. Return false if invalid. */
 static bool read_sides(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};
@@ -96,8 +97,8 @@ static bool read_sides(const char *wanted, uint8_t *side) {
   }
 }
 
-/* Choose by the labels present: one label is both lungs, two labels are a lung each, and more must
- * be exactly those of a convention. Return false if they are not. */
+/* Choose by the labels present: one label holds both lungs, two labels hold a lung each, and more
+ * must be exactly those of a convention. Return false if they are not. */
 static bool choose_by_presence(const supine_image *image, const labels_tally *tally, uint8_t *side,
                                const char **name) {
   size_t present[2] = {0, 0};
@@ -126,13 +127,13 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
     return true;
   }
   for (size_t c = 0; c < CONVENTIONS; ++c) {
-    bool same = true; /* whether exactly the convention's labels are present */
+    bool exact = true;
     memset(side, 0, LABELS_MAX);
     (void)read_sides(conventions[c].labels, side);
-    for (size_t label = 1; same && label < LABELS_MAX; ++label) {
-      same = (tally[label].count > 0) == (side[label] != 0);
+    for (size_t label = 1; exact && label < LABELS_MAX; ++label) {
+      exact = (tally[label].count > 0) == (side[label] != 0);
     }
-    if (same) {
+    if (exact) {
       *name = conventions[c].name;
       return true;
     }
@@ -175,8 +176,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
   return SUPINE_OK;
 }
 
-/* Check that each lung with labels has voxels. If both have, set `doubted` to whether the left lung
- * does not lie mainly to the left of the right lung. */
+/* Check that each lung that has labels also has voxels. If both lungs have voxels, set `doubted` to
+ * false if the left lung lies mainly to the left of the right lung, and to true otherwise. */
 static supine_status check(const char *path, const supine_image *image, const labels_tally *tally,
                            const uint8_t *side, bool *doubted, supine_error *error) {
   static const char *const names[] = {"left", "right"};
@@ -190,8 +191,8 @@ static supine_status check(const char *path, const supine_image *image, const la
       list_labels(tally, NULL, 0, present, sizeof present);
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "%s: no voxel has a label that --labels gives the %s lung; the labels "
-          "present are %s: correct --labels, or name only one lung: --labels %s=1+2",
+          "%s: no voxel has a label that --labels gives to the %s lung; the labels present are "
+          "%s. Correct --labels, or name only one lung, such as --labels %s=1+2",
           path, names[s], present, names[1 - s]);
     }
   }

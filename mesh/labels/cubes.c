@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Average a mask over cubes aligned with its axes, and correct them so that no two inner or outer
- * cubes meet only in an edge or a corner: the surface is then a manifold [Latecki1995]. */
+/* Average a mask over cubes aligned with its axes. Correct the cubes so that no two inside, and no
+ * two outside, meet only in an edge or a corner: the surface is then a manifold [Latecki1995]. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -8,9 +8,9 @@
 
 enum { LAYERS = 2 }; /* layers of empty cubes around the mask */
 
-/* Average `in` [outer, n, inner] along its middle axis over cubes of `ratio` voxels, into `out`
- * [outer, m, inner]. Cubes narrower than a voxel take the average over the width of one voxel,
- * which interpolates linearly between voxel centres. */
+/* Average `in` [outer, n, inner] along its middle axis over intervals of `ratio` voxels, into `out`
+ * [outer, m, inner]. An interval shorter than a voxel is widened to one voxel, which interpolates
+ * linearly between voxel centres. */
 static void average(const float *in, size_t outer, size_t n, size_t inner, size_t m, double ratio,
                     float *out) {
   const double width = fmax(1.0, ratio);
@@ -35,7 +35,7 @@ static void average(const float *in, size_t outer, size_t n, size_t inner, size_
   }
 }
 
-/* Average the mask [rows, n] along its rows as average() does, into `out` [rows, m]. */
+/* Average the mask [rows, n] along its rows like average() does, into `out` [rows, m]. */
 static void average_rows(const labels_mask *mask, size_t m, double ratio, float *out) {
   const size_t n = mask->size[0];
   const double width = fmax(1.0, ratio);
@@ -129,7 +129,7 @@ static bool mend(const size_t size[3], float *share) {
   return mended;
 }
 
-/* Remove islands and fill cavities of the cubes, which averaging and correction may leave. */
+/* Remove islands, and fill cavities, that averaging and correction have left among the cubes. */
 static supine_status one_piece(labels_cubes *cubes) {
   labels_mask inside = {.size = {cubes->size[0], cubes->size[1], cubes->size[2]}};
   const size_t count = supine_labels_mask_count(&inside);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the exact squared distance from every voxel to the nearest voxel of a set: along the
- * first axis by counting, along the others by the lower envelope of parabolas, d(x) = min over y of
- * (x - y)^2 + f(y), where f is the result for the axes before [Felzenszwalb2012]. */
+/* Compute the exact squared distance from every voxel to the nearest voxel of a set, axis by axis
+ * [Felzenszwalb2012]. Along the first axis, count voxels. Along each other axis, take the minimum
+ * over y of (x - y)^2 + f(y), where f is the result so far: a lower envelope of parabolas. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -12,7 +12,7 @@ static const float far_away = 1e30F; /* squared distance in a row without voxels
 
 typedef struct sweep {
   const labels_mask *mask;
-  bool zero; /* whether the set is the zero voxels, otherwise the nonzero voxels */
+  bool zero; /* whether the set is the zero voxels, else the nonzero voxels */
   float *squares;
   int axis;
   size_t length; /* larger of the mask's size[1] and size[2] */
@@ -41,8 +41,9 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Replace the n values f(x), at line[x * stride], by the minimum over y of (x - y)^2 + f(y).
- * Work space: v, indices y of the envelope's parabolas; z, where each begins, mm; f, the values. */
+/* Replace the n values f(x), `stride` apart in `line`, by the minimum over y of (x - y)^2 + f(y).
+ * Work space: v, the y of each parabola in the envelope; z, where it begins, mm; f, the old
+ * values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;
@@ -118,7 +119,7 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
     free(squares);
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t i = 0; i < count; ++i) { /* value 2: outside the mask, but within the radius */
+  for (size_t i = 0; i < count; ++i) { /* 2 marks voxels outside the mask but within the radius */
     mask->at[i] = mask->at[i] != 0 ? 1 : squares[i] <= reach ? 2 : 0;
   }
   const supine_status status = supine_labels_distance(mask, true, squares);

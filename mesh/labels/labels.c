@@ -10,11 +10,11 @@
 #include "mesh/anatomy.h"
 #include "mesh/labels/mask.h"
 
-static const double least_edge = 0.2;    /* smallest edge, mm: some ten million vertices */
-static const double most_edge = 20.0;    /* largest edge, mm; larger cubes leave little of a lung */
-static const double most_closing = 20.0; /* largest radius of closing, mm */
-static const double least_lung = 1.0;    /* least volume of a lung, mL */
-static const double longest_lung = 1000.0; /* largest length of a lung with valid voxels, mm */
+static const double least_edge = 0.2;           /* mm; makes some ten million vertices */
+static const double most_edge = 20.0;           /* mm; larger cubes leave little of a lung */
+static const double most_closing_radius = 20.0; /* mm */
+static const double least_volume = 1.0;         /* mL */
+static const double longest_lung = 1000.0;      /* mm; a longer lung must have a wrong voxel size */
 
 typedef struct work {
   const char *path; /* first file, for messages */
@@ -23,10 +23,10 @@ typedef struct work {
   double edge;
   supine_image image; /* the label map; freed once `both` is cut from it */
   labels_mask both;
-  bool doubted; /* whether the axes are doubtful: the left lung is not left of the right lung */
+  bool doubted; /* whether the left lung does not lie left of the right lung */
 } work;
 
-/* Report progress. Return SUPINE_ERROR_INTERRUPTED if the caller stops. */
+/* Report progress. Return SUPINE_ERROR_INTERRUPTED if the caller asks to stop. */
 static supine_status advance(work *w, double fraction, supine_error *error) {
   const supine_labels_options *options = w->options;
   return options->progress == NULL || options->progress(options->progress_context, fraction)
@@ -67,7 +67,7 @@ static supine_status read_image(const work *w, const char *path, supine_image *i
   return status;
 }
 
-/* Join masks into one map, labelled by their order from 1; earlier masks take precedence. */
+/* Join masks into one map with the labels 1, 2, ...; where masks overlap, the first one counts. */
 static supine_status join_images(work *w, const char *const *paths, size_t count,
                                  supine_error *error) {
   const size_t voxels = w->image.size[0] * w->image.size[1] * w->image.size[2];
@@ -97,7 +97,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
   return status;
 }
 
-/* Cut the box of the lungs from the map; its voxels are 0, LABELS_LEFT, _RIGHT or _EITHER. */
+/* Copy the box of the lungs from the map; its voxels are 0, LABELS_LEFT, _RIGHT or _EITHER. */
 static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
                                supine_error *error) {
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
@@ -234,7 +234,7 @@ static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
   return status;
 }
 
-/* Make the surface of one lung; an empty lung leaves `lung` and `mesh` as they are. */
+/* Make the surface of one lung; do nothing if the lung has no voxels. */
 static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung, supine_mesh *mesh,
                                supine_error *error) {
   labels_mask mask;
@@ -252,7 +252,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
   }
-  if (status == SUPINE_OK && !(lung->mask >= least_lung && longest <= longest_lung)) {
+  if (status == SUPINE_OK && !(lung->mask >= least_volume && longest <= longest_lung)) {
     supine_labels_mask_free(&mask);
     return supine_error_set(error, SUPINE_ERROR_MESH,
                             "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is "
@@ -287,16 +287,14 @@ static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, su
   const supine_mesh_anatomy found = supine_mesh_anatomy_find(surfaces, report->lung_count);
   char letters[4];
   supine_mesh_axes_letters(supine_mesh_axes_after(report->coordinates, found.axes), letters);
-  return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "%s: by its header the left lung does not lie left of the other (labels "
-                          "%s). %s%s",
-                          w->path, report->taken,
-                          found.axes == SUPINE_AXES_LPS
-                              ? "Exchange the labels, --labels left=...,right=..., or give "
-                                "the header's axes, --axes ABC"
-                              : "Their shape fits other axes: if the labels are correct, add "
-                                "--axes ",
-                          found.axes == SUPINE_AXES_LPS ? "" : letters);
+  return supine_error_set(
+      error, SUPINE_ERROR_MESH,
+      "%s: by its header, the left lung does not lie left of the right lung (labels %s). %s%s",
+      w->path, report->taken,
+      found.axes == SUPINE_AXES_LPS
+          ? "Exchange the labels, --labels left=...,right=..., or correct the axes with --axes"
+          : "Their shape fits other axes: if the labels are correct, add --axes ",
+      found.axes == SUPINE_AXES_LPS ? "" : letters);
 }
 
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
@@ -307,11 +305,11 @@ supine_status supine_labels_surfaces(const char *const *paths, size_t count,
   w.edge = options->edge != 0.0 ? options->edge : SUPINE_LABELS_EDGE;
   *report = (supine_labels_report){.lung_count = 0};
   if (!(w.edge >= least_edge && w.edge <= most_edge) ||
-      !(options->close >= 0.0 && options->close <= most_closing) || count > FILES_MAX) {
+      !(options->close >= 0.0 && options->close <= most_closing_radius) || count > FILES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "give --edge from %g to %g mm, --close from 0 to %g mm, and at most %d "
                             "images",
-                            least_edge, most_edge, most_closing, FILES_MAX);
+                            least_edge, most_edge, most_closing_radius, FILES_MAX);
   }
   supine_status status = read_map(&w, paths, count, error);
   for (uint8_t value = LABELS_LEFT; value <= LABELS_RIGHT && status == SUPINE_OK; ++value) {

@@ -12,13 +12,13 @@
 #define SUPINE_LABELS_EDGE 2.0
 
 typedef struct supine_labels_options {
-  /** Labels of the lungs. NULL: chosen by the labels present. "one": all but 0, split into two
-   * lungs. "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1": labels of a segmenter.
-   * Or a list, "left=10+11,right=12+13+14", of one or both sides. */
+  /** Labels of the lungs; if NULL, chosen by the labels present. "one": all labels but 0, split
+   * into two lungs. "lungmask", "lobes", "totalsegmentator", "totalsegmentator-v1": labels of a
+   * segmenter. Or a list such as "left=10+11,right=12+13+14", for one or both sides. */
   const char *labels;
-  supine_axes axes; /**< axes of the header's coordinates; AUTO: the axes that the header names */
-  double edge;      /**< approximate distance between vertices, mm; 0: SUPINE_LABELS_EDGE */
-  double close;     /**< radius of closing, mm: fills gaps up to twice as wide; 0: none */
+  supine_axes axes; /**< axes of the header's coordinates; AUTO for those that the header names */
+  double edge;      /**< approximate distance between vertices, mm; 0 for SUPINE_LABELS_EDGE */
+  double close;     /**< radius of closing, mm, which fills gaps up to twice as wide; 0 for none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -43,30 +43,31 @@ typedef struct supine_labels_report {
   size_t size[3];
   double spacing[3];  /**< distances between voxels, mm */
   char axes[64];      /**< "i to the left, j to the back, k to the head" */
-  const char *source; /**< header field that gives the frame of the image, such as "sform" */
+  const char *source; /**< header field that gives origin and steps, such as "sform" */
   bool frames_differ; /**< whether qform and sform of a NIfTI header differ */
   char taken[256];    /**< labels of each side: "2 left; 1 right (convention lungmask)" */
-  double neck;        /**< width of the neck at which touching lungs were split, mm; 0: none */
+  double neck;        /**< width of the neck where lungs were split, mm; 0 if they were apart */
   size_t lung_count;
   supine_labels_lung lung[2]; /**< the left lung first if there are two */
   supine_axes coordinates;    /**< axes assumed for the header's coordinates */
 } supine_labels_report;
 
 /** Make the surfaces of the lungs from a label map (.nrrd, .nii, .nii.gz, .mha), or from several
- * masks in one frame, whose nonzero voxels get the labels 1, 2, ... in their order.
+ * masks of one scan: nonzero voxels of the first get the label 1, of the second 2, and so on.
  *
  * The largest piece of each lung is kept and its cavities are filled. The map is averaged over
- * cubes with sides of `edge` along the map's axes. Cubes at least half filled are inside; they are
- * corrected so that no two meet only in an edge or corner, which makes the surface net [Gibson1998]
- * a closed manifold. The net is smoothed without shrinking [Taubin1995], each vertex within its
- * cell.
+ * cubes with sides of `edge` along the map's axes. Cubes at least half filled are inside. Cubes are
+ * corrected so that no two inside, and no two outside, meet only in an edge or a corner, which
+ * makes the surface net [Gibson1998] a closed manifold. The net is smoothed without shrinking
+ * [Taubin1995], each vertex within its cell.
  *
- * @param surfaces  [2] zero-initialised; those of report->lung are written, facing outwards
+ * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
  * @retval SUPINE_ERROR_ARGUMENT  an edge, closing distance or list of labels that is invalid
- * @retval SUPINE_ERROR_MESH      no voxel of a lung; labels that do not tell which are lungs; a
- *             left lung that does not lie left of the right one; a lung too small or too large
+ * @retval SUPINE_ERROR_MESH      a lung without voxels; labels that do not show which ones are
+ *             lungs; a left lung that does not lie left of the right lung; a lung too small or too
+ *             large
  * @retval SUPINE_ERROR_FORMAT    voxels that are not labels, images that differ in size or frame
- * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and those of supine_image_read
+ * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and the statuses of supine_image_read
  * Memory: the map and 1 byte per voxel; per voxel of the lungs' box 10 bytes more to split lungs,
  * and 4 more to close gaps. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,

@@ -23,7 +23,7 @@ void supine_labels_mask_place(const labels_mask *mask, const double voxel[3], do
   }
 }
 
-/* Find the first and last index of a value along each axis; false if it is absent. */
+/* Find the first and last index of a value along each axis; return false if it is absent. */
 static bool box_of(const labels_mask *mask, uint8_t value, size_t low[3], size_t high[3]) {
   bool any = false;
   for (size_t row = 0; row < mask->size[1] * mask->size[2]; ++row) {

@@ -11,7 +11,7 @@
 /** A box of voxels with a margin of zeros around the nonzero ones. */
 typedef struct labels_mask {
   size_t size[3];
-  long from[3];      /**< index of voxel 0 in the image or mask that the box was cut from */
+  long from[3];      /**< [axis] index of voxel 0 in the image or mask that the box was cut from */
   double origin[3];  /**< centre of voxel 0, mm, LPS */
   double step[3][3]; /**< vector from a voxel to the next along each axis, mm, LPS */
   double spacing[3]; /**< lengths of the steps, mm */
@@ -23,8 +23,9 @@ enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* values of a ma
 /* ---- mask.c ---- */
 size_t supine_labels_mask_count(const labels_mask *mask);
 double supine_labels_voxel_ml(const labels_mask *mask);
-/** Extract the voxels of one value, as 1, with `margin` voxels around them; mask->at is NULL if
- * there are none. @retval SUPINE_ERROR_MEMORY */
+/** Extract the voxels of one value, as 1, with a margin of `margin` zeros around them. If there are
+ * none, mask->at is NULL.
+ * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_labels_mask_extract(const labels_mask *from, uint8_t value, size_t margin,
                                          labels_mask *mask);
 void supine_labels_mask_free(labels_mask *mask);
@@ -51,28 +52,28 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
 
 typedef struct labels_choice {
   char *taken;  /**< [256] output: labels of each side (supine_labels_report) */
-  bool doubted; /**< whether the axes are doubtful: the left lung is not left of the right lung */
+  bool doubted; /**< whether the left lung does not lie left of the right lung */
 } labels_choice;
 
-/** Choose the side of each label, as `wanted` says or, if it is NULL, by the labels present.
+/** Choose the side of each label by `wanted`, the `labels` of supine_labels_options.
  * @param side     [LABELS_MAX] output: 0, LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER */
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
                                    labels_choice *choice, supine_error *error);
 
-/** Cut the box from voxel `low` to voxel `high`, with `margin` voxels around it, from an image
- * that supine_labels_count has checked; on SUPINE_ERROR_MEMORY `at` is NULL.
- * @param value  value in the mask of each label that the image holds */
+/** Copy the box from voxel `low` to voxel `high` of an image that supine_labels_count has checked,
+ * with a margin of `margin` zeros around it. On SUPINE_ERROR_MEMORY, mask->at is NULL.
+ * @param value  [largest label + 1] value in the mask for each label */
 supine_status supine_labels_mask_cut(const supine_image *image, const size_t low[3],
                                      const size_t high[3], size_t margin, const uint8_t *value,
                                      labels_mask *mask);
 
 /* ---- pieces.c: pieces of equal voxels that share faces ---- */
 
-/** A run of equal voxels, begin <= i < end, of a row. */
+/** A run of equal voxels in a row: begin <= i < end. */
 typedef struct labels_run {
   uint32_t begin, end;
-  uint32_t parent; /**< first run of the piece */
+  uint32_t parent; /**< index of the first run of the same piece */
 } labels_run;
 
 typedef struct labels_piece {
@@ -82,17 +83,17 @@ typedef struct labels_piece {
 
 typedef struct labels_pieces {
   size_t run_count;
-  size_t *row;         /**< [rows + 1] first run of each row of voxels */
-  labels_run *run;     /**< [run_count] row by row */
-  labels_piece *piece; /**< [run_count] a piece at the index of its first run; 0 at other runs */
+  size_t *row;         /**< [rows + 1] index of the first run of each row of voxels */
+  labels_run *run;     /**< [run_count] runs of all rows, in order */
+  labels_piece *piece; /**< [run_count] piece[r] is the piece whose first run is r; 0 if none */
   size_t piece_count;
 } labels_pieces;
 
 /** Find the pieces of zero voxels or, if `zero` is false, of nonzero voxels. */
 supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, labels_pieces *pieces);
 void supine_labels_pieces_free(labels_pieces *pieces);
-/** Set all pieces of nonzero voxels except the largest to 0. If `zero`, instead set the cavities,
- * all pieces of zero voxels except the outer one, to 1.
+/** If `zero` is false, set all pieces of nonzero voxels except the largest to 0. Otherwise fill the
+ * cavities: set all pieces of zero voxels except the outer one to 1.
  * @param others  output: number of pieces changed
  * @param voxels  output: number of voxels changed */
 supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *others, size_t *voxels);
@@ -103,15 +104,15 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
  * zero voxel or, if `zero` is false, nonzero voxel. The steps are assumed to be orthogonal.
  * @param squares  [size] output */
 supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *squares);
-/** Close the mask: fill all voxels that no ball of this radius, mm, outside the mask can cover. The
- * mask's margin must be wider than the radius.
+/** Close the mask: fill all voxels that no ball of this radius, mm, can reach without entering the
+ * mask. The mask's margin must be wider than the radius.
  * @param added  output: number of voxels filled */
 supine_status supine_labels_close(labels_mask *mask, double radius, size_t *added);
 
 /* ---- split.c ---- */
 
 /** Replace LABELS_EITHER by LABELS_LEFT or LABELS_RIGHT.
- * @param neck  output: width of the neck at which the lungs were split, mm; 0: none
+ * @param neck  output: width of the neck at which the lungs were split, mm; 0 if they were apart
  * @retval SUPINE_ERROR_MESH  one lung, or two that cannot be separated */
 supine_status supine_labels_split(const char *path, labels_mask *both, double *neck,
                                   supine_error *error);

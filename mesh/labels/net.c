@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Make the surface of a mask by surface nets: a vertex in each cell that the surface runs through,
- * a quadrilateral across each edge between an inner and an outer cube [Gibson1998]. */
-#include <math.h>
+/* Make the surface of a mask as a surface net [Gibson1998]: a vertex in each cell that the surface
+ * runs through, and a quadrilateral between neighbouring cubes of which only one is inside. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,11 +14,11 @@
  * are inside and some outside. */
 typedef struct surface_net {
   size_t count;
-  uint32_t (*cell)[3]; /* x, y and z index of the first of the eight cubes of each vertex's cell */
-  double (*at)[3];     /* position of each vertex in its cell, 0 to 1 along each axis */
-  uint32_t (*neighbour)[6]; /* vertices across the cell's faces -x, +x, -y, ..., or NONE */
+  uint32_t (*cell)[3];      /* [count] index along x, y and z of the cell's first cube */
+  double (*at)[3];          /* [count] position of the vertex in its cell, 0 to 1 along each axis */
+  uint32_t (*neighbour)[6]; /* [count] vertices across the cell's faces -x, +x, -y, ..., or NONE */
   size_t quad_count;
-  uint32_t (*quad)[4]; /* corners, whose order faces outwards if the map's axes are right-handed */
+  uint32_t (*quad)[4]; /* corners; quads face outwards if the map's axes are right-handed */
 } surface_net;
 
 static const float half = 0.5F;
@@ -27,12 +26,12 @@ static const float half = 0.5F;
 typedef struct build {
   const labels_cubes *cubes;
   size_t stride[3]; /* index step from a cube to the next along each axis */
-  uint32_t *vertex; /* [cubes] vertex of the cell at each cube, or NONE */
+  uint32_t *vertex; /* [cubes] vertex of the cell whose first cube this is, if it has one */
   surface_net *net;
 } build;
 
 /* Find the mean of the points where the surface crosses edges of the cell, 0 to 1 along each axis;
- * false if there are none. */
+ * return false if there are none. */
 static bool crossing(const build *b, size_t cell, double mean[3]) {
   const float *share = b->cubes->share;
   double sum[3] = {0.0, 0.0, 0.0};
@@ -69,7 +68,7 @@ static bool crossing(const build *b, size_t cell, double mean[3]) {
   return true;
 }
 
-/* Count the cells that the surface runs through; with `write`, also fill the net's vertices. */
+/* Count the cells that the surface runs through; if `write`, also fill the net's vertices. */
 static void find_vertices(build *b, bool write) {
   const size_t *size = b->cubes->size;
   surface_net *net = b->net;
@@ -96,14 +95,14 @@ static void find_vertices(build *b, bool write) {
 }
 
 /* Add the quadrilateral around the edge between `cube` and the next cube along axis `a`, and link
- * its vertices; without `write`, only count it. */
+ * its vertices; unless `write`, only count it. */
 static void add_quad(build *b, size_t cube, size_t a, bool write) {
   surface_net *net = b->net;
   const size_t u = (a + 1) % 3;
   const size_t v = (a + 2) % 3;
   const size_t cells[4] = {cube - b->stride[u] - b->stride[v], cube - b->stride[v], cube,
                            cube - b->stride[u]};
-  /* Face through which each cell touches the next: +u, +v, -u, -v. */
+  /* Face through which each of `cells` touches the next: +u, +v, -u, -v. */
   const size_t face[4] = {2 * u + 1, 2 * v + 1, 2 * u, 2 * v};
   if (write) {
     const bool outwards = b->cubes->share[cube] >= half;
@@ -170,13 +169,13 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
   return SUPINE_OK;
 }
 
-/* Factors of the smoothing. The pass band, 1 / 0.5 - 1 / 0.51 = 0.04, keeps waves longer than some
- * 16 cubes, and removes the steps between slices. */
+/* Factors of the smoothing. Their pass band, 1 / 0.5 - 1 / 0.51 = 0.04, keeps waves longer than
+ * some 16 cubes and removes the steps between slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
 enum { TURNS = 40 }; /* number of times that the net is shrunk and inflated */
 
-/* Move every vertex by a share of the way to the mean of its neighbours, within its cell. */
+/* Move every vertex by a share of the way to its neighbours' mean, but not out of its cell. */
 static void step(const surface_net *net, double share, double (*next)[3]) {
   for (size_t v = 0; v < net->count; ++v) {
     double sum[3] = {0.0, 0.0, 0.0};
@@ -238,7 +237,7 @@ static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes
     in_voxels(net, cubes, i, voxel);
     supine_labels_mask_place(mask, voxel, made.vertices + 3 * i);
   }
-  for (size_t q = 0; q < net->quad_count; ++q) { /* cut each along its shorter diagonal */
+  for (size_t q = 0; q < net->quad_count; ++q) { /* cut along the shorter diagonal */
     uint32_t c[4];
     for (size_t k = 0; k < 4; ++k) {
       c[k] = net->quad[q][turned ? 3 - k : k];

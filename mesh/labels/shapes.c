@@ -2,15 +2,14 @@
 /* Make the surface of each label. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "mesh/labels/mask.h"
 #include "mesh/labels/shapes.h"
 
-enum { ALL_MOST = 256 }; /* an image with more values is probably no label map */
+enum { PARTS_MAX = 256 }; /* an image with more labels is probably no label map */
 
-/* Distance between vertices of large parts, divided by the cube root of the volume; gives 15,000
- * vertices in a lobe. */
+/* In large parts, vertices are this multiple of the cube root of the volume apart, which gives
+ * 15,000 vertices in a lobe. */
 static const double edge_share = 0.02;
 
 /* Make the surface of one label.
@@ -47,10 +46,10 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
     parts[(*count)++].label = wanted[i];
   }
   for (unsigned label = 1; label < LABELS_MAX && wanted_count == 0; ++label) {
-    if (tally[label].count > 0 && *count == ALL_MOST) {
+    if (tally[label].count > 0 && *count == PARTS_MAX) {
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "%s: more than %d labels: if it is a label map, name the labels to use", path, ALL_MOST);
+          "%s: more than %d labels: if it is a label map, name the labels to use", path, PARTS_MAX);
     }
     if (tally[label].count > 0) {
       parts[(*count)++].label = label;
@@ -65,7 +64,7 @@ supine_status supine_labels_shapes(const char *path, const unsigned *wanted, siz
   supine_image image = {0};
   labels_tally *tally = malloc(LABELS_MAX * sizeof *tally);
   uint8_t *value = calloc(LABELS_MAX, 1);
-  supine_labels_shape *made = calloc(wanted_count > 0 ? wanted_count : ALL_MOST, sizeof *made);
+  supine_labels_shape *made = calloc(wanted_count > 0 ? wanted_count : PARTS_MAX, sizeof *made);
   size_t made_count = 0;
   supine_status status =
       tally == NULL || value == NULL || made == NULL

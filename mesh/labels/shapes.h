@@ -12,15 +12,15 @@ typedef struct supine_labels_shape {
 } supine_labels_shape;
 
 /** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz, .mha), as supine_labels_surfaces
- * does, but with all pieces and cavities. Vertices are about one voxel apart, or in large parts
- * 1/50 of the cube root of the volume.
- * @param wanted  labels, 1 to 65535; count 0: all labels present
- * @param parts   [*count] output in the order of `wanted`, or of all labels; release with
+ * does, but with all pieces and cavities. Vertices are about one voxel apart; in large parts, 1/50
+ * of the cube root of their volume.
+ * @param wanted  [wanted_count] labels, 1 to 65535; all labels present if the count is 0
+ * @param parts   [*count] output in the order of `wanted`, or by label; release with
  *             supine_labels_shapes_free
  * @retval SUPINE_ERROR_MESH    a label has no voxels, all voxels are 0, or more than 256 labels are
  *             present but none is named
  * @retval SUPINE_ERROR_FORMAT  voxels that are not labels
- * @retval SUPINE_ERROR_MEMORY, and those of supine_image_read */
+ * @retval SUPINE_ERROR_MEMORY, and the statuses of supine_image_read */
 supine_status supine_labels_shapes(const char *path, const unsigned *wanted, size_t wanted_count,
                                    supine_labels_shape **parts, size_t *count, supine_error *error);
 void supine_labels_shapes_free(supine_labels_shape *parts, size_t count);

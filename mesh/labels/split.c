@@ -13,12 +13,11 @@ static const double least_share = 0.1;
 static const double widest_neck = 40.0;
 
 typedef struct pair {
-  uint32_t piece[2];   /* first run of each piece, left piece first */
-  double centre[2][3]; /* centre of each piece, mm, larger piece first */
+  uint32_t piece[2]; /* first run of each piece, left piece first */
 } pair;
 
-/* Find the two largest pieces; false unless they lie beside each other and the smaller has at least
- * a tenth of the larger one's volume. */
+/* Find the two largest pieces. Return false unless they lie side by side along x and the smaller
+ * one has at least `least_share` of the volume of the larger one. */
 static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair *found) {
   uint32_t top[2] = {0, 0};
   for (uint32_t r = 1; r < pieces->run_count; ++r) {
@@ -34,24 +33,25 @@ static bool find_pair(const labels_mask *mask, const labels_pieces *pieces, pair
   if (top[0] == top[1] || counts[1] < least_share * counts[0]) {
     return false;
   }
+  double centre[2][3];
   for (int p = 0; p < 2; ++p) {
     const labels_piece *piece = &pieces->piece[top[p]];
     const double voxel[3] = {piece->sum[0] / counts[p], piece->sum[1] / counts[p],
                              piece->sum[2] / counts[p]};
     found->piece[p] = top[p];
-    supine_labels_mask_place(mask, voxel, found->centre[p]);
+    supine_labels_mask_place(mask, voxel, centre[p]);
   }
-  const double apart = found->centre[0][0] - found->centre[1][0];
+  const double apart = centre[0][0] - centre[1][0];
   if (apart < 0.0) {
     found->piece[0] = top[1];
     found->piece[1] = top[0];
   }
-  return fabs(apart) > fabs(found->centre[0][1] - found->centre[1][1]) &&
-         fabs(apart) > fabs(found->centre[0][2] - found->centre[1][2]);
+  return fabs(apart) > fabs(centre[0][1] - centre[1][1]) &&
+         fabs(apart) > fabs(centre[0][2] - centre[1][2]);
 }
 
-/* Set `eroded` to 1 at the voxels of the mask deeper than `depth`, mm, else to 0.
- * @param squares  squared depth of each voxel, mm^2; not read for depth 0 */
+/* Set `eroded` to 1 at the voxels of the mask that are deeper than `depth`, mm, and to 0 elsewhere.
+ * @param squares  squared depth of each voxel, mm^2; not read if `depth` is 0 */
 static void erode(const labels_mask *both, const float *squares, double depth, uint8_t *eroded) {
   const size_t count = supine_labels_mask_count(both);
   for (size_t i = 0; i < count; ++i) {
@@ -115,7 +115,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
-    if (depth == step) { /* lungs that touch need the distances */
+    if (depth == step) { /* the lungs touch: compute the depth of each voxel */
       status = supine_labels_distance(both, true, squares);
     }
     erode(both, squares, depth, eroded.at);

@@ -4,9 +4,7 @@
 #include <cblas.h>
 #include <lapacke.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
@@ -15,7 +13,7 @@
 #include "precompute/inside/biharmonic.h"
 
 /* AFFINE: number of affine terms. COLUMNS: columns of the matrix that are eliminated together.
- * POINTS, CENTRES: size of a tile in the evaluation. */
+ * POINTS, CENTRES: points and centres that are evaluated together. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
 /* Set `middle` to the middle of the points' box, and `unit` to half its diagonal. */
@@ -34,8 +32,8 @@ static void frame(size_t count, const double *points, supine_inside_biharmonic *
   fit->unit = square > 0.0 ? sqrt(square) : 1.0;
 }
 
-/* Choose the centres: first the point farthest from the middle, then always the point farthest from
- * all earlier centres. */
+/* Choose the centres: first the point farthest from the middle, then each time the point whose
+ * nearest centre is farthest away. */
 SUPINE_CLONES static supine_status choose(size_t count, const double *points, size_t centre_max,
                                           supine_inside_biharmonic *fit) {
   double *distance = malloc(count * sizeof *distance);
@@ -75,9 +73,9 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
 
 /* The matrix K of the centres p_i, which is positive definite because |p_i| <= 1:
  *
- *     K_ij = ALPHA - |p_i - p_j|,    ALPHA > 2
+ *     K_ij = alpha - |p_i - p_j|,    alpha > 2
  *
- * On weights with sum 0, K acts like the matrix of -|p_i - p_j|. */
+ * For weights with sum 0, alpha cancels: K gives the same result as the matrix of -|p_i - p_j|. */
 typedef struct kernel {
   size_t size;
   double *matrix; /* [size, size], the lower triangle column by column */
@@ -93,8 +91,8 @@ SUPINE_CLONES static void fill(const double *c, const kernel *k) {
   }
 }
 
-/* Subtract the products of the last eliminated columns from the columns after them. Long and short
- * blocks alternate, so that threads get equal work. */
+/* Subtract the products of the COLUMNS columns eliminated last from the columns after them. Long
+ * and short blocks alternate, so that threads get equal work. */
 static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const kernel *k = context;
@@ -129,14 +127,14 @@ static lapack_int factorise(kernel *k) {
   return failed;
 }
 
-/* Find the weights w, b of u(x) = -sum over j of w_j |x - p_j| + (1, x) b. With a row of P = (1, x)
- * for each centre, u passes through the values f if K w + P b = f and P' w = 0:
+/* Find the weights w, b of u(x) = -sum over j of w_j |x - p_j| + (1, x) b. With f the values at the
+ * centres and P the matrix of the rows (1, p_j), u has these values if K w + P b = f and P^T w = 0:
  *
- *     K y = f,    K z = P,    (P' z) b = P' y,    w = y - z b
+ *     K y = f,    K z = P,    (P^T z) b = P^T y,    w = y - z b
  *
  * The weights are stored as -w, then b.
- * @param p  P [4, size] column by column, then f [R, size]; overwritten by z and y
- * @retval SUPINE_ERROR_NUMERICAL  K or P' z is singular, as all centres lie in one plane */
+ * @param p  P [4, size], then f [R, size], each column by column; overwritten by z and y
+ * @retval SUPINE_ERROR_NUMERICAL  K or P^T z is singular: all centres lie in one plane */
 static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {
   static const double flat = 1e-5;
   const int n = (int)k->size;
@@ -239,9 +237,9 @@ typedef struct evaluation {
   size_t count;
 } evaluation;
 
-/* Add the terms of centres [first, last) to the values of the first `here` of the points x. */
+/* Add the terms of centres [first, last) to the values of the first point_count of the points x. */
 SUPINE_CLONES static void add_centres(const supine_inside_biharmonic *fit, size_t first,
-                                      size_t last, const double (*x)[POINTS], size_t here,
+                                      size_t last, const double (*x)[POINTS], size_t point_count,
                                       double *values) {
   double distance[CENTRES][POINTS];
   for (size_t j = first; j < last; ++j) {
@@ -259,7 +257,7 @@ SUPINE_CLONES static void add_centres(const supine_inside_biharmonic *fit, size_
         sum[i] += weights[j] * distance[j - first][i];
       }
     }
-    for (size_t i = 0; i < here; ++i) {
+    for (size_t i = 0; i < point_count; ++i) {
       values[i * fit->columns + r] += sum[i];
     }
   }
@@ -272,10 +270,10 @@ static void evaluate_tiles(void *context, size_t begin, size_t end, size_t threa
   const size_t m = fit->count;
   for (size_t tile = begin; tile < end; ++tile) {
     const size_t at = tile * POINTS;
-    const size_t here = e->count - at < POINTS ? e->count - at : POINTS;
+    const size_t point_count = e->count - at < POINTS ? e->count - at : POINTS;
     double *values = e->values + at * fit->columns;
     double x[3][POINTS] = {{0.0}};
-    for (size_t i = 0; i < here; ++i) {
+    for (size_t i = 0; i < point_count; ++i) {
       for (size_t k = 0; k < 3; ++k) {
         x[k][i] = (e->points[3 * (at + i) + k] - fit->middle[k]) / fit->unit;
       }
@@ -287,7 +285,7 @@ static void evaluate_tiles(void *context, size_t begin, size_t end, size_t threa
     }
     for (size_t first = 0; first < m; first += CENTRES) {
       add_centres(fit, first, first + CENTRES < m ? first + CENTRES : m, (const double(*)[POINTS])x,
-                  here, values);
+                  point_count, values);
     }
   }
 }

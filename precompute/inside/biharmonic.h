@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file The biharmonic interpolation of values at scattered points, several columns at once:
+/** @file The biharmonic interpolation of values at points p_j, several columns of values at once:
  *
  *     u(x) = sum over j of w_j |x - p_j|  +  a + B x,    sum w_j = 0, sum w_j p_j = 0
  *
- * It minimises the integral of the squared second derivatives over space among all functions
- * through the values, and reproduces affine functions. */
+ * Among all functions through the values, it minimises the integral over space of the squared
+ * second derivatives. It reproduces affine functions. */
 #ifndef SUPINE_INSIDE_BIHARMONIC_H
 #define SUPINE_INSIDE_BIHARMONIC_H
 
@@ -31,7 +31,7 @@ typedef struct supine_inside_biharmonic {
  * @param values  [count, columns]
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY
- * Cost: count M distances to choose; M^3 / 6 multiplications to factorise one matrix of 8 M^2
+ * Cost: count x M distances to choose; M^3 / 6 multiplications to factorise one matrix of 8 M^2
  * bytes, of which half are used. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
                                            const double *values, size_t centre_max,

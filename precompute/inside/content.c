@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Read the content that a basis moves. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -11,17 +11,17 @@
 typedef struct supine_inside_content {
   size_t count;
   double *points; /**< [count, 3] mm, LPS */
-  uint32_t *part; /**< [count] index of the point's part; in a grid, its node i + size[0] (j +
-                   * size[1] k) */
+  uint32_t *part; /**< [count] index of the point's part; in a grid, of its node (i, j, k): i +
+                     size[0] (j + size[1] k) */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] indices of points */
-  size_t part_count;   /**< number of named parts; 0: a grid */
+  size_t part_count;   /**< number of named parts; 0 for a grid */
   char *names;         /**< names of the parts in order, separated by newlines */
-  bool *rigid;         /**< [part_count] whether the part keeps its shape; NULL: none does */
+  bool *rigid;         /**< [part_count] whether the part keeps its shape; NULL if none does */
   supine_image grid;   /**< if the content is a grid: size, origin and step of its nodes */
 } supine_inside_content;
 
-/** Append the points of a file, each as one part; options and statuses as
+/** Append the points of a file, each as one part; for options and statuses see
  * supine_mesh_points_read. */
 supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
@@ -44,10 +44,10 @@ supine_status supine_inside_content_surface(const char *name, const supine_mesh 
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);
 
-/** Make a grid of the nodes inside the lungs and of the nodes at most a cell's diagonal outside, so
- * that every point inside lies between nodes.
+/** Make a grid of all nodes inside the lungs, and of the nodes outside that are nearer than about a
+ * cell's diagonal, so that every point inside lies between nodes.
  *
- * @param like     image of which every n-th voxel along each axis is a node; NULL: axes x, y and z
+ * @param like     image of which every n-th voxel along each axis is a node; NULL for axes x, y, z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
  * @param margin   distance, mm, by which the grid extends beyond the lungs' box, for the field to
  *             fade out

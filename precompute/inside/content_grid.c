@@ -34,7 +34,7 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
   }
 }
 
-/* Make the grid that covers the lungs, along x, y, z or of every n-th voxel of the image `like`. */
+/* Make the grid that covers the lungs: along x, y and z, or of every n-th voxel of `like`. */
 static supine_status make_grid(const supine_inside_shells *shells, const supine_image *like,
                                double spacing, double margin, supine_image *grid,
                                supine_error *error) {
@@ -57,7 +57,7 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
     if (like != NULL && !(high[k] >= low[k])) {
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "the image does not show the lungs: check its axes and those of the lungs' meshes");
+          "the image does not show the lungs: check its axes and the axes of the meshes");
     }
     nodes *= count;
     grid->size[k] = (size_t)fmin(count, nodes_max);
@@ -77,12 +77,11 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
   return SUPINE_OK;
 }
 
-/* Arguments of the pass that classifies the nodes. */
 typedef struct search {
   const supine_inside_shells *shells;
   const supine_image *grid;
   double limit;        /* largest distance of a kept node from the lungs, mm */
-  unsigned char *keep; /* [nodes] 2: inside a lung; 1: outside within the limit; 0: dropped */
+  unsigned char *keep; /* [nodes] 2 inside a lung, 1 outside but within the limit, 0 dropped */
 } search;
 
 static void search_rows(void *context, size_t begin, size_t end, size_t thread) {

@@ -29,7 +29,7 @@ typedef struct embedding {
   uint32_t *part;       /* [N] index of the part */
   unsigned char *group; /* [N] index of the lung */
   uint32_t *triangles;  /* [M, 3] indices of vertices */
-  uint32_t *rigid;      /* [rigid_count, 2] first vertex of a rigid part, and one past its last */
+  uint32_t *rigid;      /* [rigid_count, 2] each rigid part has the vertices begin <= i < end */
   size_t rigid_count;
 } embedding;
 
@@ -99,7 +99,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
     while (end < n && e->part[end] == e->part[begin]) {
       ++end;
     }
-    if (e->content->rigid[e->part[begin]] && end > begin + 1) { /* a point needs no rotation */
+    if (e->content->rigid[e->part[begin]] && end > begin + 1) { /* a single point does not rotate */
       e->rigid[2 * e->rigid_count] = (uint32_t)begin;
       e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
     }
@@ -109,7 +109,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
   return SUPINE_OK;
 }
 
-/* Interpolate the surface's displacement by each mode linearly in the triangle of a place. */
+/* Find the displacement by each mode at a place on the surface, interpolated in its triangle. */
 static void surface_motion(const embedding *e, const supine_inside_shell *shell,
                            const double *displacement, const supine_inside_place *place,
                            double *motion) {
@@ -138,10 +138,10 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
   }
 }
 
-/* Find the displacements of points [begin, end) of `order`, at most BLOCK, all of one lung. `space`
- * has room for positions and values of 2 BLOCK points (first the given points; then, for each point
- * within `reach` of the surface, the nearest surface point) and for the values of one more. All
- * eight parameters describe one block and its work space. */
+/* Find the displacements of the points [begin, end) of `order`, at most BLOCK, all of one lung. All
+ * eight parameters describe one block and its work space.
+ * @param space  positions of 2 BLOCK points, then values of 2 BLOCK + 1 points: first the given
+ *             ones, then the surface points nearest to those within `reach` of the surface */
 static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
@@ -213,8 +213,8 @@ cleanup:
 }
 
 /* Find a rigid part at full inflation: its shape in the scan, rotated and shifted so that the field
- * at the scan's weights moves it back to the scan. The rotation is found by iteration, as the
- * field's rotation of the part depends on it. */
+ * at the weights of the scan moves it back. The rotation is found by iteration, because the
+ * rotation by the field depends on it. */
 static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);

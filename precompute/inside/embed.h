@@ -24,16 +24,15 @@
 
 /** Default largest number of centres per lung, which are chosen from its vertices. On two lungs of
  * 20,000 vertices with a spreading length of 10 mm (--reach), the error is 0.2 % of the
- * displacement at the other vertices and 0.05 % inside; this takes a few seconds. */
+ * displacement at vertices that are no centres, and 0.05 % inside; this takes a few seconds. */
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 
 typedef struct supine_inside_options {
   bool clamp;     /**< whether points outside a lung move like the surface point nearest to them */
-  size_t centres; /**< largest number of centres of one lung; 0: SUPINE_INSIDE_CENTRES */
-  const char *made_by; /**< name of the maker for the file's metadata; optional */
+  size_t centres; /**< largest number of centres of one lung; 0 for SUPINE_INSIDE_CENTRES */
+  const char *made_by; /**< program that writes the file, for its metadata; optional */
 } supine_inside_options;
 
-/** Result of embedding. */
 typedef struct supine_inside_report {
   size_t count;                     /**< number of points in the file */
   size_t in_lung[SUPINE_LUNGS_MAX]; /**< number of points in each lung or nearest to it */

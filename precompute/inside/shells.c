@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Extract the surfaces of a basis, lung by lung, and find the lung that a point is in. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 #include "sh/base/vec3.h"

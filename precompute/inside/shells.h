@@ -22,7 +22,7 @@ typedef struct supine_inside_shell {
 
 typedef struct supine_inside_shells {
   const supine_basis *basis; /**< owned by the caller; must outlive the shells */
-  size_t count;              /**< number of lungs, G */
+  size_t count;
   supine_inside_shell shell[SUPINE_LUNGS_MAX];
   supine_pose scan; /**< the scan's state, in which content is given */
 } supine_inside_shells;
@@ -51,8 +51,8 @@ typedef struct supine_inside_walk {
 
 /** Return the lung that a point is in, or the nearest lung; walk->place[lung] is the point's place.
  * @param walk  zeroed for the first point
- * @param far   distance in mm: if the surface is farther, the place may be left from an earlier
- *              point on the same side; INFINITY: it is always the point's own */
+ * @param far   mm; if the surface is farther, the place may be that of an earlier point on the same
+ *             side; with INFINITY, it is always that of the point itself */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk);
 

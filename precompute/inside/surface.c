@@ -12,16 +12,16 @@
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
-/* Distance from a box, in radii of the box, beyond which a dipole replaces its triangles. The error
- * of the winding number is then below 0.01; its threshold is 0.5. */
+/* A dipole replaces the triangles of a box farther away than this, in radii of the box. The winding
+ * number, whose threshold is 0.5, then errs by less than 0.01. */
 static const double dipole_distance = 2.0;
-/* Largest distance, mm, of a point that counts as on the surface; positions are in float32. */
+/* Points nearer than this, mm, count as on the surface, as positions are in float32. */
 static const double on_surface = 1e-3;
 
 typedef struct node {
   double low[3], high[3];
   uint32_t begin, end;
-  uint32_t right; /* index of the second child (the first is the next node); 0: a leaf */
+  uint32_t right; /* index of the second child (the first is the next node); 0 in a leaf */
   uint32_t leaf;  /* index of a leaf's boxes in `leaves` */
 } node;
 
@@ -120,7 +120,7 @@ static void find_box(const supine_inside_surface *s, node *n, boxes *leaf) {
   }
 }
 
-/* Add a part to a dipole, whose centre stays a first moment until all parts are added. */
+/* Add a part to a dipole. Until all parts are added, d->centre is a sum of area times centre. */
 static void add_part(dipole *d, double area, const double centre[3], const double normal[3]) {
   d->area += area;
   for (int k = 0; k < 3; ++k) {
@@ -129,7 +129,7 @@ static void add_part(dipole *d, double area, const double centre[3], const doubl
   }
 }
 
-/* Find a node's dipole: a leaf's from its triangles, otherwise from its children. */
+/* Find a node's dipole: from its triangles if it is a leaf, otherwise from its children. */
 static void find_dipole(const supine_inside_surface *s, const node *n) {
   if (s->dipoles == NULL) {
     return;
@@ -163,7 +163,7 @@ static void find_dipole(const supine_inside_surface *s, const node *n) {
   d->radius = sqrt(square);
 }
 
-/* Build the node of triangles order[begin..end) and its descendants. */
+/* Build the node of the triangles order[begin, end), and its descendants. */
 static void build(supine_inside_surface *s, keyed *space, uint32_t begin, uint32_t end) {
   node *n = &s->nodes[s->node_count++];
   n->begin = begin;
@@ -238,19 +238,19 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   }
 }
 
-/* Find the parameter, 0 at the start to 1 at the end, of the point of an edge nearest to x.
- * `offset` leads from the edge's start to x. */
+/* Find the point of an edge that is nearest to x. Return its place: 0 at the start of the edge to 1
+ * at its end. `offset` leads from the start to x. */
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
   const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
   return t > 1.0 ? 1.0 : t > 0.0 ? t : 0.0;
 }
 
-/* Find the barycentric coordinates of the triangle's point nearest to x; false if a lower bound of
- * its squared distance from x exceeds `best`. */
+/* Find the barycentric coordinates b of the triangle's point nearest to x. Return false, with b
+ * undefined, if its squared distance from x must exceed `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  static const double slender = 1e-4; /* sin^2 of a corner below which coordinates are inexact */
+  static const double slender = 1e-4; /* squared sine of an angle below which b is inexact */
   double u[3];
   double v[3];
   double w[3];
@@ -266,11 +266,12 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   b[1] = (vv * uw - uv * vw) / determinant;
   b[2] = (uu * vw - uv * uw) / determinant;
   b[0] = 1.0 - b[1] - b[2];
-  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* false for a triangle without area */
+  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* false for NaN: a triangle without area */
     return true;
   }
   const double ww = supine_dot(w, w);
-  const double opposite[3] = {uu + vv - 2.0 * uv, vv, uu}; /* squared lengths of edges */
+  const double opposite[3] = {uu + vv - 2.0 * uv, vv,
+                              uu}; /* squared length of each opposite edge */
   /* Squared distance from x's projection beyond which the triangle is farther than `best`. */
   const double limit = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
@@ -328,7 +329,7 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
   }
 }
 
-/* Search below node `at` for the triangle nearest to x, if its squared distance is below *best. */
+/* Search node `at` and below for the triangle nearest to x, among those nearer than sqrt(*best). */
 static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];

@@ -17,7 +17,7 @@ typedef struct supine_inside_place {
   double depth;          /**< distance to the surface, mm; positive inside, negative outside */
   double nearest[3];     /**< the surface's nearest point, mm */
   size_t triangle;       /**< index of the triangle of the nearest point */
-  double barycentric[3]; /**< barycentric coordinates of that point in the triangle */
+  double barycentric[3]; /**< barycentric coordinates of `nearest` in the triangle */
 } supine_inside_place;
 
 /** Build a tree of boxes over the triangles.
@@ -31,24 +31,24 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
 /** Free the tree; NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
-/** Find the surface's nearest point; `depth` is positive on both sides. Thread-safe.
- * @param near  the place of a nearby point, to save work; NULL: none */
+/** Find the surface point nearest to a point; `depth` is positive on both sides. Thread-safe.
+ * @param near  the place of a nearby point, which saves work, or NULL */
 supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
                                                   const double point[3],
                                                   const supine_inside_place *near);
 
 /** Find the distance of each point [count, 3] to the surface, mm, into distance [count], and the
- * surface's nearest point into nearest [count, 3] unless it is NULL. Uses all cores. */
+ * surface point nearest to it into nearest [count, 3] unless `nearest` is NULL. Uses all cores. */
 void supine_inside_surface_distances(const supine_inside_surface *surface, size_t count,
                                      const double *points, double *distance, double *nearest);
 
-/** Find the surface's nearest point, and the side by the generalised winding number, which
- * tolerates small holes: inside if
+/** Find the surface point nearest to a point, and the side of the point by the generalised winding
+ * number, which tolerates small holes: it is inside if
  *
  *     (1 / 4 pi) sum over triangles of their solid angle seen from the point > 1/2
  *
  * Boxes farther than twice their radius are approximated by a dipole. Thread-safe.
- * @param near  the place of a nearby point, as found by this function, to save work; NULL: none
+ * @param near  the place of a nearby point, found by this function, which saves work, or NULL
  * Sources: Jacobson, Kavan, Sorkine-Hornung, ACM Trans. Graph. 32(4), 2013; for the dipoles Barill,
  * Dickson, Schmidt, Levin, Jacobson, ACM Trans. Graph. 37(4), 2018. */
 supine_inside_place supine_inside_surface_find(const supine_inside_surface *surface,

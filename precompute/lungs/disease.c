@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Weight lesions, and shrink collapsed lungs ([Santhanam2008] VI). */
+/* Compute the stiffness factors of lesions, and shrink collapsed lungs ([Santhanam2008] VI). */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "sh/base/vec3.h"

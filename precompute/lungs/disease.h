@@ -14,21 +14,21 @@
  *     factor^w     w = 1 for r <= radius/2,  0 for r >= radius,  3 q^2 - 2 q^3 between
  *                  q = 2 (1 - r / radius)
  *
- * so that it is `factor` inside, exactly 1 from the radius on, and smooth. The factors of several
- * lesions multiply. */
+ * so that it changes smoothly, and not at all from the radius on. The factors of several lesions
+ * multiply. */
 typedef struct supine_lesion {
   double centre[3]; /**< mm, LPS; inside the lung or on its surface */
   double radius;    /**< mm, > 0 */
   double factor;    /**< > 0; above 1 stiffer, below 1 softer, 1 changes nothing */
 } supine_lesion;
 
-/** Multiply a lesion into `factors` [N], which start as 1 everywhere. Factors apply after stiffness
- * was scaled to geometric mean 1: scaling with the lesion included would soften all other tissue,
- * by 4 % for a lesion of factor 10 over 2 % of the vertices. At a given breath scale other tissue
- * therefore moves as before; at a given volume all tissue moves more, by one ratio, to make up for
- * the lesion.
+/** Multiply the factors of a lesion into `factors` [N], which start as 1 everywhere. They apply
+ * after stiffness was scaled to geometric mean 1: otherwise the scaling would soften all other
+ * tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices. So at a given breath scale,
+ * other tissue moves as before; at a given volume, all tissue moves more, by one ratio, to make up
+ * for the lesion.
  *
- * @param reached  optional output: number of vertices nearer than the radius; 0: no effect
+ * @param reached  optional output: number of vertices nearer than the radius; if 0, no effect
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
  *             positive and finite */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
@@ -43,13 +43,13 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
  *
  *     V_j(s, g) = share x healthy V_j(s, g)
  *
- * exactly, for every direction g of gravity, and for the surface itself.
+ * exactly, for every direction g of gravity. The volume of `vertices` is scaled alike.
  *
- * @param share     [lungs] volume over the healthy volume, 0 < share <= 1; 1: healthy
+ * @param share     [lungs] volume divided by healthy volume, 0 < share <= 1
  * @param vertices  [N, 3] output, mm */
 void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
-/** Scale the directions [N, 3] of healthy lungs to those of collapsed lungs, in place. */
+/** Scale the directions [N, 3] of displacement of healthy lungs to collapsed lungs, in place. */
 void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
                                        double *directions);
 

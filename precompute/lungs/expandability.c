@@ -40,8 +40,8 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
   double value = 0.0;
   if (number != NULL && !parse_vertex(number, &vertex)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s:%zu: '%.40s' is not the number of a vertex: write a value, or "
-                            "vertex,value",
+                            "%s:%zu: '%.40s' is not the number of a vertex: write a whole number, "
+                            "0 for the first vertex",
                             csv->path, csv->line, number);
   }
   const supine_status status = supine_csv_number(csv, 0, "expandability", &value, error);

@@ -23,15 +23,15 @@ typedef enum supine_expandability_shape {
 typedef struct supine_expandability_law {
   supine_expandability_shape shape;
   int axis;        /**< 0, 1 or 2 */
-  double from, to; /**< a at t = 0 and t = 1, > 0 */
+  double from, to; /**< values of a, > 0, at t = 0 and at t = 1 */
 } supine_expandability_law;
 
 /** Compute a [N] by a regional model whose shape is not UNIFORM. */
 void supine_tissue_expandability_regional(const supine_lungs *lungs,
                                           const supine_expandability_law *law, double *a);
 
-/** Read a [N] from a CSV file: a header line, then either one value per line in the model's order,
- * or `vertex,value` with vertices counted from 0, in any order. Empty lines, and lines that begin
+/** Read a [N] from a CSV file with the column `expandability`. Lines are in the model's order, or
+ * in any order if a column `vertex` numbers the vertices from 0. Empty lines, and lines that begin
  * with #, are skipped.
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice

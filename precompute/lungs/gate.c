@@ -8,14 +8,14 @@
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 
-/* Pieces with less than this share of their file's volume are dropped. */
+/* Pieces with less than this share of the volume of their file are dropped. */
 static const double speck_share = 0.01;
 
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
 }
 
-/* Repair one surface and drop its specks; note what was changed. */
+/* Repair one surface, drop its small pieces, and note what was changed. */
 static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *findings,
                           supine_error *error) {
   supine_mesh_repair_report report;
@@ -90,13 +90,12 @@ static supine_status check_size(const supine_lungs *lungs, const supine_lungs_so
   return supine_error_set(error, SUPINE_ERROR_MESH,
                           "%s: %.3g mm long, which is impossible for lungs: %s%s. If the size is "
                           "right, add --units mm",
-                          source->name, side,
-                          unit != NULL ? "its unit is likely --units " : "check its units",
+                          source->name, side, unit != NULL ? "add --units " : "check its units",
                           unit != NULL ? unit : "");
 }
 
 /* Separate the triangles of two lungs along the axis on which they overlap least. Return the number
- * of lungs; 0: out of memory.
+ * of lungs, or 0 if out of memory.
  * @param parts  written; they share the lungs' vertices, and the caller frees their triangles */
 static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
   const supine_mesh *mesh = &lungs->mesh;
@@ -134,7 +133,7 @@ static size_t part_lungs(const supine_lungs *lungs, supine_mesh parts[2]) {
 }
 
 /* Judge the axes by the lungs' shape, and refuse two lungs in one piece.
- * @param side  written: the side of a single lung, +1 left, -1 right; 0: unknown */
+ * @param side  written: the side of a single lung, +1 left, -1 right, 0 unknown */
 static supine_status judge(const supine_lungs *lungs, const supine_lungs_source *source, int *side,
                            bool *axes_hold, supine_findings *findings, supine_error *error) {
   supine_mesh parts[2];
@@ -175,8 +174,8 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
   const double high = lungs->maximum[0];
   const int taken = side != 0 ? side : lungs->side[0];
   supine_findings_add(findings,
-                      "%s: note: one lung, taken for the %s by its %s; --midline %.0f would make "
-                      "it the %s",
+                      "%s: note: one lung, taken for the %s lung by its %s; --midline %.0f would "
+                      "make it the %s lung",
                       source->name, taken > 0 ? "left" : "right", side != 0 ? "shape" : "place",
                       taken > 0 ? ceil(high) : floor(low), taken > 0 ? "right" : "left");
   if (taken == lungs->side[0] && lungs->midline == (taken > 0 ? low : high)) {

@@ -10,23 +10,23 @@
 
 /** Where the surfaces come from. */
 typedef struct supine_lungs_source {
-  const char *name;      /**< name of the first file, for messages */
-  supine_axes axes;      /**< axes of all files; AUTO if they differ */
-  bool axes_given;       /**< whether the user gave the axes */
-  bool units_given;      /**< whether the user gave the units */
+  const char *name; /**< name of the first file, for messages */
+  supine_axes axes; /**< axes of all files; AUTO if they differ */
+  bool axes_given;
+  bool units_given;
   const double *midline; /**< midline for supine_lungs_create */
 } supine_lungs_source;
 
 /** Repair and check surfaces, and join them into lungs.
  *
  * Repairs are those of supine_mesh_repair; pieces below 1 % of their file's volume are dropped. The
- * longest side must be possible for lungs (if the user gave the axes or units, an impossible one is
- * only a warning). The axes are compared with the shape (supine_mesh_anatomy_find). The side of a
+ * longest side must be possible for lungs (an impossible one is only a warning if the user gave the
+ * axes or units). The axes are compared with the shape (supine_mesh_anatomy_find). The side of a
  * single lung follows from its shape or, if that is unclear, from its position. Notes and warnings
  * go to `findings`.
  *
  * @param meshes     [count] changed in place
- * @param axes_hold  output: whether the shape fits LPS and no other axes nearly as well
+ * @param axes_hold  output: whether the shape fits LPS clearly better than all other axes
  * @retval SUPINE_ERROR_MESH  a size impossible for lungs, both lungs in one piece; and those of
  *             supine_lungs_create
  * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed */

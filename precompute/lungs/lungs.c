@@ -8,9 +8,9 @@
 
 /* A component with less than this share of the vertices does not make a lung. */
 static const double significant_share = 0.05;
-/* If the faces of two boxes differ by less than this share of their size, both hold the same lung:
- * a mesh of half the resolution has a box that differs by thousandths; the boxes of two lobes or
- * lungs differ by far more. */
+/* Two surfaces are the same lung if the faces of their boxes differ by less than this share of the
+ * longest side. The faces of one lung meshed at half the resolution differ by thousandths, those of
+ * two lobes or lungs by far more. */
 static const double same_box_share = 0.01;
 /* Least ratio of the longest sides of two surfaces: lobes and lungs of one chest differ by less
  * than a factor of ten. */

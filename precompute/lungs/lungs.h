@@ -6,18 +6,17 @@
 
 #include "mesh/mesh.h"
 
-/** One or two lungs as a single surface whose vertices and triangles are grouped by lung, in the
- * order of the input within each. With two lungs, the left one is lung 0. */
+/** One or two lungs as a single surface whose vertices and triangles are grouped by lung, within
+ * each lung in the order of the input. With two lungs, the left one is lung 0. */
 typedef struct supine_lungs {
   supine_mesh mesh;
   supine_topology topology;
-  size_t lung_count;    /**< 1 or 2 */
-  size_t lung_begin[3]; /**< vertices of lung j: lung_begin[j] <= i < lung_begin[j + 1] */
-  size_t
-      triangle_begin[3]; /**< triangles of lung j: triangle_begin[j] <= t < triangle_begin[j + 1] */
-  int side[2];           /**< +1 left, -1 right */
-  bool reversed[2];      /**< whether the lung's triangles faced inwards and were reversed */
-  double minimum[3];     /**< bounding box over all lungs, mm */
+  size_t lung_count;        /**< 1 or 2 */
+  size_t lung_begin[3];     /**< lung j: lung_begin[j] <= vertex < lung_begin[j + 1] */
+  size_t triangle_begin[3]; /**< lung j: triangle_begin[j] <= triangle < triangle_begin[j + 1] */
+  int side[2];              /**< +1 left, -1 right */
+  bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
+  double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
   double *scanned; /**< [N, 3] vertices in the scan if `mesh` was moved from there to full
                         inflation (reference.h); else NULL */
@@ -32,11 +31,11 @@ typedef struct supine_lungs {
  * reversed.
  *
  * @param meshes   [count] not changed
- * @param midline  x of the plane between left and right, mm; NULL: find it
+ * @param midline  x of the plane between left and right, mm; found if NULL
  * @param lungs    written on success; release with supine_lungs_free
  * @retval SUPINE_ERROR_MESH      no surface, no extent, or more vertices than 32-bit indices reach;
- *                                one lung given twice, a tiny surface beside another;
- *                                a midline through a lung, or with both lungs on one side of it
+ *             one lung given twice, a tiny surface beside another; a midline through a lung, or
+ *             with both lungs on one side of it
  * @retval SUPINE_ERROR_ARGUMENT  a midline that is not finite
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const double *midline,
@@ -50,10 +49,10 @@ void supine_lungs_free(supine_lungs *lungs);
 #define SUPINE_LUNGS_MOST_OVERLAP 0.5
 
 /** Sort connected components to the two sides of `middle` along an axis, by the mean of their
- * vertices.
+ * vertices. The range of a side is that of its components with at least 5 % of the vertices.
  * @param above  [components] written: whether the mean is above `middle`
- * @return overlap of the two sides, each the range of its significant components, as a share of the
- *         narrower side; INFINITY if a side has none, NAN if out of memory */
+ * @return overlap of the two ranges as a share of the narrower one; INFINITY if a side has no
+ *             range, NAN if out of memory */
 double supine_lungs_sides(const supine_mesh *mesh, const supine_topology *topology, int axis,
                           double middle, uint8_t *above);
 
@@ -62,7 +61,8 @@ static inline const char *supine_lungs_name(const supine_lungs *lungs, size_t lu
   return lungs->side[lung] > 0 ? "left" : "right";
 }
 
-/** Return one lung as a mesh that shares the arrays; its triangles index all vertices. */
+/** Return one lung as a mesh that shares the arrays; its triangles index the vertices of all
+ * lungs. */
 static inline supine_mesh supine_lungs_part(const supine_lungs *lungs, size_t lung) {
   const size_t begin = lungs->triangle_begin[lung];
   return (supine_mesh){lungs->mesh.vertex_count, lungs->mesh.vertices,

@@ -31,7 +31,7 @@ size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
 /* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
-  const size_t axis = index / 4; /* axis whose coordinate is +-1; the next is +-golden */
+  const size_t axis = index / 4; /* axis with coordinate +-1; the next axis has +-golden */
   const double one = index % 2 == 0 ? -1.0 : 1.0;
   const double far = index % 4 < 2 ? golden : -golden;
   p[axis % 3] = one;
@@ -57,7 +57,7 @@ static size_t edge_index(unsigned a, unsigned b) {
   return count;
 }
 
-/* Find the index of the vertex of a face with barycentric coordinates (f - i - j, i, j) / f. */
+/* Return the index of the vertex of a face with barycentric coordinates (f - i - j, i, j) / f. */
 static size_t number(size_t face, size_t f, size_t i, size_t j) {
   const size_t step[3] = {f - i - j, i, j};
   size_t inside = 0;
@@ -73,8 +73,8 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
       if (step[k] > 0 && step[next] > 0) {
         const unsigned a = faces[face][k];
         const unsigned b = faces[face][next];
-        const size_t along =
-            a < b ? step[next] : step[k]; /* steps from the corner with the lower index */
+        /* Steps from the corner with the lower index. */
+        const size_t along = a < b ? step[next] : step[k];
         return CORNERS + edge_index(a, b) * (f - 1) + along - 1;
       }
     }
