@@ -32,13 +32,13 @@ def rows(name):
 
 
 def visits(method):
-    """Return the number of link visits until the relative error is 1e-6."""
+    """Return the number of link visits after which the relative error is 1e-6."""
     return next(round(float(row["link_visits"])) for row in rows("fig7_convergence")
                 if row["method"] == method and float(row["relative_rms_error"]) <= 1e-6)
 
 
 def apart(name, a, b):
-    """Return the RMS difference of the columns a and b of a table divided by the RMS of a."""
+    """Return the RMS difference of the columns a and b of a table, divided by the RMS of a."""
     of = [(float(row[a]), float(row[b])) for row in rows(name)]
     return math.sqrt(sum((x - y) ** 2 for x, y in of) / sum(x * x for x, _ in of))
 
@@ -94,10 +94,10 @@ makes this file from synthetic lungs of {best['vertices']:,} vertices.
 | in the paper | reproduced by | result | difference |
 |---|---|---|---|
 | III-B, pressure and volume: a second-order equation with five control parameters | `supine pv fit`, `supine pv show`, `supine breathe` | the built-in adult relation; other curves are fitted with errors below 1 % (`test_pv_fit`) | the paper does not define the control functions; here they are Legendre polynomials (`<supine/breath.h>`) |
-| III-C, displacement as a function of volume at one orientation | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | at most {off_line():.1f} % of the displacement at 500 mL away from a straight line, from 0 to 500 mL in four postures | with `deep` the path bends, as that of real lungs does; with `paper` each vertex moves on a line |
+| III-C, displacement as a function of volume at one orientation | `tests/bench/bench_validation`, linearity.csv; `supine validate` with several `--state` | at most {off_line():.1f} % of the displacement at 500 mL away from a straight line, from 0 to 500 mL in four postures | with `deep` the path of a vertex bends, like that of real lungs; with `paper` it is a straight line |
 | III-E, mass and spring nodes, expandability, local transfer; (3), (8) | `supine precompute --law paper`, `--expandability`, `--lesion` | every column of the transfer sums to 1 (`test_equilibrium`) | the spring nodes are eliminated exactly; `deep` spreads the force over 10 mm and has no spring nodes |
 | (2), a column of the transfer matrix | `supine solve --unit-force VERTEX` | CSV, one row per vertex | |
-| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits to an error of 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare the solution with the paper's iteration |
+| (5), (6), Pitcher/Catcher | `tests/bench/bench_validation`, fig7_convergence.csv | link visits until the error is 1e-6: {reached} | the program factorises the matrix (CHOLMOD); tests compare the solution with the paper's iteration |
 | (9)-(14), all paths | `supine solve --law paper` | the fixed point of (5), (6) (`test_equilibrium`) | the paths are not enumerated; the linear system is solved |
 | (15)-(17), directions | `--law`, `--constants`, `supine fit` | {best['direction_constants']} | **Table I is not available**: these constants were fitted to the 4-D CT of ten patients (DIR-Lab); `supine fit` fits those of a person |
 | (18), applied force | `--base`, `--gain`, `--box-force`, `supine fit` | {best['force']} | in `deep` only a part of the gradient of the force follows gravity |
@@ -105,10 +105,10 @@ makes this file from synthetic lungs of {best['vertices']:,} vertices.
 | IV, Fig. 7, convergence | `tests/bench/bench_validation`, fig7_convergence.png | as for (5), (6) | |
 | IV, Fig. 8, a plane | `tests/bench/bench_validation`, fig8_plane.png | {plane[0]} and {plane[1]} differ by {apart('fig8_plane', plane[0], plane[1]):.1g} of the displacement, in the nine digits written | |
 | IV, Fig. 9, a ring with a stiffer third | `tests/bench/bench_validation`, fig9_ring.png | mean radius {radius('x0'):.1f} mm before, {radius('x1'):.1f} with uniform stiffness, {radius('x2'):.1f} with a third twice as stiff, {radius('x4'):.1f} with a third four times as stiff | |
-| IV-B, expandability from displacement | `supine fit --expandability` | a known law is recovered (`test_inverse`, `test_patient_expand`) | found for regions, as surfaces do not determine it for single vertices |
-| IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, which has larger breaths of other people | |
+| IV-B, expandability from displacement | `supine fit --expandability` | a known law is recovered (`test_inverse`, `test_patient_expand`) | found for regions, because surfaces do not determine it for single vertices |
+| IV-B, distance between surfaces; the paper: 2 mm, constants within 1 % | `supine validate`, error pictures by `-o errors.png` | see `tests/FIGURES.md`, measured in larger breaths of other people | |
 | V, spherical harmonics of the orientation, l <= 3 | `supine precompute --law paper --band 3 --modes harmonics` | error {percent(first)} RMS on held-out directions; {operations(first)} per vertex | |
-| V, with at most the same number of operations | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} per vertex | the best functions of orientation instead of the first harmonics |
+| V, with at most the same number of operations | `supine precompute --law paper` | error {percent(best)} with {best['modes']} modes of band {best['band']}; {operations(best)} per vertex | uses the best functions of orientation instead of the first harmonics |
 | V, with stiffness that follows gravity | `--reach 10 --soften 1` | {percent(soft_first)} with the first 16 harmonics, {percent(soft_best)} with {soft_best['modes']} modes | |
 | V, FFTW | `supine precompute` | the force on a grid of directions, by FFTW along longitude and Legendre functions along latitude | the force is transformed, not the displacement; the transfer matrix is applied once, to the best modes |
 | V, a breath of 500 mL over 5 s in steps of 1.5 mL, 15 ms per frame | `supine breathe --course flow`, `supine_step` | three additions per vertex and step (`test_deform`) | |

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/** Write `size` bytes as base64 with padding. Write errors stay in the stream. */
+/** Write `size` bytes as base64 with padding. A write error sets the error indicator of `file`. */
 void supine_export_base64_write(const void *bytes, size_t size, FILE *file);
 
 #endif

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Open a basis to export, and compute poses during a breath. */
 #include <math.h>
-#include <stdlib.h>
 
 #include <supine/sh.h>
 

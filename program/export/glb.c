@@ -12,8 +12,8 @@
 
 static const double step_mm = 0.045; /* smallest unit of quantized positions */
 
-/* Compute the largest displacement of each vertex from supine in the other lying postures before
- * the breath, mm; return the largest of all vertices. glb.xyz and glb.normals are overwritten. */
+/* Compute the largest displacement of each vertex between supine and another lying posture, at the
+ * start of a breath, mm. Return the maximum. Overwrites glb.xyz and glb.normals. */
 static double find_displacements(const glb *g, float *displacement) {
   static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
   float *from = g->normals;
@@ -35,7 +35,7 @@ static double find_displacements(const glb *g, float *displacement) {
   return largest;
 }
 
-/* Colour vertices by displacement, 0 to `end` mm; glTF's vertex colours are linear RGBA. */
+/* Compute vertex colours, linear RGBA, from displacements. The colour map ends at `end` mm. */
 static void colour(const float *displacement, size_t count, double end, uint8_t *colours) {
   for (size_t i = 0; i < count; ++i) {
     double rgb[3];
@@ -48,8 +48,8 @@ static void colour(const float *displacement, size_t count, double end, uint8_t 
   }
 }
 
-/* Compute the colours and normals of the lungs' vertices; set `end` to the displacement that the
- * last colour shows, mm. */
+/* Compute the colours and normals of the lungs' vertices. Set `end` to the displacement at the end
+ * of the colour map, mm. */
 static supine_status prepare(glb *g, double *end, supine_error *error) {
   const size_t n = g->source->info->vertex_count;
   float *displacement = calloc(n, sizeof *displacement);
@@ -73,8 +73,8 @@ static supine_status prepare(glb *g, double *end, supine_error *error) {
   return status;
 }
 
-/* Append the patient with the lungs, the animations, the table and the arrow; set `roots` to the
- * root nodes of the scene, and `end` to the displacement that the last colour shows, mm. */
+/* Append the patient with the lungs, the animations, the table and the arrow. Set `roots` to the
+ * root nodes of the scene, and `end` to the displacement at the end of the colour map, mm. */
 static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
   float q[4];
   const supine_status status = prepare(g, end, error);
@@ -96,8 +96,8 @@ static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *
   return g->status == SUPINE_OK ? SUPINE_OK : supine_error_set(error, g->status, "out of memory");
 }
 
-/* Build the file's JSON. A compressed file has a second buffer without data, as large as the
- * decoded arrays: the fallback that EXT_meshopt_compression describes. */
+/* Build the file's JSON. A compressed file has a second buffer, the fallback of
+ * EXT_meshopt_compression: it has the size of the decoded arrays, but no data. */
 static json_t *make_root(glb *g, size_t bytes, double end, json_t *roots) {
   static const char packed[] = "EXT_meshopt_compression";
   json_t *root =
@@ -152,7 +152,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   return status;
 }
 
-/* Build the chunks in memory, then write the file; set `total` to its size, bytes. */
+/* Build the chunks in memory, then write the file. Set `total` to the file's size, bytes. */
 static supine_status make_and_write(glb *g, const char *path, size_t *total, supine_error *error) {
   char *numbers = NULL;
   size_t bytes = 0;
@@ -172,7 +172,7 @@ static supine_status make_and_write(glb *g, const char *path, size_t *total, sup
     char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9));
     status = text == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: out of memory", path)
                           : write_file(path, text, numbers, bytes, total, error);
-    free(text); /* jansson's default allocator is malloc */
+    free(text); /* jansson allocates with malloc by default */
     json_decref(root);
   }
   free(numbers);

@@ -9,9 +9,9 @@
 #include "program/export/packed.h"
 #include "program/export/targets.h"
 
-/** Kinds of array, with their types in memory. Unless export_glb_options.plain is set, the file
- * holds positions and weights as 16-bit integers and normals as bytes, and meshes are compressed.
- */
+/** Kinds of array; each comment names the type in memory. In the file, unless
+ * export_glb_options.plain is set, positions and weights are 16-bit integers, normals are bytes,
+ * and meshes are compressed. */
 typedef enum glb_kind {
   GLB_CORNERS,  /**< uint32_t: vertex indices, three for each triangle */
   GLB_PLACES,   /**< float [3]: positions or displacements in units of glb.step */
@@ -28,52 +28,53 @@ typedef struct glb {
   const export_source *source;
   const export_glb_options *options;
   export_targets targets;
-  export_order order; /**< order in which vertices and triangles are written */
-  float *xyz;         /**< [N, 3] workspace */
-  float *normals;     /**< [N, 3] unit normals of the base mesh */
-  float *added;       /**< [targets, N, 3] vectors that targets add to the normals at weight 1 */
-  uint8_t *colours;   /**< [N, 4] linear RGBA of vertices */
-  double step;        /**< unit of GLB_PLACES, mm; 1 if options->plain */
+  export_order order;
+  float *xyz;       /**< [N, 3] workspace */
+  float *normals;   /**< [N, 3] unit normals of the base mesh */
+  float *added;     /**< [targets, N, 3] vectors that targets add to the normals at weight 1 */
+  uint8_t *colours; /**< [N, 4] linear RGBA of vertices */
+  double step;      /**< unit of GLB_PLACES, mm; 1 if options->plain */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
-  FILE *numbers;        /**< binary chunk, in memory */
+  FILE *numbers;        /**< binary chunk */
   size_t unpacked;      /**< size of the compressed arrays after decoding, bytes */
   supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */
 } glb;
 
 /** Append an array of `count` rows and return the index of its accessor.
- * @param order  [count] index in `rows` of each row to write; NULL: 0, 1, 2, ... */
+ * @param order  [count] indices of the rows to append; NULL if they are 0, 1, 2, ... */
 json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
                                  size_t count);
 
-/** Append an accessor of `count` rows of zeros, which the file does not store; return its index. */
+/** Append an accessor of `count` zero rows, which the file does not store; return its index. */
 json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 
-/** Append a mesh and a node that shows it; return the node's index. Positions of the mesh are LPS
- * from the centre of the lungs, in units of glb.step; the node converts them to metres, y up.
- * @param mesh  becomes part of `g`, which frees it */
+/** Append a mesh and a node that shows it; return the node's index. Positions of the mesh are in
+ * LPS axes, relative to the centre of the lungs, in units of glb.step. The node converts them to
+ * metres with y up.
+ * @param mesh  `g` takes ownership */
 json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
 
-/** Append the mesh of a lung, with morph targets; return its node's index. */
+/** Append the mesh of a lung, with morph targets; return the index of its node. */
 json_int_t supine_export_glb_add(glb *g, size_t lung);
 
 /** Append a material and return its index. */
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
-/** Return the extras of the file, which say how weights follow from gravity and volume.
- * @param end  displacement that the last colour shows, mm */
+/** Return the extras of the file, which say how to compute weights from gravity and volume.
+ * @param end  displacement at the end of the colour map, mm */
 json_t *supine_export_glb_extras(const glb *g, double end);
 
 /** Return the extras of a lung's mesh: its constants in the formulas of the file's extras. */
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
 
-/** Compute the rotation of the node "patient" as a quaternion x, y, z, w: lying down, and turned
- * about the body's long axis by `roll` radians: 0 is supine, pi / 2 is on the left side. */
+/** Compute the rotation of the node "patient" as a quaternion x, y, z, w. The patient lies on the
+ * table, turned about the body's long axis by `roll` radians: 0 is supine, pi / 2 the left side. */
 void supine_export_glb_rotation(double roll, float q[4]);
 
-/** Append the animations. The patient must be node 0, and lung i node 1 + i. */
+/** Append the animations. Node 0 must be the patient, and node 1 + i must be lung i. */
 void supine_export_glb_animate(glb *g);
 
-/** Append a table and an arrow that shows gravity; return the root nodes of the scene: the patient,
+/** Append a table and an arrow that shows gravity. Return the root nodes of the scene: the patient,
  * the table and the arrow. */
 json_t *supine_export_glb_room(glb *g);
 

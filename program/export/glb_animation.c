@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Append animations: breathing while the patient turns about the long axis, and breathing in each
- * lying posture; gravity stays down. */
+/* Append animations of breathing: one while the patient turns about the long axis, and one in each
+ * lying posture. Gravity always points down. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -20,22 +20,22 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the roll at a time of the animation, radians: the patient stays in each posture for half
- * of SECONDS, then turns to the next one in the other half. */
+/* Return the roll at a time of the animation, radians. Of the SECONDS of each posture, the patient
+ * stays in it for the first half and turns to the next posture in the second half. */
 static double roll_at(double seconds) {
   const double stage = floor(seconds / SECONDS);
   const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
   return pi / 2 * (stage + x * x * (3 - 2 * x));
 }
 
-/* Compute the weights of all lungs in one frame, `seconds` after the start of a breath. `rows`
- * points to the frame's row of the first lung in an array [lungs, frames, targets]. */
+/* Compute the weights of all lungs in one frame, `seconds` after the start of a breath. They belong
+ * in an array [lungs, frames, targets], in which `rows` points to this frame of lung 0. */
 static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
   const double gravity[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
   double weights[EXPORT_TARGETS_MAX];
   supine_pose pose;
-  /* No failure is expected: supine_export_targets_choose reached both ends of the breath. */
+  /* No failure is expected: supine_export_targets_choose has posed both ends of the breath. */
   (void)supine_export_breath_pose(g->source, g->options->breath, gravity, fraction, &pose, NULL);
   for (size_t i = 0; i < g->source->info->lung_count; ++i) {
     supine_export_targets_weights(g->source, &g->targets, &pose, i, weights);
@@ -45,7 +45,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   }
 }
 
-/* Append an animation of breathing at `roll` radians; NAN means while the patient turns around. */
+/* Append an animation of breathing at `roll` radians, or during a full turn if `roll` is NAN. */
 static void add(glb *g, const char *name, double roll, size_t seconds) {
   const size_t count = g->source->info->lung_count;
   const size_t frames = RATE * seconds + 1;

@@ -14,8 +14,8 @@ typedef struct layout {
   size_t columns;
   size_t stride; /* bytes per row */
   int component; /* componentType of the accessor */
-  int limit;     /* largest integer that a column may hold; 0: rows are stored as they are */
-  int target;    /* `target` of the buffer view; 0: none */
+  int limit;     /* largest integer to store; 0 if rows are not converted to integers */
+  int target;    /* `target` of the buffer view; 0 if it has none */
 } layout;
 
 static layout layout_of(const glb *g, glb_kind kind) {
@@ -43,7 +43,7 @@ static layout layout_of(const glb *g, glb_kind kind) {
   }
 }
 
-/* Return the rows in the format of the file, to be freed by the caller; NULL if out of memory. */
+/* Return the rows in the format of the file; NULL if out of memory. The caller frees them. */
 static unsigned char *store(glb_kind kind, const layout *l, const void *rows, const uint32_t *order,
                             size_t count) {
   unsigned char *stored = calloc(count + 1, l->stride);
@@ -63,14 +63,14 @@ static unsigned char *store(glb_kind kind, const layout *l, const void *rows, co
       const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
       const double value = (double)values[k] * (kind == GLB_PLACES ? 1 : l->limit);
       const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
-      memcpy(row + k * bytes, &counts, bytes); /* the low bytes, on a little-endian machine */
+      memcpy(row + k * bytes, &counts, bytes); /* the low bytes: the machine is little-endian */
     }
   }
   return stored;
 }
 
-/* Write stored rows and return their buffer view. `mode` is that of EXT_meshopt_compression; NULL
- * stores the rows without compression. */
+/* Write stored rows and return their buffer view. `mode` is the mode of EXT_meshopt_compression, or
+ * NULL for no compression. */
 static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned char *stored,
                           size_t count, const char *mode) {
   const size_t bytes = count * l->stride;

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Write the extras of a glTF file: formulas and constants to compute the weights of targets. */
 #include <math.h>
-#include <stdio.h>
-#include <string.h>
+#include <stdlib.h>
 
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-/* Largest number of targets with volume formulas; more formulas would be larger than the mesh. */
+/* With more targets, the extras omit the constants of the volume: K modes need K^3. */
 enum { FORMS_MAX = 32 };
 
 static const char frame_text[] =
@@ -64,7 +63,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* unit of the modes: integers are shorter text than fractions */
+  const double unit = 1e-7; /* modes are written as integers of this unit, to save text */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();

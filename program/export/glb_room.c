@@ -6,8 +6,8 @@
 
 enum { SIDES = 16, RINGS = 5 };
 
-/* Append a solid of revolution about the vertical axis, given by a profile of radii and heights,
- * mm, and return its node. It has no normals, so that engines shade each facet flat. */
+/* Append a solid of revolution about the vertical axis and return its node. `profile` has the
+ * radius and the height of each ring, mm. Without normals, engines shade each facet flat. */
 static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2], size_t sides,
                         const double rgb[3]) {
   float places[RINGS * SIDES][3];

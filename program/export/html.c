@@ -22,9 +22,9 @@ typedef struct page {
   const export_page *shown;
   double middle[3];   /* origin of stored positions: centre of the box of all vertices, mm */
   double place_unit;  /* unit of positions, mm */
-  double unit;        /* unit of the lungs' coefficients, for directions of length 1, mm */
+  double unit;        /* unit of the surface's coefficients, mm; directions are unit vectors */
   double inside_unit; /* unit of the coefficients of the content, mm */
-  export_order order; /* order in which the lungs' vertices and triangles are written */
+  export_order order; /* order of the surface's vertices and triangles */
   supine_status *status;
 } page;
 
@@ -84,17 +84,17 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* Divide a number between plus and minus 1 << bits by 1 << shift and round it; return the quotient
- * plus NORMAL_BIAS, so that numbers near 0 have the same high byte, which compresses well. */
+/* Divide a number between plus and minus 1 << bits by 1 << shift and round it. Add NORMAL_BIAS, so
+ * that numbers near 0 have the same high byte, which compresses well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
   const int32_t steps = (number + (1 << shift) / 2) >> shift;
   return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
-/* Fill a row with the normals of a vertex. Each word of supine_gl_pack_normals holds three numbers;
- * the row holds the first numbers of all words, then the second, then the third, without their
- * lowest 2, 2 and 1 bits (takeNormals in basis.js reads them). */
+/* Fill a row with the normals of a vertex: words of three numbers, from supine_gl_pack_normals. The
+ * row has the first numbers of all words, then the second, then the third ones, without their
+ * lowest 2, 2 and 1 bits. takeNormals in basis.js reads the row. */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
@@ -135,8 +135,8 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
   write_packed(p, file, name, status, packed);
 }
 
-/* Choose the origin and the units of the counts: units that keep positions to 0.02 mm, or larger
- * ones if a count would exceed COUNT_MAX. */
+/* Choose the origin and the units of the counts: units that place vertices within 0.02 mm, or
+ * larger units if a count would otherwise exceed COUNT_MAX. */
 static void find_units(page *p) {
   static const double step = 0.005;
   const export_source *s = p->source;
@@ -166,7 +166,7 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* Write those tensors of doubles that the basis has, without compression. */
+/* Write the tensors below, if the basis has them, without compression. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -201,7 +201,7 @@ static json_t *colours(void) {
   return maps;
 }
 
-/* Return `begin` as JSON: the first index of each lung, then the end. */
+/* Return `begin` as JSON: where each lung begins, then where the last one ends. */
 static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
   for (size_t i = 0; i <= s->info->lung_count; ++i) {
@@ -313,13 +313,15 @@ static void write_tensors(const void *context, const char *name, FILE *file) {
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error) {
   const supine_basis_info *info = source->info;
-  if (info->vector || info->mode_count > EXPORT_PAGE_MODES_MAX) {
-    return supine_error_set(
-        error, SUPINE_ERROR_UNSUPPORTED,
-        "a page shows a scalar basis of up to %d modes, not a %s basis of %zu mode%s: "
-        "%sexport .glb",
-        EXPORT_PAGE_MODES_MAX, info->vector ? "vector" : "scalar", info->mode_count,
-        info->mode_count == 1 ? "" : "s", info->vector ? "" : "precompute it with --modes 16, or ");
+  if (info->vector) {
+    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
+                            "a page cannot show a vector basis: export .glb");
+  }
+  if (info->mode_count > EXPORT_PAGE_MODES_MAX) {
+    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
+                            "a page shows up to %d modes, not %zu: precompute the basis with "
+                            "--modes %d, or export .glb",
+                            EXPORT_PAGE_MODES_MAX, info->mode_count, EXPORT_PAGE_MODES_MAX);
   }
   supine_status status = supine_export_pack_begin(error);
   page p = {.source = source, .shown = shown, .status = &status};

@@ -54,9 +54,9 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
   return SUPINE_OK;
 }
 
-/* Sort a lung's triangles from feet to head, then into strips, which run around the long axis:
- * neighbours in this direction differ least. `level` [N, 3] holds (z, 0, 0) of each vertex; `from`
- * [count] is workspace. */
+/* Sort a lung's triangles from feet to head, then into strips around the long axis, along which
+ * neighbours differ least. `level` [N, 3] holds (z, 0, 0) of each vertex; `from` [count] is
+ * workspace. */
 static void sort_triangles(uint32_t *corners, size_t count, const float *level, size_t vertices,
                            uint32_t *from) {
   memcpy(from, corners, count * sizeof *from);

@@ -3,16 +3,15 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "sh/base/vec3.h"
 
 enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
-/* Fraction of a weight's range that is added at both ends, for directions between the samples. */
+/* Part of a weight's range that is added at either end, for directions between the sampled ones. */
 static const double margin = 0.02;
 
-/* Find `split`, the s and t of the gains s + t bend[axis], from the axes with the least and the
- * largest bend. */
+/* Find s and t such that the gain along each axis is s + t bend[axis], from the axes with the least
+ * and the largest bend. Write them to `split`. */
 static void split_gains(const double bend[3], const double gains[3], double split[2]) {
   size_t low = 0;
   size_t high = 0;
@@ -24,7 +23,7 @@ static void split_gains(const double bend[3], const double gains[3], double spli
   split[0] = gains[low] - split[1] * bend[low];
 }
 
-/* Compute the amount of each of `count` fields of a lung: the field's gain times its weight. */
+/* Compute the amount of each field of a lung, which targets.h defines. */
 static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
                          size_t lung, double *amounts) {
   const size_t k = source->info->mode_count;
@@ -45,7 +44,7 @@ void supine_export_targets_weights(const export_source *source, const export_tar
 }
 
 /* Set the offset of each field to its smallest amount over all directions and volumes of a breath,
- * and its unit to the range of the amounts. Gains are monotonic in the volume, so that both ends of
+ * and its unit to the range of the amounts. Gains are monotonic in the volume, so the two ends of
  * the breath suffice. */
 static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {
@@ -152,8 +151,8 @@ static void find_normals(const export_source *source, const export_targets *targ
   supine_normals(source->basis, xyz, normals);
 }
 
-/* Scale the base normals to length 1, which glTF requires, and divide the vectors that targets add
- * by the same lengths: engines draw normalize(base + sum over j of weight_j added_j). */
+/* Scale the base normals to length 1, which glTF requires. Divide the vectors that targets add by
+ * the same lengths, because engines draw normalize(base + sum over j of weight_j added_j). */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
   static const double least = 0.2; /* smallest length to divide by, so that vectors stay short */
@@ -174,13 +173,13 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
-/* Round the vectors that targets add to normals to bytes, or to the vector of the previous vertex
- * in `order` if that is near, because equal rows compress to almost nothing. Correct the base so
- * that the normals at `weights` stay the same. */
+/* Round the vectors that targets add to normals to bytes. If a component is near that of the
+ * previous vertex in `order`, use that one, because equal rows compress to almost nothing. Correct
+ * the base so that the normals at `weights` stay the same. */
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
-  static const float near = 2; /* largest difference that counts as near, in units of a byte */
+  static const float near = 2; /* smaller differences count as near, in units of a byte */
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
@@ -208,7 +207,7 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2;    /* change of a weight for central differences */
-  static const double least = 0.044; /* least RMS change of normals kept, radians (2.5 degrees) */
+  static const double least = 0.044; /* smaller RMS changes of normals become 0, radians */
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

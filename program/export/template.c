@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 #include "program/export/template.h"
 
-#include <stdbool.h>
 #include <string.h>
 
 /* Return the asset whose name is the first `length` bytes of `name`, or NULL. */

@@ -17,10 +17,10 @@
 
 #include <jansson.h>
 
-/** A file that the CMake function supine_embed puts into the program. The last element of an array
- * has name NULL. */
+/** A file that the CMake function supine_embed puts into the program. An array of assets ends with
+ * the name NULL. */
 typedef struct supine_asset {
-  const char *name;  /**< name of the file, for example "page.css" */
+  const char *name;  /**< for example "page.css" */
   const char *bytes; /**< content, followed by a zero that `size` does not count */
   size_t size;
 } supine_asset;
@@ -29,13 +29,13 @@ typedef struct supine_asset {
 typedef struct supine_template {
   const supine_asset *assets;
   const json_t *data;
-  /** Write the text of a tag whose name is neither data nor an asset; NULL: write nothing. */
+  /** Write the text of a tag whose name is neither data nor an asset; NULL writes nothing. */
   void (*write)(const void *context, const char *name, FILE *file);
   const void *context;
 } supine_template;
 
-/** Write the asset `name` with its tags filled. An unknown name writes nothing; supine_embed
- * refuses unknown names when the program is built. Write errors stay in the stream. */
+/** Write the asset `name` with its tags filled. Unknown names write nothing; supine_embed refuses
+ * them when the program is built. A write error sets the error indicator of `file`. */
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
 
 /** Return `count` numbers as a JSON array. */

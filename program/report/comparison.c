@@ -27,9 +27,11 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   if (status != SUPINE_OK) {
     return status;
   }
+  double total = 0.0;
   supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     posture->gain[lung] -= posture->volume[lung];
+    total += posture->gain[lung];
   }
   supine_deform(c->basis, &posture->pose, xyz[0]);
   supine_deform(c->basis, &after, xyz[1]);
@@ -38,6 +40,11 @@ static supine_status find_breath(const supine_comparison *c, const supine_postur
   for (size_t i = 0; status == SUPINE_OK && i < info->lung_count * SUPINE_COMPARISON_SLABS; ++i) {
     posture->slab[i % SUPINE_COMPARISON_SLABS].volume += slabs[i].volume;
     posture->slab[i % SUPINE_COMPARISON_SLABS].gain += slabs[i].gain;
+  }
+  for (size_t i = 0; i < SUPINE_COMPARISON_SLABS; ++i) {
+    const supine_slab *slab = &posture->slab[i];
+    posture->expansion[i] = slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
+    posture->share[i] = total != 0.0 ? slab->gain / total : 0.0;
   }
   return status;
 }

@@ -15,29 +15,31 @@ enum { SUPINE_COMPARISON_SLABS = 10 };
 /* Results for one posture. */
 typedef struct supine_compared_posture {
   supine_pose pose;
-  supine_distance_statistics displacement; /* displacement from the reference pose, mm */
-  double expected_error;           /* expected error of the displacement, mm RMS; 0 if unknown */
-  double volume[SUPINE_LUNGS_MAX]; /* volume of each lung, gas and tissue, mL */
-  double gain[SUPINE_LUNGS_MAX];   /* volume that each lung gains in the breath, mL */
+  supine_distance_statistics displacement;   /* displacement from the reference pose, mm */
+  double expected_error;                     /* of the displacement, mm RMS; 0 if unknown */
+  double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
+  double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
   supine_slab slab[SUPINE_COMPARISON_SLABS]; /* slabs of all lungs together, uppermost first */
+  double expansion[SUPINE_COMPARISON_SLABS]; /* gain of each slab divided by its volume */
+  double share[SUPINE_COMPARISON_SLABS];     /* gain of each slab divided by that of all lungs */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
-  const char *path;    /* file of the basis */
-  const char *command; /* name of the command, for its messages */
+  const char *path;    /* basis file */
+  const char *command; /* command to name in messages */
   const char *made_by; /* command line, which the report prints */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* supine at the volume at which all postures are compared */
+  supine_state state; /* supine; all postures have the volume of this state */
   supine_from from;
   double breath; /* volume that a breath adds, mL */
   supine_posture_list postures;
   supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;
-  supine_compared_posture *posture; /* [postures.count] results */
-  size_t directions;                /* number of sampled directions, without those out of reach */
-  double farthest[3];               /* unit vector of gravity farthest from supine */
-  double farthest_rms;              /* RMS distance of `farthest` from supine, mm */
+  supine_compared_posture *posture; /* [postures.count] */
+  size_t directions;                /* number of sampled directions where the volume is in reach */
+  double farthest[3];               /* direction of gravity that differs most from supine */
+  double farthest_rms;              /* supine_report_from_supine(farthest), mm */
 } supine_comparison;
 
 /* Compute `reference` and the members after it. Free them with supine_report_free, also after a
@@ -50,21 +52,21 @@ void supine_report_free(supine_comparison *comparison);
 /* Write the volume of the comparison to `text`, for example "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
-/* Return the RMS distance of the surface between a direction of gravity and supine, both at the
- * volume of the comparison, mm; NaN if the lungs cannot reach that volume. */
+/* Return the RMS distance of the surface from its supine position, mm, for a direction of gravity
+ * and the volume of the comparison; NaN if the lungs cannot reach that volume. */
 double supine_report_from_supine(const supine_comparison *comparison, const double gravity[3]);
 
 /* Return whether the expected error of any posture is known. */
 bool supine_report_has_errors(const supine_comparison *comparison);
 
-/* Return the volume that all lungs together gain in the breath in a posture, mL. */
+/* Return the volume by which a breath in a posture expands all lungs together, mL. */
 double supine_report_gain(const supine_comparison *comparison, size_t posture);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);
 
 /* Print the comparison as HTML. If pictures cannot be drawn, the page states the reason in their
- * place. Write errors stay in the stream.
+ * place. A write error sets the error indicator of `file`.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
                                  supine_error *error);

@@ -2,7 +2,6 @@
 /* Build the charts of the report: coordinates of lines, dots and cells for the templates
  * profile.html and map.html. */
 #include <math.h>
-#include <string.h>
 
 #include <supine/posture.h>
 
@@ -14,16 +13,9 @@
 static const double pi = 3.14159265358979323846;
 
 /* Return the value that a profile shows for a slab, %. */
-typedef double slab_value(const supine_comparison *c, size_t posture, size_t slab);
-
-static double expansion(const supine_comparison *c, size_t posture, size_t slab) {
-  const supine_slab *s = &c->posture[posture].slab[slab];
-  return s->volume > 0.0 ? 100.0 * s->gain / s->volume : 0.0;
-}
-
-static double share(const supine_comparison *c, size_t posture, size_t slab) {
-  const double gain = supine_report_gain(c, posture);
-  return gain != 0.0 ? 100.0 * c->posture[posture].slab[slab].gain / gain : 0.0;
+static double percent(const supine_comparison *c, bool share, size_t posture, size_t slab) {
+  const supine_compared_posture *p = &c->posture[posture];
+  return 100.0 * (share ? p->share : p->expansion)[slab];
 }
 
 /* Box of the plot in profile.html, SVG units. */
@@ -37,14 +29,13 @@ static double down(double height) {
   return BOTTOM - (BOTTOM - TOP) * height / 100.0;
 }
 
-static json_t *profile(const supine_comparison *c, const char *axis, bool of_breath,
-                       slab_value *value) {
+static json_t *profile(const supine_comparison *c, const char *axis, bool share) {
   double low = 0.0;
   double high = 0.0;
   for (size_t i = 0; i < c->postures.count; ++i) {
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
-      low = fmin(low, value(c, i, s));
-      high = fmax(high, value(c, i, s));
+      low = fmin(low, percent(c, share, i, s));
+      high = fmax(high, percent(c, share, i, s));
     }
   }
   const double step = supine_render_bar_step(high - low);
@@ -60,11 +51,11 @@ static json_t *profile(const supine_comparison *c, const char *axis, bool of_bre
   for (size_t i = 0; i < c->postures.count; ++i) {
     json_t *dots = json_array();
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
+      const double value = percent(c, share, i, s);
       (void)json_array_append_new(
-          dots,
-          json_pack("{s:o, s:o, s:o}", "x", json_sprintf("%.1f", across(value(c, i, s), low, high)),
-                    "y", json_sprintf("%.1f", down(95.0 - 10.0 * (double)s)), "value",
-                    json_sprintf("%.2f", value(c, i, s))));
+          dots, json_pack("{s:o, s:o, s:o}", "x", json_sprintf("%.1f", across(value, low, high)),
+                          "y", json_sprintf("%.1f", down(95.0 - 10.0 * (double)s)), "value",
+                          json_sprintf("%.2f", value)));
     }
     (void)json_array_append_new(
         lines, json_pack("{s:s, s:s, s:b, s:o}", "line", supine_report_line(i), "name",
@@ -72,12 +63,12 @@ static json_t *profile(const supine_comparison *c, const char *axis, bool of_bre
                          (int)(i >= 7), "dots", dots));
   }
   return json_pack("{s:s, s:o, s:o, s:o}", "axis", axis, "title",
-                   supine_report_profile_finding(c, of_breath), "ticks", ticks, "lines", lines);
+                   supine_report_profile_finding(c, share), "ticks", ticks, "lines", lines);
 }
 
 json_t *supine_report_profiles(const supine_comparison *c) {
-  return json_pack("[o, o]", profile(c, "regional expansion, %", false, expansion),
-                   profile(c, "share of the volume gained, %", true, share));
+  return json_pack("[o, o]", profile(c, "regional expansion, %", false),
+                   profile(c, "share of the volume gained, %", true));
 }
 
 /* Numbers of cells of the map; side of a cell and position of the map in map.html, SVG units. */
@@ -135,13 +126,13 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    /* Of equally near postures, keep the first: names precede their DICOM codes. */
+    /* If two are equally near, keep the first: a name precedes its DICOM code. */
     if (cosine > nearest + 1e-9) {
       nearest = cosine;
       name = supine_posture_name(i);
     }
   }
-  const double degrees = acos(fmin(1.0, nearest)) * 180.0 / acos(-1.0);
+  const double degrees = acos(fmin(1.0, nearest)) * 180.0 / pi;
   if (degrees < 0.5) {
     return json_string(name);
   }

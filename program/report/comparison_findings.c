@@ -7,7 +7,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* Published values, each for the table row of its posture; report.html names the sources. */
+/* Published values for rows of the table of postures; report.html names their sources. */
 static const struct {
   const char *posture, *words;
 } published[] = {
@@ -52,8 +52,8 @@ static void print_where(const char *name, FILE *to) {
   }
 }
 
-/* Print a sentence on a posture: the change of volume of each lung, the largest first, and the mean
- * and the largest displacement. */
+/* Print a sentence on a posture: the change of volume of each lung, beginning with the largest
+ * change, and the mean and the largest displacement. */
 static void print_finding(const supine_comparison *c, size_t posture, FILE *to) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   double percent[SUPINE_LUNGS_MAX];
@@ -106,7 +106,7 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a profile: a heading, then name and value of the postures 0 to `last`. */
+/* Print the title of a profile: a heading, and the name and value of each posture up to `last`. */
 static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
   (void)fputs(share ? "Share of the lower half in a breath:"
                     : "Expansion of the lowest 30 % of the height over that of the uppermost:",

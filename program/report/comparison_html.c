@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Print a comparison as one self-contained HTML file by filling report.html. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -51,9 +50,8 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
   add_fact(list, "basis", json_incref(file));
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
     const char *value = supine_basis_metadata(c->basis, keys[i]);
-    json_t *text = value == NULL ? NULL : json_string(value);
-    if (text != NULL) { /* a value that is not UTF-8 gives NULL */
-      add_fact(list, keys[i], text);
+    if (value != NULL) {
+      add_fact(list, keys[i], json_string(value));
     }
   }
   return list;

@@ -5,7 +5,7 @@
 
 #include "program/report/comparison_parts.h"
 
-/* A slice, seen from the feet or from the front: the patient's x points right in its picture. */
+/* A slice, seen from the feet or from the front: the patient's left is on the right. */
 typedef struct slice {
   const char *name;
   size_t axis;     /* axis normal to the slice */
@@ -27,12 +27,13 @@ static void cross(const slice *s, double at, const float *a, const float *b, dou
   point[1] = s->sign * ((double)a[v] + t * ((double)b[v] - (double)a[v]));
 }
 
-/* Print the outline as an SVG path, a line for each triangle; return the area inside it, mm^2. */
+/* Print the outline as an SVG path, with a line for each triangle that the plane crosses. Return
+ * the area inside the outline, mm^2. */
 static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
                     FILE *path) {
   double twice = 0;
   for (size_t t = 0; t < info->triangle_count; ++t) {
-    double up[2] = {NAN, NAN}; /* where the triangle's boundary rises through the plane */
+    double up[2] = {NAN, NAN}; /* point where the triangle's boundary rises through the plane */
     double down[2] = {0, 0};
     for (size_t i = 0; i < 3; ++i) {
       const float *a = xyz + 3 * (size_t)info->triangles[3 * t + i];

@@ -38,9 +38,9 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
   return made;
 }
 
-/* Add gravity to the data of a picture. If it lies nearly in the picture: {{along}}, its direction
- * in degrees clockwise from the right, and {{turn}}, the rotation in degrees that makes it point
- * down. Else {{towards}} or {{away}}: it points towards the viewer or away. */
+/* Add gravity to the data of a picture. {{along}} is its direction in the picture, in degrees
+ * clockwise from the right, and {{turn}} the rotation in degrees that makes it point down. If
+ * gravity is almost normal to the picture, add {{towards}} or {{away}} (the viewer) instead. */
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};

@@ -20,16 +20,12 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
   return list;
 }
 
-/* Return a slab of a posture as JSON. Its expansion is its gain divided by its volume before the
- * breath, its share the gain divided by the volume of the breath. */
-static json_t *encode_slab(const supine_comparison *c, size_t posture, size_t s) {
-  const supine_slab *slab = &c->posture[posture].slab[s];
+static json_t *encode_slab(const supine_compared_posture *posture, size_t s) {
+  const supine_slab *slab = &posture->slab[s];
   const double thickness = 1.0 / SUPINE_COMPARISON_SLABS;
-  const double total = supine_report_gain(c, posture);
   return json_pack("{s:[f, f], s:f, s:f, s:f, s:f}", "height", 1.0 - thickness * (double)(s + 1),
                    1.0 - thickness * (double)s, "volume_ml", slab->volume, "gain_ml", slab->gain,
-                   "expansion", slab->volume > 0.0 ? slab->gain / slab->volume : 0.0, "share",
-                   total != 0.0 ? slab->gain / total : 0.0);
+                   "expansion", posture->expansion[s], "share", posture->share[s]);
 }
 
 static json_t *encode_postures(const supine_comparison *c) {
@@ -45,7 +41,7 @@ static json_t *encode_postures(const supine_comparison *c) {
     }
     json_t *slabs = json_array();
     for (size_t s = 0; s < SUPINE_COMPARISON_SLABS; ++s) {
-      (void)json_array_append_new(slabs, encode_slab(c, i, s));
+      (void)json_array_append_new(slabs, encode_slab(&c->posture[i], s));
     }
     (void)json_object_set_new(posture, "volume_ml", by_lung(c, c->posture[i].volume));
     (void)json_object_set_new(posture, "gain_ml", by_lung(c, c->posture[i].gain));
@@ -55,12 +51,12 @@ static json_t *encode_postures(const supine_comparison *c) {
   return list;
 }
 
-/* Append a row to the table `heading` of `tables`: `value` in the column `name`, then the columns
- * `members`, which are freed. */
+/* Append a row to the table named `heading`: `value` in the column `name`, then `columns`,
+ * which the function frees. */
 static void add_row(json_t *tables, const char *heading, const char *name, const char *value,
-                    json_t *members) {
+                    json_t *columns) {
   json_t *row = json_pack("{s:s}", name, value);
-  (void)json_object_update_new(row, members);
+  (void)json_object_update_new(row, columns);
   if (json_object_get(tables, heading) == NULL) {
     (void)json_object_set_new(tables, heading, json_array());
   }
@@ -88,12 +84,8 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
     for (size_t i = 0; i < c->postures.count; ++i) {
       const char *name = supine_options_posture_label(c->postures.item[i].name);
-      json_t *slab = encode_slab(c, i, s);
-      for (int k = 0; k < 2; ++k) {
-        const json_t *part = json_object_get(slab, k == 0 ? "expansion" : "share");
-        (void)json_object_set_new(values[k], name, json_real(100.0 * json_number_value(part)));
-      }
-      json_decref(slab);
+      (void)json_object_set_new(values[0], name, json_real(100.0 * c->posture[i].expansion[s]));
+      (void)json_object_set_new(values[1], name, json_real(100.0 * c->posture[i].share[s]));
     }
     add_row(text, "regional expansion by height along gravity, % of the volume before the breath",
             "height, %", height, values[0]);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the errors of law and kriging at held-out points: for five people, predict the
- * displacements of all landmarks from those of ten, from exhaled to inhaled and in the opposite
- * direction. Print the RMS errors in mm and the percentage of points within the 95 % band, then the
- * time that the run-time library needs for a surface.
+/* Measure the errors of law and kriging at held-out points. For each of five people, predict the
+ * displacements of all landmarks from those of ten landmarks, from exhaled to inhaled and in the
+ * opposite direction. Print the RMS errors in mm and the percentage of points within the 95 % band,
+ * then the time that the run-time library needs for a surface.
  *
  *     bench_locate [FOLDER OF LANDMARKS]
  *
@@ -31,7 +31,7 @@ enum { PEOPLE = 5, POINTS_MAX = 128, DRAWN = 10, DRAWS = 40, STEPS = 4 };
 static const double spread = 0.3; /* prior standard deviation of the scale, relative to its mean */
 
 typedef struct person {
-  size_t count; /* number of landmarks, n */
+  size_t count; /* number n of landmarks */
   /* [n, 3] positions before the motion, displacements, and displacements by the law at scale 1,
    * mm */
   double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
@@ -46,8 +46,8 @@ static void need(supine_status status, const supine_error *error) {
   }
 }
 
-/* Compute the displacements of points in supine lungs by the law, and store them for the landmarks
- * of the same index. The bounding box of the points stands for that of the lungs. */
+/* Compute the displacements of `points`, one for each landmark, in supine lungs by the law, and
+ * store them in `p->law`. The bounding box of the points is used as that of the lungs. */
 static void find_law(person *p, const double *points) {
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const double *c = model.direction.c;
@@ -123,8 +123,8 @@ static double best_scale(const person *p) {
   return lu / ll;
 }
 
-/* Evaluate the law at the inhaled position of each landmark. The law displaces the inhaled position
- * p to the exhaled one x: solve p - scale * law(p) = x by iteration from x. */
+/* Evaluate the law at the inhaled position p of each landmark. The law displaces p to the exhaled
+ * position x: solve p - scale * law(p) = x by iteration from p = x. */
 static void find_law_at_inhaled(person *p, double scale) {
   double full[3 * POINTS_MAX];
   for (int step = 0; step < 30; ++step) {
@@ -157,7 +157,7 @@ typedef struct sums {
   double stated;   /* variances stated by kriging, mm^2 */
   double points;   /* number of held-out points */
   double held;     /* number of held-out points within the 95 % band */
-  double left_out; /* number of observed points judged as outliers */
+  double left_out; /* number of observed points judged to be outliers */
   double judged;   /* number of observed points */
 } sums;
 

@@ -3,11 +3,11 @@
 //
 //     node tests/bench/bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]
 //
-// Needs playwright-core (npm install in tests/export, or in the folder of the environment variable MODULES). The FLAGs
-// of Chromium choose the renderer: without any, software; for a graphics card, --enable-gpu and --use-angle=gl or
-// --use-angle=vulkan. "still" draws the surface without deforming it, as a viewer of a mesh of as many triangles would;
-// "turning" is a frame in which the patient turns: weights, positions, normals and drawing; "script" is the part of
-// such a frame that the CPU computes. The ratio turning / still is the cost of deforming relative to drawing.
+// Needs playwright-core (npm install in tests/export, or in the folder of the environment variable MODULES). Chromium
+// draws in software unless FLAGs choose a graphics card: --enable-gpu and --use-angle=gl or --use-angle=vulkan.
+// "still" draws the surface without deforming it, like a viewer of a mesh of as many triangles. "turning" is a frame
+// in which the patient turns: weights, positions, normals and drawing. "script" is the part of this frame that the CPU
+// computes. The ratio turning / still is the cost of deforming relative to drawing.
 import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
@@ -48,7 +48,7 @@ const found = await page.evaluate(() => {
     turning: () => { weights(); picture.deform('now', state.moment); picture.draw(panes()); },
   };
   const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
-  const some = 20; // frames per measurement, as the clock of a browser has steps of 0.1 ms
+  const some = 20; // frames per measurement, because the clock of a browser has steps of 0.1 ms
   for (let i = 0; i < 60; ++i) { // 1200 frames, so that the script is compiled and optimised
     const begin = performance.now();
     for (let j = 0; j < some; ++j) {

@@ -16,7 +16,7 @@ reference, path = sys.argv[1:3]
 lungs = supine.open(path)
 pose = lungs.pose("prone")
 points = np.empty((lungs.vertex_count, 3), np.float32)
-CALLS = 20000  # as in tests/python/reference.c
+CALLS = 20000  # like tests/python/reference.c
 calls = {"deform into an array": lambda: lungs.deform(pose, points),
          "deform into a new array": lambda: lungs.deform(pose)}
 fastest = dict.fromkeys(calls, float("inf"))

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare the speed of the evaluation with OpenBLAS and plain loops, by alternating runs in one
+/* Compare the speed of the run-time library with OpenBLAS and plain loops, which take turns in one
  * process.
  *
  *     OPENBLAS_CORETYPE=SAPPHIRERAPIDS bench_runtime [VERTICES | BASIS]...
  *
- * A number makes a random basis of that many vertices, with 16 modes and 6 modes of normals. Each
- * entry is the fastest of nine runs. OpenBLAS 0.3.21 does not recognise newer processors;
- * OPENBLAS_CORETYPE names one whose kernels it has. */
+ * VERTICES is the number of vertices of a random basis with 16 modes and 6 modes of normals. Each
+ * entry is the fastest of nine runs. OpenBLAS 0.3.21 does not recognise newer processors, so that
+ * OPENBLAS_CORETYPE must name a processor whose kernels it has. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -33,15 +33,14 @@ void openblas_set_num_threads(int threads);
 typedef struct bench {
   const supine_basis_info *info;
   supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis in each storage */
-  supine_basis
-      *simd[SUPINE_SIMD_COUNT]; /* 16-bit basis for each instruction set, NULL if not available */
+  supine_basis *simd[SUPINE_SIMD_COUNT];       /* in 16 bits; NULL if the set is not available */
   supine_pose pose;
   float weights[SUPINE_MODES_MAX]; /* [K] weights of the modes, times the gain */
   float *xyz, *normals;            /* [N, 3] positions, mm, and normals */
   float *amount;                   /* [N] displacement along the direction, mm */
   float *columns;                  /* [K, N] coefficients, mode by mode */
   int16_t *counts;                 /* [K, N] coefficients as 16-bit counts */
-  float units[SUPINE_MODES_MAX];   /* [K] size of one count in mm, times the weight of the mode */
+  float units[SUPINE_MODES_MAX];   /* [K] unit of the counts, mm, times the weight of the mode */
 } bench;
 
 typedef struct entry {
@@ -74,7 +73,7 @@ static void run_lit(void *context, size_t begin, size_t end, size_t thread) {
                                 e->work->normals + 3 * begin);
 }
 
-/* Compute all normals from the triangles, in one thread, as supine_normals takes no range. */
+/* Compute all normals from the triangles in one thread, because supine_normals takes no range. */
 static void run_exact_normals(void *context, size_t begin, size_t end, size_t thread) {
   const entry *e = context;
   (void)begin, (void)end, (void)thread;
@@ -111,7 +110,7 @@ static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   for (size_t i = begin; i < end; ++i) {
     const float *c = m->coefficients + i * m->mode_count;
     float amount = 0;
-    if (m->mode_count == 16) { /* a constant, so that the compiler unrolls the loop */
+    if (m->mode_count == 16) { /* the compiler unrolls a loop with a constant count */
       for (size_t k = 0; k < 16; ++k) {
         amount += w[k] * c[k];
       }
@@ -137,7 +136,7 @@ static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t th
   displace(work, begin, end);
 }
 
-enum { BLOCK = 16384 }; /* number of vertices whose sums stay in the second-level cache */
+enum { BLOCK = 16384 }; /* number of vertices whose sums fit in the second-level cache */
 
 /* Add mode k to the sums of vertices begin <= i < end. */
 typedef void add_mode(const bench *work, size_t k, size_t begin, size_t end);
@@ -277,7 +276,7 @@ static size_t add_entries(bench *work, entry *entries) {
   return count;
 }
 
-/* Measure all entries several times, each time beginning with another entry. */
+/* Measure all entries several times, beginning with another entry each time. */
 static void measure(entry *entries, size_t count, size_t vertices) {
   const size_t rounds = 1 + ENOUGH / vertices;
   for (size_t turn = 0; turn < REPEATS; ++turn) {

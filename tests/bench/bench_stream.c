@@ -4,17 +4,17 @@
  *
  *     bench_stream SUPINE BASIS [SECONDS [WHAT...]]
  *
- * This program sends 66.66 poses a second, as a tracker does, to a server on the same machine, and
- * receives weights, points or surfaces (WHAT). Print one row for each, and below it one for a bare
- * server that sends messages of the same size without any computation:
- * - number of poses sent, and of poses answered by a frame
- * - "old": number of frames of a pose that was no longer the newest when their last byte arrived
- * - "oldest": largest number of poses sent since the pose of a frame
+ * This program sends 66.66 poses a second, like a tracker, to a server on the same machine, and
+ * receives frames of weights, points or surfaces (WHAT). Print a row for each kind, and below it a
+ * row for a server that sends messages of the same size without any computation. A row has
+ * - the number of poses sent, and of frames received
+ * - "old": number of frames that ended after a newer pose was sent
+ * - "oldest": largest number of newer poses sent before the end of a frame
  * - median, 99th percentile and maximum of the time from the first byte of a pose sent to the last
  *   byte of its frame received, ms
  * - memory of the server after 1 s and at the end, KiB
- * - "holds" if no pose was older than one frame and 99 % of the frames came in time: weights within
- *   2 ms, points and surfaces within 15 ms; else "misses" */
+ * - "holds" if "oldest" is at most 1 and 99 % of the frames came in time, weights within 2 ms,
+ *   points and surfaces within 15 ms; otherwise "misses" */
 #include <arpa/inet.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -67,8 +67,8 @@ static int serve(const char *supine, const char *basis, const char *what, pid_t 
   return port;
 }
 
-/* Start a server that answers each pose by a message of `size` bytes without any computation, the
- * least time that a frame of this size can take; return its port, or 0 on failure. */
+/* Start a server that answers each pose by a message of `size` bytes without any computation. No
+ * frame of this size can take less time. Return its port, or 0 on failure. */
 static int serve_bare(size_t size, pid_t *server) {
   struct sockaddr_in here = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
   socklen_t length = sizeof here;
@@ -133,7 +133,7 @@ static int dial(int port) {
  * minute. */
 static void make_pose(double time, uint64_t stamp, unsigned char bytes[POSE_SIZE]) {
   const double angle = time * (2.0 * M_PI / 30.0);
-  /* The columns of the rotation: the directions of left, back and head. */
+  /* columns of the rotation: directions of left, back and head */
   float columns[12] = {
       (float)cos(angle), 0, (float)-sin(angle), (float)-sin(angle), 0, (float)-cos(angle), 0, 1, 0};
   unsigned char *body = bytes + SUPINE_STREAM_HEADER;
@@ -153,12 +153,12 @@ static int compare(const void *a, const void *b) {
 }
 
 typedef struct tally {
-  double *sent;           /* [poses] time at which each pose was sent, s; the stamps begin at 1 */
+  double *sent;           /* [poses] time at which the pose with stamp index + 1 was sent, s */
   double *latency;        /* [answered] time from sending a pose to receiving its frame, s */
   size_t poses, answered; /* number of poses sent, and of frames received */
-  size_t old;             /* number of frames whose pose was no longer the newest */
-  size_t oldest;          /* largest number of poses sent since the pose of a frame */
-  /* Bytes received of the current message, and its size as far as it is known. */
+  size_t old;             /* number of frames that ended after a newer pose was sent */
+  size_t oldest;          /* largest number of newer poses sent before the end of a frame */
+  /* Bytes of the current message: received, and expected (at first only the header). */
   size_t got, wanted;
   unsigned char head[SUPINE_STREAM_HEADER];
   supine_stream_header header;
@@ -200,8 +200,8 @@ static bool take(int s, tally *t) {
   }
 }
 
-/* Measure one kind of frame, and set `size` to the size of its message. If `size` is not 0, measure
- * messages of that size by the server without computation instead. */
+/* Measure one kind of frame, and set `size` to the size of its message. If `*size` is not 0,
+ * measure the server without computation instead, with messages of this size. */
 static int measure(const char *supine, const char *basis, const char *what, double seconds,
                    size_t *size) {
   pid_t server = 0;

@@ -55,9 +55,9 @@ static void end_figure(FILE *csv, const char *name, const char *commands) {
   (void)printf("%s/%s.csv%s\n", folder, name, code == 0 ? ", .png" : " (no PNG: install gnuplot)");
 }
 
-/* The convergence curve of one method. */
+/* Convergence curve of one method. */
 typedef struct curve {
-  FILE *csv; /* the file to which points are written */
+  FILE *csv; /* file for the points of the curve */
   const char *method;
   size_t count;        /* number of displacements */
   const double *exact; /* [count] exact displacements */
@@ -80,7 +80,7 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Draw Fig. 7, convergence. Work is measured in link visits, one from each end of a link. */
+/* Draw Fig. 7, convergence. Work is measured in link visits; both ends of a link visit it. */
 static void convergence(void) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;

@@ -6,16 +6,16 @@
                       [--stream path/to/bench_stream]
 
 The old version makes the inputs. Print the least wall and processor seconds and the largest memory
-of all rounds, and the ratios of new to old; count the bytes in which outputs differ, except
-compressed VTP. The library of a program is runtime/libsupine_runtime.so beside it. --stream adds
-the least median time from a pose sent to the last point received.
+of all rounds, and the ratios of new to old. Count the bytes in which outputs differ, except in
+compressed VTP. The library of a program is runtime/libsupine_runtime.so in its folder. --stream
+adds the least median time from sending a pose to receiving the last point.
 
 Expected differences from version 0.2.0:
-- deform --image, --labels: since a lung has a gain for each axis, products are rounded in another
-  order. Displacements differ by one unit in the last place (3e-5 mm), hence about 1 % of the voxels
-  of 16-bit noise by 1, and 5 of 65 million labels.
-- embed: the header's version and its place, and the checksum; in large grids also the last place of
-  one coefficient in 200,000, as the interpolation is factorised by Cholesky instead of LU.
+- deform --image, --labels: because a lung has a gain for each axis, products are rounded in another
+  order. Displacements differ by one unit in the last place (3e-5 mm). Therefore about 1 % of the
+  voxels of 16-bit noise differ by 1, and 5 of 65 million labels differ.
+- embed: the version in the header and its place, and the checksum. In large grids, one coefficient
+  in 200,000 differs in the last place, because Cholesky's factorisation replaced LU.
 - render: the processor draws instead of OpenGL, a grey shell shows opacity, and names changed."""
 import argparse
 import operator
@@ -70,7 +70,7 @@ def run(command):
 
 
 def count_differences(first, second):
-    """Count the unequal bytes of two files; a difference of size counts too."""
+    """Count the unequal bytes of two files. Bytes that only one file has count too."""
     count, step = abs(os.path.getsize(first) - os.path.getsize(second)), 1 << 20
     with open(first, "rb") as one, open(second, "rb") as other:
         while (a := one.read(step)) and (b := other.read(step)):
@@ -86,7 +86,7 @@ def compare(name, programs, arguments, rounds, output=None):
             wall, cpu, memory = run([program] + arguments)
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
-            if output is not None:  # both write to one name, as files contain the command line
+            if output is not None:  # both programs write to one name, because files contain the command line
                 os.replace(output, f"{which}-{output}")
     differing = 0 if output is None else count_differences("0-" + output, "1-" + output)
     old, new = best

@@ -23,14 +23,14 @@ import numpy as np
 POSTURES = ("supine", "prone", "left", "right", "upright", "inverted")
 FULL_DENSITY = 0.12  # g/mL at full inflation: 0.86 L of tissue (Denison 1986) in lungs of 7.2 L
 
-# Quantity, lower and upper end of its range (None: not checked), unit, published value.
+# Quantity, lower and upper end of its range (None if not checked), unit, published value.
 ROWS = (
-    ("thirds, supine", 1.6, 1.9, "", "1.75, supine (Sa 2010, n 8)"),
-    ("thirds, prone", 1.1, 1.3, "", "1.0 to 1.4"),
-    ("z share, supine", 0.58, 0.76, "", "0.63 (SD 0.11; Aliverti 2001, n 10)"),
-    ("z share, prone", 0.53, 0.70, "", "0.535 (SD 0.13; Aliverti 2001)"),
-    ("lower lung of a breath, left side", 51, 56, "%", "57.6 (SD 7.2; Volk 2011, n 10): missed"),
-    ("lower lung of a breath, right side", 57, 62, "%", "64.7 (SD 6.7; Volk 2011): missed"),
+    ("lowest / uppermost third, supine", 1.6, 1.9, "", "1.75, supine (Sa 2010, n 8)"),
+    ("lowest / uppermost third, prone", 1.1, 1.3, "", "1.0 to 1.4"),
+    ("diaphragm's share (z), supine", 0.58, 0.76, "", "0.63 (SD 0.11; Aliverti 2001, n 10)"),
+    ("diaphragm's share (z), prone", 0.53, 0.70, "", "0.535 (SD 0.13; Aliverti 2001)"),
+    ("share of lower lung, left side", 51, 56, "%", "57.6 (SD 7.2; Volk 2011, n 10): missed"),
+    ("share of lower lung, right side", 57, 62, "%", "64.7 (SD 6.7; Volk 2011): missed"),
     ("right lung at rest, left side", 21, 26, "%", "+25 (SD 11; Little 2021, n 10)"),
     ("left lung at rest, left side", -3, 1, "%", "0 (SD 44; Little 2021)"),
     ("left lung full, upright", 10, 12, "%", "+11.6 (Yamada 2020, n 32)"),
@@ -39,14 +39,14 @@ ROWS = (
     ("density, front third, prone", None, None, "g/mL", "+0.07 (Prisk 2007, n 6)"),
     ("density, back third, prone", None, None, "g/mL", "-0.11 (Prisk 2007)"),
     ("mean displacement to prone, rest", 6, 20, "mm", ""),
-    ("the same, lower half / upper third", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
+    ("lower half / upper third, to prone", 2, 10, "", "lesions move below the carina (Yankelevitz 1995)"),
     ("reversed triangles, at most", 0, 0.03, "%", ""),
     ("reversed triangles added by the bend", None, 2, "", ""),
 )
 
 
 class Slab(ctypes.Structure):
-    """Mirror supine_slab of supine/compare.h."""
+    """The struct supine_slab of supine/compare.h."""
     _fields_ = [("volume", ctypes.c_double), ("gain", ctypes.c_double)]
 
 
@@ -96,7 +96,7 @@ class Lungs:
         return int((np.einsum("ij,ij->i", self.area_vectors(xyz), self.reference) < 0).sum())
 
     def straight(self, posture, total):
-        """Return positions as without a bend: equal gains on all axes at the same volume of each lung."""
+        """Return positions without the bend: with equal gains on all axes, but the same volume of each lung."""
         pose = self.basis.pose(f"{posture}:{total:.3f}mL")
         wanted = np.array(self.basis.volumes(pose))
         gains = self.basis.gains(pose)
@@ -118,14 +118,14 @@ class Lungs:
         after = {p: self.at(f"{p}:rest+{breath:.3f}") for p in POSTURES}
         for p in ("supine", "prone"):
             volume, gain = self.thirds(p, rest[p][0], after[p][0])
-            out[f"thirds, {p}"] = gain[2] / volume[2] * volume[0] / gain[0]
+            out[f"lowest / uppermost third, {p}"] = gain[2] / volume[2] * volume[0] / gain[0]
             move = (after[p][0] - rest[p][0])[self.faces].mean(1)
             areas = (self.area_vectors(rest[p][0]) + self.area_vectors(after[p][0])) / 2
             flux = (move * areas).sum(0)
-            out[f"z share, {p}"] = flux[2] / flux.sum()
+            out[f"diaphragm's share (z), {p}"] = flux[2] / flux.sum()
         for lung, side in enumerate(("left", "right")):
             gained = after[side][1] - rest[side][1]
-            out[f"lower lung of a breath, {side} side"] = 100 * gained[lung] / gained.sum()
+            out[f"share of lower lung, {side} side"] = 100 * gained[lung] / gained.sum()
             out[f"{side} lung at rest, left side"] = 100 * (rest["left"][1][lung] / rest["supine"][1][lung] - 1)
             out[f"{side} lung full, upright"] = 100 * (self.at("upright:full")[1][lung] / full_ml[lung] - 1)
         out["both lungs at rest, upright"] = 100 * (rest["upright"][1].sum() / rest["supine"][1].sum() - 1)
@@ -139,7 +139,7 @@ class Lungs:
         height = full[:, 2] - full[:, 2].min()
         height /= height.max()
         out["mean displacement to prone, rest"] = move.mean()
-        out["the same, lower half / upper third"] = move[height < 1 / 2].mean() / move[height > 2 / 3].mean()
+        out["lower half / upper third, to prone"] = move[height < 1 / 2].mean() / move[height > 2 / 3].mean()
         over, more = 0, 0
         for p in POSTURES:
             for share in (0.35, 0.5, 0.7, 0.9, 1.1):
@@ -181,7 +181,7 @@ def main(arguments):
             subprocess.run([str(build / "supine"), "precompute", left, right, "-o", basis, *(["--axes", axes] if axes else [])],
                            check=True, stdout=subprocess.DEVNULL)
             columns[title] = Lungs(supine, basis).measure()
-    print("%-36s" % "" + "".join("%16s" % title for title in columns) + "  range held     published")
+    print("%-36s" % "" + "".join("%16s" % title for title in columns) + "  range          published")
     misses = 0
     for what, low, high, unit, published in ROWS:
         values = [column[what] for column in columns.values()]

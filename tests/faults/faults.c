@@ -4,10 +4,10 @@
  * FAULT_ALSO are counted.
  *
  *     FAULT_KIND    "memory" or "file"
- *     FAULT_NTH     number of the call that fails, from 0; unset: none
- *     FAULT_ALSO    parts of the names of further libraries, separated by commas: gsl,jansson
- *     FAULT_REPORT  file to write at the end: number of calls, of failed calls, and of blocks that
- *                   the counted code allocated and nobody freed */
+ *     FAULT_NTH     number of the call that fails, from 0; if unset, no call fails
+ *     FAULT_ALSO    parts of the names of further libraries, such as gsl,jansson
+ *     FAULT_REPORT  file to write at exit: numbers of calls, of failed calls, and of blocks that
+ *                   the counted code allocated but nobody freed */
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run whole commands with each allocation, and each call on files, failing in turn.
+"""Run whole commands in which each allocation, and each call on files, fails in turn.
 
     faults.py PROGRAM LIBFAULTS [EACH] [WORD]
     faults.py PROGRAM            run each command once without faults, for a program built with a sanitizer
 
-The n-th call fails in the n-th run. By default, every call of a command fails once; with EACH above 0, about
-EACH calls spread over the command (CTest uses 1). WORD selects the commands that contain it.
+By default, the n-th call of a command fails in its n-th run. If EACH is above 0, only about EACH calls, spread
+over the command, fail (CTest uses 1). WORD selects the commands that contain it.
 
 Each run must end within a minute and without a signal: with the complete outputs, or with an exit code
 above 0 and a message that gives the reason. A run that fails must leave no file, and no block of memory
@@ -37,7 +37,7 @@ fit --landmarks pairs.csv --law deep -o patient.json
 pv fit samples.csv -o patient.pv.json
 """
 
-# Commands to test; outputs go to the folder out.
+# Commands to test. They write to the folder out.
 COMMANDS = """
 phantom --vertices 100 -o out/a.ply
 phantom --vertices 100 -o out/a.obj
@@ -88,7 +88,7 @@ REASONS = {
     "file": "memory|No space left|Too many open files|Input/output error|Resource temporarily|"
             "Cannot allocate|short|truncated|changed",
 }
-# Libraries whose allocations fail as well; drivers, fonts and the web server are left out.
+# Libraries whose allocations fail as well. Those of drivers, fonts and the web server do not.
 ALSO = {"memory": "gsl,jansson", "file": ""}
 LIMIT = 60  # time limit of a command, s
 
@@ -159,7 +159,7 @@ def what_is_wrong(trial, kind, kept, whole, result):
 
 
 def faultless(trial, arguments):
-    """Return the result of a run without faults for each kind; its output is None if it differs between runs."""
+    """Return the result of a run without faults for each kind of fault. Its output is None if it varies."""
     runs = {kind: trial.run(arguments, kind) for kind in REASONS}
     same = len({run[1] for run in runs.values()}) == 1
     return {kind: (run[0], run[1] if same else None, *run[2:]) for kind, run in runs.items()}
@@ -201,7 +201,7 @@ def main():
     word = sys.argv[4] if len(sys.argv) > 4 else ""
     faults = dict.fromkeys(REASONS, 0)
     wrong = []
-    shared = "/dev/shm"  # a folder in memory, as a disk would be slow
+    shared = "/dev/shm"  # a folder in memory, because a disk would be slow
     with tempfile.TemporaryDirectory(dir=shared if os.access(shared, os.W_OK) else None) as name:
         trial = Trial(program, library, Path(name))
         samples(trial.folder)

@@ -6,8 +6,8 @@
  *     fuzz_X -runs N [-seed S] [-dict FILE]    run N mutations of the seeds
  *
  * Print the number of inputs, the longest time and the peak memory. Exit with 1 if an input took
- * more than 0.5 s of processor time (5 s with a sanitizer) or the process more than 2 GB. An input
- * that crashes is saved as crash-input in the working folder. */
+ * more than 0.5 s of processor time (5 s with a sanitizer) or the process used more than 2 GB. An
+ * input that crashes is saved as crash-input in the working folder. */
 #include <fcntl.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -41,7 +41,7 @@ static size_t seed_count;
 static uint64_t state;
 static double slowest;
 
-/* Current input, which the crash handler saves. */
+/* current input, which the crash handler saves */
 static const uint8_t *current;
 static size_t current_size;
 

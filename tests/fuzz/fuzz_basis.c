@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz basis files, each twice: as it is, and with a corrected checksum, which the code behind the
- * check needs. A basis that opens is evaluated. */
+/* Fuzz basis files, each twice: as it is, and with a corrected checksum, so that the code behind
+ * the check is reached. A basis that opens is evaluated. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 
 #include "tests/poses.h"
 
-/* Largest number of vertices to evaluate, as a small file may declare many. */
+/* Largest number of vertices to evaluate: a small file may declare many. */
 enum { VERTICES_MOST = 4096 };
 
 static void evaluate(const supine_basis *basis) {

@@ -12,7 +12,7 @@
 
 #include "fuzz.h"
 
-enum { SMALL = 1 << 15 }; /* voxels; the conversion of larger images takes too long */
+enum { SMALL = 1 << 15 }; /* voxels; larger images take too long to convert */
 
 static void expect_words(supine_status status, const supine_error *error) {
   supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&

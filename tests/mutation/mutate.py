@@ -6,11 +6,11 @@
     mutate.py random [COUNT] [SEED]    COUNT (default 100) random mutants of the code in FOLDERS
 
 The mutants are made in a copy of the last commit, in build/mutation. A mutant is killed if a test fails or exceeds
-its time limit; a mutant that does not compile does not count. For a random mutant, the tests that reach its line
+its time limit. A mutant that does not compile does not count. For a random mutant, the tests that reach its line
 are run, quick ones first, until one fails or they have taken ENOUGH seconds. An instrumented build, in which each
 test runs once alone, shows which tests reach a line; the result is kept for other seeds of the same commit. Tests
-that fail in that build, take longer than SLOW or are listed in LEFT_OUT are not used, so the number of survivors is
-an upper bound. Set CMake options such as -DSUPINE_LUNGS=FOLDER in the environment variable SUPINE_CMAKE_OPTIONS.
+that fail in that build, take longer than SLOW or are listed in LEFT_OUT are not used. The number of survivors is
+therefore an upper bound. The environment variable SUPINE_CMAKE_OPTIONS has options such as -DSUPINE_LUNGS=FOLDER.
 """
 import json
 import os
@@ -147,7 +147,7 @@ def places():
 def random_ones(count, seed):
     chosen = random.Random(seed)
     took, reached = measured()
-    for file in BUILD.rglob("CTestTestfile.cmake"):  # shorter time limits, for mutants that never end
+    for file in BUILD.rglob("CTestTestfile.cmake"):  # shorter time limits, because some mutants never end
         file.write_text(re.sub(r'(set_tests_properties\(\[=\[(\S+)\]=\].* TIMEOUT )"\d+"',
                                lambda m: f'{m[1]}"{20 + took.get(m[2], 0):.0f}"', file.read_text()))
     every = places()
@@ -161,7 +161,7 @@ def random_ones(count, seed):
         line = lines[number]
         lines[number] = line[:match.start()] + match.expand(chosen.choice(instead)) + line[match.end():]
         path = str(file.relative_to(COPY))
-        # For a line that gcov does not count, use the tests that reach the file; for a file not counted, all tests.
+        # If gcov does not count the line, use the tests that reach the file; if it does not count the file, all tests.
         tests = reached.get((path, number + 1), reached.get((path, 0), sorted(took, key=took.get)))
         used = list(accumulate(took[t] for t in tests))
         tests = [t for t, so_far in zip(tests, used) if so_far <= ENOUGH] or tests[:1]
@@ -178,7 +178,7 @@ def random_ones(count, seed):
 
 
 def measured():
-    """Return the time of each test, s, and for each (file, line) the tests that reach it; line 0 is the whole file."""
+    """Return the time of each test, s, and the tests that reach each (file, line). Line 0 stands for the whole file."""
     covered = FOLDER / "covered"
     configure(covered, "-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_C_FLAGS_DEBUG=-Og", "-DSUPINE_COVERAGE=ON")
     if not build(covered):
@@ -202,8 +202,8 @@ def measured():
 
 
 def lines_reached(name, covered, kept):
-    """Run a test of the instrumented build, unless `kept` has its result. Return its time in s (infinite if it
-    fails), the (file, line) that can be reached, and those that it reached, with line 0 for the whole file."""
+    """Run a test of the instrumented build, unless `kept` has its result. Return its time in s (infinite if it fails),
+    each (file, line) that gcov counts, and each that the test reached. Line 0 stands for the whole file."""
     kept, counts = kept / f"{name}.json", FOLDER / "counts" / name
     if kept.exists():
         return json.loads(kept.read_text())

@@ -17,8 +17,7 @@ async function check(basis, states, ask) {
   }
 }
 
-/** Return the results of an open basis in each state. This function runs in node or in a
- * browser. */
+/** Return the results of an open basis in each state. This function runs in node or in a browser. */
 export function pose(lungs, states) {
   return states.map((state) => {
     lungs.pose(state).deformLit();
@@ -26,7 +25,7 @@ export function pose(lungs, states) {
   });
 }
 
-/** Compare each basis in its last `most` states. `ask(basis, states)` returns the results of `pose` in these states. */
+/** Compare the results for each basis and its last `most` states. `ask(basis, states)` returns what `pose` returns. */
 export async function checkAll(ask, most = Infinity) {
   for (const [basis, states] of bases) await check(basis, states.slice(-most), ask);
   console.log(`${bases.length} bases give the same results as in C`);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The JavaScript package in Chromium: same results as plain C, and the examples draw moving lungs.
+// Test the JavaScript package in Chromium: results equal those of plain C, and the examples draw moving lungs.
 import assert from 'node:assert/strict';
 import { copyFileSync, existsSync, readFileSync, symlinkSync, writeFileSync } from 'node:fs';
 import { basename, extname, join } from 'node:path';
@@ -7,9 +7,9 @@ import { checkAll, pose } from './agree.mjs';
 import { browser, settled } from '../export/browser.mjs';
 import { folder } from '../export/support.mjs';
 
-/** Open a page of the folder; requests are answered by this process, without a network. */
 const origin = 'http://lungs.test/';
 const kinds = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
+/** Open a page of the folder. This process answers its requests, without a network. */
 async function visit(path) {
   const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
   const complaints = [];
@@ -34,7 +34,7 @@ await checkAll((basis, states) => page.evaluate(async ([file, states, code]) => 
 }, [`/${basename(basis)}`, states, pose.toString()]), 2);
 await page.close();
 
-/** Take a screenshot; return the red values of its pixels. */
+/** Take a screenshot and return the red values of its pixels. */
 async function look(page) {
   await settled(page);
   const shot = (await page.screenshot()).toString('base64');

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Helpers for tests of the JavaScript package: a folder with the package in node_modules, bases, and their results
-// in plain C. Environment variables give paths: NATIVE of the program npm_native, TARBALL of the package, GOLDEN of a
-// basis of version 1, LUNGS of the real lungs.
+// in plain C. Environment variables are paths: NATIVE (program npm_native), TARBALL (the package), GOLDEN (a basis of
+// version 1), LUNGS (folder of real lungs).
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -20,7 +20,7 @@ writeFileSync(content, 'name,x,y,z\nnodule,-80,-120,-90\nother,70,-150,-120\n');
 supine('embed', demo, content, mesh, '-o', inside);
 const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+120', '0.6:0.2:-0.7:2600mL', 'upright:full'];
 const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // a basis of version 1 has no rest volumes
-/** Pairs of a basis and the states to test it in. */
+/** Bases, each with the states to test. */
 export const bases = [[demo, states], [inside, states], [old, ofScan]];
 const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `lungs/chaste_${side}.ply`));
 if (real.every(existsSync)) {

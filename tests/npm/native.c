@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute reference results for the JavaScript package, in portable C (SUPINE_SIMD_PORTABLE).
  *
- *     native BASIS STATE OUT    write as float64 the volume of each lung; then as float32 the
- *                               positions, the normals of supine_deform_lit (of supine_normals if
- *                               the file has none) and the expected errors (0 if unknown)
- *     native BASIS STATE        print ns per vertex of supine_deform and of supine_deform_lit (0 if
- *                               the file has no normals), the fastest of several rounds */
+ *     native BASIS STATE OUT    write the volume of each lung as float64, then as float32 the
+ *                               positions, the normals of supine_deform_lit (supine_normals if the
+ *                               file has none) and the expected errors (0 if unknown)
+ *     native BASIS STATE        print the times of supine_deform and of supine_deform_lit (0 if the
+ *                               file has no normals), ns per vertex: the fastest of nine rounds */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>

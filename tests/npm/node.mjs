@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The JavaScript package in node: results of plain C, size, speed, refused input, examples of README.md, and types.
+// Test the JavaScript package in node: equal results in plain C, size, speed, refused input, examples, types.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -14,7 +14,7 @@ const bytes = readFileSync(demo);
 
 await checkAll(async (basis, states) => pose(await open(readFileSync(basis)), states));
 
-/* The library has at most 150 kB, 40 kB compressed. */
+/* The library has at most 150 kB, and 40 kB when compressed. */
 const wasm = readFileSync(join(packed, 'supine.wasm'));
 const small = brotliCompressSync(wasm).length;
 console.log(`supine.wasm: ${wasm.length} bytes, ${small} with brotli`);
@@ -24,7 +24,7 @@ assert.ok(wasm.length <= 150000 && small <= 40000);
  * or gain. A refused state changes nothing. */
 const [lungs, other] = [await open(bytes), await open(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), { wasm })];
 const { positions, normals } = lungs;
-assert.ok(largestDistance(positions, lungs.vertices) < 0.002, 'before the first pose, positions are not those of the file');
+assert.ok(largestDistance(positions, lungs.vertices) < 0.002, 'positions before the first pose differ from those in the file');
 lungs.pose('prone:rest+500').deformLit();
 const prone = positions.slice();
 other.pose({ gravity: new Float32Array([0, -2, 0]), volume: 'rest+500' }).deform();
@@ -62,7 +62,7 @@ assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
-/* A basis of an open surface, from an older version, has no volumes; a gain poses it. */
+/* A basis of an open surface, made by an older version, has no volumes, but a gain poses it. */
 const opened = await open(readFileSync(join(dirname(process.env.GOLDEN), 'open_surface.safetensors')));
 assert.throws(() => opened.volumes, { status: 'open surface' });
 assert.throws(() => opened.pose('prone:rest+500'), SupineError);
@@ -97,7 +97,7 @@ writeFileSync(join(folder, 'package.json'), '{ "type": "module" }');
 assert.deepEqual(compile(use), []);
 for (const line of wrong) assert.equal(compile(use + line).length, 1, line);
 
-/* The time per vertex is at most 2.5 times that of plain C: the fastest of several alternating runs. */
+/* The time per vertex is at most 2.5 times that of plain C; each is the fastest of several alternating runs. */
 const fastest = [[Infinity, Infinity], [Infinity, Infinity]];
 const calls = Math.ceil(1000000 / lungs.vertexCount);
 for (let round = 0; round < 5; ++round) {

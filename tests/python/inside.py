@@ -33,7 +33,7 @@ lungs = supine.open(path)
 n, k = lungs.vertex_count, lungs.mode_count
 assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", "right"]
 
-# Arrays are read-only views of the basis, not copies, and keep it open.
+# Arrays are read-only views of the basis, not copies. The basis stays open while an array exists.
 for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
                             (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
                             (lungs.modes, (k, (lungs.band + 1) ** 2), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
@@ -52,7 +52,7 @@ kept, first = supine.open(path).vertices, lungs.vertices.copy()
 gc.collect()
 assert (kept == first).all()
 
-# Results have the same bits as in C, for a basis from a file or from memory, and in ranges of vertices.
+# Results have the same bits as in C: for a basis from a file or from memory, and for ranges of vertices.
 STATE = "prone:rest+321.5"
 pose, supine_rest = lungs.pose(STATE), lungs.pose("supine")
 assert abs(lungs.volumes(pose).sum() - lungs.volumes(lungs.pose("prone:rest")).sum() - 321.5) < 1e-6
@@ -76,12 +76,12 @@ assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(pose)
 assert bytes(lungs.pose((0, -2, 0), "rest+321.5")) == bytes(pose) == bytes(lungs.pose(STATE, out=supine.Pose()))
 assert (lungs.deform(supine.Pose().fill(0.0)) == lungs.deform(lungs.pose("full"))).all()
 
-# Directions of gravity by name, tilt and quaternion.
+# Directions of gravity from a name, a tilt or a quaternion.
 assert tuple(supine.gravity("HFP")) == (0.0, -1.0, 0.0) and "prone" in supine.postures()
 assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))
 assert np.allclose(supine.gravity_of_quaternion((1, 0, 0, 0)), supine.gravity("upright"))
 
-# Volume of a breath over time.
+# The volume during a breath.
 times = np.array([[0, 5 / 3], [5, 2]])
 volumes = supine.breath(times)
 assert volumes.shape == (2, 2) and np.allclose(volumes[:, 0], 0, atol=1e-9) and abs(volumes[0, 1] - 500) < 1e-9
@@ -123,7 +123,7 @@ try:
 except ValueError:
     pass
 
-# Lungs from observed points: a wrong point is reported, a rotation is found, invalid points are refused.
+# Lungs located from observed points: a wrong point is reported, a rotation is found, invalid points are refused.
 seen = list(range(0, n, n // 20))
 truth = lungs.deform(lungs.pose("left:rest+300"))
 turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
@@ -144,8 +144,8 @@ refused(supine.ArgumentError, "give a vertex below", lungs.locate, [n], [(0, 0, 
 refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=True)
 refused(ValueError, "positions", lungs.locate, [0, 1], truth[:1])
 
-# Calls that visit vertices release the interpreter's lock. The switch interval is so long that a waiting thread gets
-# the lock only if a call releases it, which `repr` does not.
+# Calls that visit vertices release the interpreter's lock. With the long switch interval below, a waiting thread gets
+# the lock only if a call releases it; `repr` does not.
 def lets_others_run(call, *arguments, tries=None):
     gate, ran = threading.Lock(), []
 
@@ -200,7 +200,7 @@ refused(ValueError, "[z, y, x]", grid.warp, image[0], "prone:rest", **frame)
 refused(ValueError, "uint8", grid.warp, image.astype(np.int64), "prone:rest", **frame)
 refused(supine.ArgumentError, "needs a reference", grid.warp, image, "500", **frame)
 
-# A basis made from arrays has the same bits as one made by the program: `path` was made with --band 3.
+# A basis made from arrays has the same bits as `path`, which the program made with --band 3.
 parts = []
 made = supine.precompute(lungs.vertices, lungs.triangles, band=3, progress=parts.append)
 for name in ("vertices", "triangles", "coefficients", "modes", "volume_cubic"):
@@ -240,8 +240,8 @@ try:
 except KeyboardInterrupt:
     assert not os.path.exists(path + ".stopped")
 
-# Content: in a basis from a file or from arrays, points with or without names, a mesh, a grid. A point on the surface
-# moves with it.
+# Content of a basis from a file or from arrays: points with or without names, a mesh, a grid. A point on the surface
+# moves with the surface.
 place = lungs.vertices[7].astype(float)
 for basis in (lungs, made):
     inside = supine.embed(basis, {"on, the surface": place, "other": (-80, -120, -90)})

@@ -2,7 +2,7 @@
 /* Compute reference results for the Python package.
  *
  *     reference BASIS STATE OUT    write as float32 the positions and normals of supine_deform_lit,
- *                                  exact normals, and positions of a batch of this state and supine
+ *                                  exact normals, and the positions of two poses: STATE, and supine
  *                                  at rest
  *     reference BASIS STATE        print the time of a call of supine_deform, s */
 #include <stdio.h>

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Read the basis from the page. Compute, as the run-time library does once for each frame, the weights from
-// gravity and the gains of the lungs from a volume.
+// Read the basis from the page. Compute the weights of the modes from gravity, and the gains of the lungs from a
+// volume, like the run-time library.
 
-/** Decode base64. */
 function fromBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
   const padding = text.endsWith('==') ? 2 : text.endsWith('=') ? 1 : 0;
@@ -25,7 +24,7 @@ function takeBytes(name) {
 
 const takeTensor = (name, Numbers) => new Numbers(takeBytes(name).buffer);
 
-/** Return a compressed tensor of 16-bit integers (counts), in rows padded to an even number of columns. */
+/** Decompress a tensor of 16-bit integers (counts). Its rows are padded to an even number of columns. */
 function takeCounts(name, rows, columns, filter) {
   const stride = 4 * Math.ceil(columns / 2);
   const bytes = new Uint8Array(rows * stride);
@@ -33,7 +32,7 @@ function takeCounts(name, rows, columns, filter) {
   return new Int16Array(bytes.buffer);
 }
 
-/** Return a tensor of rows of numbers: middle[column] plus `unit` times the stored count. */
+/** Return a tensor of numbers, each middle[column] plus `unit` times the stored count. */
 function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)) {
   const counts = takeCounts(name, rows, columns);
   const numbers = new Float32Array(rows * columns);
@@ -42,15 +41,15 @@ function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)
   return numbers;
 }
 
-/** Return the vertex indices of a tensor of compressed triangles. */
+/** Decompress a tensor of `count` triangles to vertex indices. */
 function takeTriangles(name, count) {
   const corners = new Uint32Array(3 * count);
   MeshoptDecoder.decodeIndexBuffer(new Uint8Array(corners.buffer), 3 * count, 4, takeBytes(name));
   return corners;
 }
 
-/** Return the normals in the words that supine.glsl reads, of three numbers of 13, 10 and 9 bits. The page holds
- * each number without its lowest 2, 2 and 1 bits, plus 128. */
+/** Return the normals as the 32-bit words that supine.glsl reads. A word has three numbers, of 13, 10 and 9 bits.
+ * The page has these numbers without their lowest 2, 2 and 1 bits, plus 128. */
 function takeNormals(vertices, words) {
   const columns = 3 * words;
   const counts = takeCounts('normals', vertices, 3 * columns);
@@ -154,9 +153,9 @@ function weightsFor(basis, gravity) {
   });
 }
 
-/** Return the form of a lung at weights `w`: coefficients f such that the volume of the lung minus that of its
- * reference surface, mL, is f . (x, y, z, yz, xz, xy, xyz) at the gains x, y, z. If all gains are equal
- * (volumeAxes 1), only the terms x, yz and xyz are used. */
+/** Return the form of a lung at weights `w`: coefficients f such that, at the gains x, y, z, the volume of the lung
+ * minus that of its reference surface is f . (x, y, z, yz, xz, xy, xyz), mL. If all gains are equal (volumeAxes 1),
+ * the coefficients of y, z, xz and xy are 0. */
 function lungForm(basis, lung, w) {
   const k = basis.modes;
   const dot = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += tensor[at + i] * w[i]; return sum; };
@@ -220,15 +219,15 @@ function scaleForVolume(c, volume) {
 }
 
 /** Return the three gains at `sigma`, relative to the gain at rest, on the path from full inflation (sigma 0)
- * through rest (sigma 1), as supine_volume_bend does. */
+ * through rest (sigma 1), like supine_volume_bend. */
 function pathAt(bend, sigma) {
   const cube = sigma * sigma * sigma;
   const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   return bend.map((c) => sigma + 2 * c * e);
 }
 
-/** Return the three gains at which a lung of this form has the volume `volume`, on the path through the volume
- * `rest`, both mL above the reference volume; NaN if the surface folds before it reaches that volume. */
+/** Return the three gains at which a lung of this form has the volume `volume`, on its path through the volume `rest`.
+ * Both are mL above the reference volume. Return NaN if the surface folds before it reaches `volume`. */
 function gainsForVolume(form, bend, rest, volume) {
   const straight = bend.every((c) => c === 0) || volume === rest;
   const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
@@ -254,9 +253,9 @@ function gainsForVolume(form, bend, rest, volume) {
 
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
-/** Return volumes in a posture, mL above the reference volumes: `full`, of each lung at full inflation, and
- * `rest`, of each lung at rest or, if all lungs share their gains, of all lungs together. If the basis does not
- * know rest, `rest` is the volume in the scan. */
+/** Return volumes for a direction of gravity, mL above the reference volumes: `full`, of each lung at full
+ * inflation, and `rest`, of each lung at rest. If all lungs have the same gains, `rest` has one element, for all
+ * lungs together. If rest is unknown, `rest` is the volume in the scan. */
 function volumesFor(basis, gravity) {
   const y = harmonics(2, gravity);
   const rows = basis.resting ? basis.resting.length / y.length : 1;
@@ -269,7 +268,7 @@ function volumesFor(basis, gravity) {
 const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
 
 /** Return the volume of each lung for a volume `total` of all lungs, mL above the reference volumes. Above rest,
- * all lungs have covered the same fraction of the way from rest to full; below, all shrink by the same factor. */
+ * all lungs have covered the same fraction of the way from rest to full. Below rest, all shrink by the same factor. */
 function shareOut({ references }, { rest, full }, total) {
   const [all, resting] = [sumOf(references), sumOf(rest)];
   const part = (total - resting) / (sumOf(full) - resting);
@@ -285,8 +284,8 @@ function gainsFor(basis, forms, volumes, total) {
   return forms.map(() => gains);
 }
 
-/** Compute a moment: the lungs at a direction of gravity and a volume `depth` mL above rest. It has the weights of
- * the modes, three gains of each lung, `held`, the volume of each lung with its tissue, mL, and `folds`, which is
+/** Compute a moment: the lungs at a direction of gravity and a volume `depth` mL above rest. `weights` has a weight
+ * for each mode, `gains` three gains for each lung, `held` the volume of each lung with its tissue, mL. `folds` is
  * true if the surface folds before it reaches that volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
@@ -297,10 +296,10 @@ function momentFor(basis, gravity, depth) {
   return { gravity, weights, gains: Float64Array.from(gains.flat()), held, folds: !gains.flat().every(Number.isFinite) };
 }
 
-/** Return the uniforms of supine.glsl: the weights w, three gains of each lung, and the weights of the normals'
- * modes, in words of the modes j, j + words and j + 2 words. The weight of such a mode is a sum over the three
- * components of the normal of a polynomial with the terms 1, a w_k, b w_k and a b w_k w_l, where a and b are the
- * gains along the next two axes. If all gains are equal, it is one polynomial, without the terms b w_k. */
+/** Return the uniforms of supine.glsl: the weights w of the modes, three gains of each lung, and `turns`, the weights
+ * of the normals' modes: vector j of a lung has the weights of the modes j, j + words and j + 2 words. The weight of a
+ * mode is a sum over the axes of polynomials with the terms 1, a w_k, b w_k and a b w_k w_l, where a and b are the
+ * gains along the other two axes. If all gains are equal, it is one polynomial, without the terms b w_k. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const weights = new Float32Array(4 * Math.ceil(k / 4));
@@ -328,14 +327,13 @@ function uniformsOf(basis, moment) {
   return { weights, gains: Float32Array.from(moment.gains), turns };
 }
 
-/** Return the lung of a vertex. */
 function lungOf({ lungBegin }, vertex) {
   let lung = 0;
   while (vertex >= lungBegin[lung + 1]) ++lung;
   return lung;
 }
 
-/** Compute the position of a vertex, mm. */
+/** Compute the position of a vertex in a moment, mm. */
 function placeOf(basis, { weights, gains }, vertex) {
   const lung = lungOf(basis, vertex);
   let amount = 0;
@@ -343,7 +341,7 @@ function placeOf(basis, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => basis.surface[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
 }
 
-/** Compute the positions of all vertices, xyz, mm. */
+/** Compute the positions of all vertices in a moment, mm. */
 function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
   const places = new Float32Array(surface.length);
   for (let lung = 0; lung < lungs; ++lung) {
@@ -356,7 +354,7 @@ function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs },
   return places;
 }
 
-/** Compute the positions of the corners of up to 3000 triangles, mm, from which the range of the colours follows. */
+/** Compute the positions of the corners of up to 3000 triangles, mm, to choose the range of the colours. */
 function samplePlaces(basis, moment) {
   const stride = 3 * Math.max(1, Math.ceil(basis.corners.length / 3 / 3000));
   const places = [];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Compute colours, their ranges and ticks, by the rules that pictures and reports follow.
+// Compute colours, ranges and ticks, by the same rules as 'supine render' and 'supine compare'.
 
 /** Return the interval between ticks: a round number, 1/10 to 1/4 of `value`. */
 function tickStep(value) {
@@ -15,7 +15,7 @@ function rangeEnd(value) {
   return value > 0 ? step * Math.ceil(value / step - 1e-9) : 5 * step;
 }
 
-/** Quantities that colours can show: the shaders' uniform `kind`, the name of the colour map, and the unit. */
+/** Quantities that colours can show. `measure` is the uniform `kind` of the shaders. */
 const KINDS = {
   displacement: { measure: 0, map: 'displacement', unit: 'mm' },
   difference: { measure: 0, map: 'difference', unit: 'mm' },

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Write the part under the pointer as a NaN with the index of the part plus 1 in its low bits, and the bits of the
-// position.
+// Write what is under the pointer: a NaN whose low bits are the index of the part plus 1, then the position.
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

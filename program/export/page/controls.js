@@ -3,12 +3,12 @@
 
 const $ = (id) => document.getElementById(id);
 
-/** Call drag(dx, dy, shifts) when one pointer moves, with `shifts` true if the shift key or another button is
- * down; pinch(ratio, dx, dy, x, y) when two pointers move; tap(event) when a pointer is released where it was
- * pressed. Distances are CSS pixels. Return a function that returns whether a drag is under way. */
+/** Call drag(dx, dy, shifts) when one pointer moves; `shifts` is true if the shift key or another button is down.
+ * Call pinch(ratio, dx, dy, x, y) when two pointers move, and tap(event) when a pointer is released where it was
+ * pressed. Distances are CSS pixels. Return a function that tells whether a drag is under way. */
 function onDrag(element, drag, pinch, tap) {
   const pointers = new Map();
-  let far = 0; // CSS pixels that the pointers have moved since the first of them was pressed
+  let far = 0; // distance that the pointers have moved since the first was pressed, CSS pixels
   const spread = () => {
     const [a, b] = [...pointers.values()];
     return { size: Math.hypot(a.x - b.x, a.y - b.y), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
@@ -76,7 +76,7 @@ function onSlider(id, act) {
   $(id).addEventListener('input', () => take($(id)));
   for (const [type, then] of [['change', take], ['blur', () => {}]]) {
     $(`${id}-number`).addEventListener(type, () => {
-      $(id).written = ''; // writes the value again: the typed text may be no number, or out of range
+      $(id).written = ''; // makes setSlider replace a typed text that is not a number or is out of range
       then($(`${id}-number`));
     });
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Draw the patient as a small figure of ellipsoids on 2-D canvases: in the ball, and as icons of the postures.
+// Draw the patient as a figure of ellipsoids on 2-D canvases: in the gravity ball, and as icons of the postures.
 
 // Centres, half axes and tones of the ellipsoids, in the patient's axes (x left, y back, z head).
 const BODY = [
@@ -21,10 +21,10 @@ const BODY = [
 const AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 for (const part of BODY) part.squares = part.size.map((x) => x * x);
 
-/** The directions of the ends of the patient's axes, by letter. */
+/** Direction of each end of the patient's axes, by letter. */
 const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
-const lights = new WeakMap(); // gradients by context
+const lights = new WeakMap(); // results of lightsOf, by context
 /** Return the gradients that shade a ball of radius 1 in each tone, made once for a canvas and theme. */
 function lightsOf(context, tones) {
   const made = lights.get(context);
@@ -57,7 +57,7 @@ function drawFigure(context, q, x, y, scale, tones) {
   context.save();
   const { a: ratio } = context.getTransform(); // device pixels per CSS pixel, from freshContext
   for (const part of parts) {
-    // The symmetric square root of the ellipse's matrix maps the circle to it without rotating its light.
+    // The symmetric square root of the ellipse's matrix maps the circle to the ellipse without rotating the shading.
     const det = Math.sqrt(Math.max(part.xx * part.yy - part.xy * part.xy, 0));
     const by = (ratio * scale) / Math.sqrt(part.xx + part.yy + 2 * det);
     context.setTransform(by * (part.xx + det), -by * part.xy, -by * part.xy, by * (part.yy + det), ratio * (x + scale * part.x), ratio * (y - scale * part.y));
@@ -108,7 +108,7 @@ const css = (name) => theme[name.slice(2)];
 const GLYPH = 18; // side of a letter's box, CSS pixels
 
 let glyphsMade = null;
-/** Return a canvas with the ball's letters, one row for letters in front and one for those behind. They are
+/** Return a canvas with the ball's letters: a row for letters in front, and a row for letters behind. They are
  * drawn once for a theme, because drawing text is slow. */
 function glyphsOf() {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
@@ -129,7 +129,7 @@ function glyphsOf() {
   return glyphsMade;
 }
 
-let drawn = [];   // size, theme, rotation and gravity that the ball shows now
+let drawn = [];   // size, theme, rotation and gravity of the ball as drawn
 let glass = null; // gradient of the ball, made once for a size and theme
 /** Draw the ball: the patient inside, gravity as an arrow. The quaternion `toEye` rotates the patient's axes to
  * the eye's axes. */

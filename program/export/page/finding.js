@@ -9,7 +9,7 @@ const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], '
 /** Return the volume of each lung in a moment, gas and tissue, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
-/** Return for each vertex a weight proportional to the area of the triangles around it. */
+/** Return a weight for each vertex, proportional to the area of the triangles around it. */
 function areasOf({ surface, corners, vertices }) {
   const areas = new Float32Array(vertices);
   for (let t = 0; t < corners.length; t += 3) {
@@ -78,10 +78,10 @@ function findingOf(basis, moment, gravity, volume, stride) {
   return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, displacement.replace(/^t/, 'T')];
 }
 
-/** Return the expected error of the displacement u from the moment `from` to `now`, mm RMS over the vertices, as
- * the library computes it. The square of a vertex' error is |u| min(constant, RMS of u) plus, if the volume at
- * rest is assumed, the square of the change of u when that volume is larger by 5 % of the reference volume.
- * `fuller` holds both moments with 1 % more volume; null if the volume at rest is known. */
+/** Return the expected error of the displacement u from the moment `from` to `now`, mm RMS over the vertices, like
+ * the library. The squared error of a vertex is |u| min(expected_error_mm, RMS of u). If the volume at rest is
+ * assumed, add the squared change of u when that volume grows by 5 % of the reference volume. `fuller` has both
+ * moments with 1 % more volume, or is null if the volume at rest is known. */
 function expectedError(basis, now, from, fuller) {
   const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
   const more = fuller?.map((moment) => placesOf(basis, moment));
@@ -112,7 +112,7 @@ function errorWords(basis, moment, depth) {
   return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
 }
 
-/** Return the changes of volume and the mean displacement in a moment, as on a card: "L \u22121 %, R +18 %, 6.9 mm". */
+/** Return the changes of volume and the mean displacement in a moment, for a card: "L \u22121 %, R +18 %, 6.9 mm". */
 function answerOf(basis, moment) {
   const { mean, largest } = displacementBetween(basis, moment, basis.from, 1);
   if (largest < 0.05) return 'reference';
@@ -151,9 +151,9 @@ class Holds {
     });
   }
 
-  /** Show the volumes of each lung: `held` now, and `before`, mL. `most` is the largest volume of a lung in any
-   * posture, mL, to which bars are scaled; `heights` of the lungs, mm, say which lung is uppermost; `measured` is
-   * the entry of PUBLISHED for this posture, if there is one. */
+  /** Show the volume of each lung, mL: `held` now, and `before`. Bars are scaled to `most`, the largest volume of a
+   * lung in any posture. `heights`, mm, tell which lung is uppermost. `measured` is the entry of PUBLISHED for this
+   * posture, if there is one. */
   show({ lungNames }, held, before, most, heights, measured) {
     const full = 1.06 * Math.max(most, ...held, ...before.map((ml, lung) => ml * (1 + (measured?.[lungNames[lung]] ?? [0, 0]).reduce((sum, x) => sum + x, 0) / 100)));
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // mm

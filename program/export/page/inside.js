@@ -56,9 +56,9 @@ function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex)
   });
 }
 
-/** Return the rows of the rotation that maps positions before to positions after with the least squares of error.
- * `h` is the 3 x 3 sum of the products of both, each relative to its mean. The quaternion of the rotation is the
- * eigenvector of a symmetric matrix with the largest eigenvalue, from a power iteration (as in runtime/rigid.c). */
+/** Return the rows of the rotation that maps old positions of points to new ones with least squares of error. `h` is
+ * the 3 x 3 sum of old times new positions, each relative to the mean. The rotation's quaternion is the eigenvector of
+ * the largest eigenvalue of a symmetric matrix; a power iteration finds it (like runtime/rigid.c). */
 function rotationOf(h) {
   const m = [[h[0] + h[4] + h[8], h[5] - h[7], h[6] - h[2], h[1] - h[3]], [h[5] - h[7], h[0] - h[4] - h[8], h[1] + h[3], h[6] + h[2]],
     [h[6] - h[2], h[1] + h[3], h[4] - h[0] - h[8], h[5] + h[7]], [h[1] - h[3], h[6] + h[2], h[5] + h[7], h[8] - h[0] - h[4]]];
@@ -116,12 +116,11 @@ function insideNearest(inside, part, moment, place) {
   return best;
 }
 
-/** Largest number of rows shown; longer tables are searched by name. */
+/** Largest number of rows shown; a search by name finds other parts. */
 const ROWS_SHOWN = 200;
 
-/** Table of the content with a row for each part: a button that shows or hides the part's name in the picture, the
- * part's position and its displacement. `state.named` lists the parts with names in the picture; `redraw` requests
- * a new picture. */
+/** Table of the content. The row of a part has its position, its displacement, and a button that shows or hides its
+ * name in the picture. `state.named` lists the parts with names in the picture; `redraw` requests a new picture. */
 class InsideTable {
   constructor(inside, state, redraw) {
     Object.assign(this, { inside, state, redraw, rows: [], pointed: -1, written: null });

@@ -55,7 +55,7 @@ function takeLink(text, state) {
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
 }
 
-/** Return the picture with its texts as a PNG blob. It calls `draw` first, because the canvas keeps its pixels only
+/** Return the picture and its texts as a PNG blob. `draw` is called first, because the canvas keeps its pixels only
  * until the end of the frame. */
 function savePicture(canvas, draw, title, lines, range, colours, labels) {
   draw();

@@ -23,8 +23,8 @@ const placed = (element, at, shown) => {
 const LETTER_RADIUS = 12; // radius of a letter and the space around it, CSS pixels
 const ARROW_RADIUS = 13;  // radius of the head of gravity's arrow, CSS pixels
 
-/** Return the position of a letter, moved off a plate that it would overlap: up, down, right or left, whichever way
- * is shortest and stays in the picture. */
+/** Return the position of a letter, moved off a plate that it would overlap: up, down, right or left, by the shortest
+ * way that stays in the picture. */
 function offPlate(at, plate, box) {
   const r = LETTER_RADIUS;
   if (at.x < plate.left - r || at.x > plate.right + r || at.y < plate.top - r || at.y > plate.bottom + r) return at;
@@ -62,7 +62,7 @@ class Letters {
     }));
   }
 
-  show(panes, { centre, half }, ratio, plates) { // half: half edges of the lungs' box, mm
+  show(panes, { centre, half }, ratio, plates) { // half: half of each edge of the lungs' box, mm
     this.sets.forEach((set, i) => {
       const pane = panes[i];
       const middle = pane && project(pane, centre, ratio);
@@ -76,7 +76,7 @@ class Letters {
           at.x = Math.max(box.left + 15, Math.min(box.right - 15, at.x));
           at.y = Math.max(15, Math.min(box.bottom - 15, at.y));
           const off = () => { for (const plate of plates) at = offPlate(at, plate, box); };
-          off(); // and again below, because offArrow may move the letter onto a plate
+          off(); // once more below, because offArrow may move the letter onto a plate
           if (arrow[0] && arrow[1]) at = offArrow(at, arrow, box);
           off();
         }

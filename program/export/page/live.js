@@ -20,12 +20,12 @@ window.supineLive = (() => {
 
   let socket = null;
   let moments = 0;
-  let posed = NaN; // time of the newest pose, ms of performance.now(); NaN: no pose yet
+  let posed = NaN; // time of the newest pose, ms of performance.now(); NaN before the first pose
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  /** Return the orientation q (x, y, z, w), rotated by the least angle that gives gravity the direction `gravity`. */
+  /** Rotate the orientation q (x, y, z, w) by the least angle after which gravity has the direction `gravity`. */
   function turned(q, gravity) {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];
@@ -37,8 +37,8 @@ window.supineLive = (() => {
     return all.map((x) => x / length);
   }
 
-  /** Show a state: gravity in the patient's axes (x left, y back, z head), the volume above rest, mL, and the age of
-   * the newest pose, s, below 0 if there is no pose. */
+  /** Show a state: gravity in the patient's axes (x left, y back, z head), and the volume above rest, mL. `age` is
+   * the age of the newest pose, s, or negative if there is no pose. */
   function show({ gravity, above, age }) {
     posed = age < 0 ? NaN : performance.now() - 1000 * age;
     tellAge();

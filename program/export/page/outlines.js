@@ -6,7 +6,7 @@
  * points [u, v] on the other two axes, mm; it stays open if it meets a hole of the surface. */
 function linesAcross({ corners, vertices }, places, axis, at) {
   const [first, second] = [0, 1, 2].filter((i) => i !== axis);
-  const links = new Map(); // for each edge, the edges that cross the plane in the same triangles
+  const links = new Map(); // for each edge that crosses the plane, those that share a triangle with it
   const points = new Map(); // for each edge, the point where it crosses the plane
   for (let t = 0; t < corners.length; t += 3) {
     const over = [0, 1, 2].map((i) => places[3 * corners[t + i] + axis] > at);
@@ -133,7 +133,7 @@ class Outlines {
     path(before);
     context.stroke();
     context.setLineDash([]);
-    context.strokeStyle = css('--accent'); // the line of the other plane
+    context.strokeStyle = css('--accent'); // line of the other plane
     context.globalAlpha = 0.8;
     context.beginPath();
     for (const side of [-1, 1]) context[side < 0 ? 'moveTo' : 'lineTo'](...place([middle[0] + side * body.half[0] * 1.12, slices[1 - i]]));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Connect the state, the picture and the controls of the page.
 
-const CHECKBOXES = [...SHOWN, 'inside']; // ids of checkboxes, which are also the fields of State that they set
+const CHECKBOXES = [...SHOWN, 'inside']; // ids of checkboxes; each sets the field of State with the same name
 const VIEW_ANGLE = 0.5; // vertical field of view of the camera, radians
 const KIND_TEXT = {
   displacement: 'Distance of each point from its position FROM.',
@@ -39,12 +39,12 @@ function start() {
   const basis = readBasis();
   const state = new State(basis);
   takeLink(location.hash, state);
-  state.measure(); // a link may hold a deeper breath
+  state.measure(); // the link may have a larger volume
   const canvas = $('picture');
   let picture = pictureOn(canvas, basis);
   const letters = new Letters($('letters'), 2);
   const { inside } = basis;
-  const fromWhere = basis.from.name.replace(/^the /, 'in the '); // "supine at rest", "in the scan"
+  const fromWhere = basis.from.name.replace(/^the /, 'in the '); // for example "in the scan"
   const restOrScan = basis.resting ? 'rest' : 'scan';
   const redraw = () => { unseen = true; };
   const tangent = Math.tan(VIEW_ANGLE / 2);
@@ -68,8 +68,8 @@ function start() {
   const cameraTurn = () => compose(turn([1, 0, 0], state.camera.elevation - RIGHT_ANGLE), turn([0, 0, 1], state.camera.azimuth));
   const isDark = () => document.documentElement.dataset.theme === 'dark';
 
-  /** Return the largest coordinate of the lungs along a direction, mm: over all vertices if colours show heights,
-   * else over some 400, which are enough to place the arrow and the table. */
+  /** Return the largest coordinate of the lungs along a direction, mm. If colours show heights, use all vertices,
+   * otherwise about 400, which are enough to place the arrow and the table. */
   function reachAlong(moment, towards) {
     const { surface, direction, coefficients, modes } = basis;
     const { weights, gains } = moment;
@@ -313,7 +313,7 @@ function start() {
     }
   }
 
-  /** Return the height of each lung's middle against gravity, mm. */
+  /** Return the height of the middle of each lung, against gravity, mm. */
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
   let described = null; // the moment that the sentences describe, and the stride of the vertices that they use
@@ -342,7 +342,7 @@ function start() {
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // for example "rest + 500 mL"
 
   const last = {};
-  /** Call act(value) if a value differs from the last one, which is kept here because reading the page is slower. */
+  /** Call act(value) if a value differs from the last one. `last` keeps it because reading the page is slower. */
   const changed = (what, value, act) => {
     if (last[what] === value) return;
     last[what] = value;
@@ -518,7 +518,7 @@ function start() {
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
     redraw();
   };
-  /** Zoom by a ratio; the point at a position on the canvas, at the depth of the pivot, stays there. */
+  /** Zoom by a ratio. The point at the position `at` on the canvas, in the depth of the pivot, does not move. */
   const zoom = (ratioOfSizes, at) => {
     const { width, height } = boxSize();
     const aspect = width / height;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Write the bits of the value and of the position under the pointer. The index of the lung replaces the lowest 4 bits
-// of the value.
+// Write what is under the pointer: the value, whose lowest 4 bits are the index of the lung, then the position.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

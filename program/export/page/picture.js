@@ -179,7 +179,7 @@ class Picture {
     return this.states[name];
   }
 
-  /** Return the vertex array that draws the state `name` in colours that measure from the state `origin`. */
+  /** Return the vertex array that draws the state `name`, with displacements from the state `origin`. */
   shown(name, origin) {
     const { gl } = this;
     const key = `${name} ${origin}`;
@@ -190,8 +190,8 @@ class Picture {
     return this.arrays[key];
   }
 
-  /** Make the list of edges as pairs of vertices, lung by lung. Of the two directions in which triangles of a closed
-   * surface follow an edge, only that towards the larger index is listed. */
+  /** Make the list of edges as pairs of vertices, lung by lung. The two triangles at an edge of a closed surface
+   * follow it in opposite directions; only the direction towards the larger index is listed. */
   makeEdges() {
     const { gl, basis } = this;
     const { corners } = basis;
@@ -311,7 +311,7 @@ class Picture {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** Return the uniforms of a moment; those of the last moment are kept. */
+  /** Return the uniforms of a moment. The uniforms of the last moment are kept. */
   uniforms(moment) {
     if (this.uniformsMoment !== moment) {
       this.uniformsMoment = moment;
@@ -434,7 +434,7 @@ class Picture {
     }
   }
 
-  /** Draw the content in the colours of the lungs; in grey if they show expansion, which points do not have. */
+  /** Draw the content in the colours of the lungs, or in grey if colours show expansion, which points do not have. */
   drawContent(pane) {
     const { gl, content } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
@@ -446,7 +446,7 @@ class Picture {
     this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // balls of at least 4 pixels
   }
 
-  /** Draw arrows at some vertices, from the state from which colours measure to the state shown. */
+  /** Draw arrows that show displacements at some vertices. */
   drawArrows(pane) {
     const { gl, solid } = this;
     const key = `arrows ${pane.state} ${pane.origin}`;
@@ -479,7 +479,6 @@ class Picture {
     }
   }
 
-  /** Draw the table. */
   drawTable(pane) {
     const { gl, solid } = this;
     this.usePane(solid, pane);
@@ -491,7 +490,7 @@ class Picture {
     gl.drawArrays(gl.TRIANGLES, 0, 36);
   }
 
-  /** Draw panes on a framebuffer; null is the canvas. */
+  /** Draw panes on a framebuffer, or on the canvas if it is null. */
   draw(panes, framebuffer = null) {
     const { gl } = this;
     this.beginTiming();
@@ -517,8 +516,8 @@ class Picture {
     this.endTiming();
   }
 
-  /** Ask what is at the position (x, y) in a pane, -1 to 1 each. picked() has the answer a frame or two later, so
-   * that no frame waits for it. */
+  /** Ask what is at the position (x, y) in a pane, both from -1 to 1. picked() has the answer a frame or two later,
+   * so that no frame waits for it. */
   pick(pane, x, y) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);

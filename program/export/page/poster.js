@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Draw the surface on a 2-D canvas if WebGL 2 is missing, farthest triangles first. Unlike Picture, a Poster has no
+// If WebGL 2 is missing, draw the surface on a 2-D canvas, farthest triangles first. Unlike Picture, a Poster has no
 // shading, lines, arrows, content or picking.
 
 class Poster {

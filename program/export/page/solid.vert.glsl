@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Project the arrow of gravity, the table, or the arrows that show displacements of the surface.
-layout(location = 0) in vec3 position; // on an arrow of length 1 from the origin along -z, or on the table's box
+// Project the arrow of gravity, the table, or the arrows of displacements. `position` is on an arrow of length 1 from
+// the origin along -z, or on the table's box.
+layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 tail;     // start of each arrow, mm
 layout(location = 3) in vec3 head;     // end of each arrow, mm
 uniform mat4 toEye;
 uniform mat4 projection;
-uniform float thick; // largest scale across the arrows from tail to head, mm; 0: toEye alone places the solid
+uniform float thick; // largest scale across an arrow from tail to head, mm; 0 if toEye alone places the solid
 out vec3 facing;
 out vec3 body;
 

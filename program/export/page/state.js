@@ -36,7 +36,7 @@ function postureText(gravity) {
   return gravity.map((x) => x.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
-/** Return a direction of gravity as postureText does, but "left side" for "left". */
+/** Return a direction of gravity like postureText, but "left side" instead of "left". */
 const postureWords = (gravity) => postureText(gravity).replace(/^(left|right)$/, '$1 side');
 
 /** Return {q, tilt} of a posture in the notation of --posture, or null if the text is not valid. */
@@ -65,8 +65,8 @@ const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 
 class State {
   constructor(basis) {
     this.basis = basis;
-    this.standing = { q: POSTURES[2].q, tilt: 0 }; // the chosen posture, and its tilt, degrees
-    this.q = POSTURES[2].q;                        // the rotation shown, which turns to the chosen posture
+    this.standing = { q: POSTURES[2].q, tilt: 0 }; // chosen posture; tilt in degrees
+    this.q = POSTURES[2].q;                        // rotation shown, on its way to the chosen posture
     this.turning = null;
     this.tidal = basis.breathVolume;
     this.depth = 0;
@@ -154,8 +154,8 @@ class State {
     return true;
   }
 
-  /** Range of the colours: the range that the user typed, or one that contains 95 % of the surface in each of six
-   * postures at the largest volume in use. */
+  /** Range of the colours: the range that the user typed, or one that contains 95 % of the surface in each of POSTURES
+   * at the largest volume in use. */
   get range() {
     const own = this.ownRanges[this.kind];
     if (!own) return this.ranges[this.kind];

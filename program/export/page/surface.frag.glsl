@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Colour the surface by value, with soft shading so that the colours can be read from the bar.
+// Colour the surface by value. Shading is weak, so that colours match the bar.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;
 in float value;
 uniform sampler2D colours;
 uniform vec2 range;    // values at the ends of the colours
-uniform float spacing; // difference of the value between contour lines; 0: no lines
+uniform float spacing; // difference of the value between contour lines; 0 for no lines
 uniform float dark;    // 1 on a dark background
 uniform vec4 cut;      // plane of the cut: the side dot(body, xyz) > w is not drawn
 uniform float opacity;
-uniform float ghost;   // 0: the surface in colours; 1: a translucent shell; 2: the shell's outline alone
-uniform float flatly;  // 1: colours without shading, for the wireframe
+uniform float ghost;   // 0: surface in colours; 1: translucent shell; 2: only the outline of the shell
+uniform float flatly;  // 1 for colours without shading (the wireframe)
 out vec4 colour;
 
 void main() {
@@ -36,7 +36,7 @@ void main() {
   if (!gl_FrontFacing && cut.w < 1e9) base = mix(base, vec3(0.55), 0.55); // the inner side, seen through the cut
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, -0.1, 0.45));
-  // Shade weakly, so that colours match the bar; darker outlines show the shape.
+  // Darker outlines show the shape.
   float diffuse = 0.93 + 0.06 * max(dot(n, key), 0.0) + 0.02 * max(dot(n, fill), 0.0);
   vec3 lit = base * diffuse * (1.0 - 0.5 * pow(edge, 7.0));
   colour = vec4(clamp(lit, 0.0, 1.0) * opacity, opacity);

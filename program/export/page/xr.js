@@ -10,8 +10,7 @@ const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
   return sum;
 });
 
-/** Return a pane as one eye of the headset sees it. Millimetres of the pane become metres in the room, in front of
- * the viewer. */
+/** Return a pane as one eye of the headset sees it: in front of the viewer, in metres instead of millimetres. */
 function xrPane(pane, view, { x, y, width, height }) {
   const room = Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * pane.distance - XR_AWAY, 1]);
   const toEye = product(view.transform.inverse.matrix, room);
@@ -21,8 +20,8 @@ function xrPane(pane, view, { x, y, width, height }) {
   };
 }
 
-/** Show `button`, which starts and ends a session, if the browser supports a headset. frame(time) advances the
- * state and returns the pane to draw, or null; over() is called after a session. */
+/** If the browser supports a headset, show `button`, which starts and ends a session. frame(time) advances the state
+ * and returns the pane to draw, or null. over() is called after a session. */
 async function offerXr(button, getPicture, frame, over) {
   if (!(await navigator.xr?.isSessionSupported('immersive-vr').catch(() => false))) return;
   button.hidden = false;
