@@ -11,7 +11,7 @@
 #include "runtime/internal.h"
 #include "runtime/safetensors/platform.h"
 
-/* The file being checked, its name in messages, and the error struct that a failure fills in. */
+/* A file being checked, and its name in messages. */
 typedef struct check {
   const supine_safetensors *file;
   const char *name;
@@ -24,14 +24,14 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   va_start(arguments, format);
   (void)vsnprintf(detail, sizeof detail, format, arguments);
   va_end(arguments);
-  return supine_error_set(c->error, SUPINE_ERROR_FORMAT,
-                          "%s: %s: make the file again with 'supine precompute'", c->name, detail);
+  const bool embedded = supine_safetensors_metadata(c->file, "content") != NULL;
+  return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s: make the file again with '%s'",
+                          c->name, detail, embedded ? "supine embed" : "supine precompute");
 }
 
-/* Check that all numbers are finite and below 2^30 in magnitude. No lung needs larger numbers, and
- * sums over 256 modes of products of three such numbers stay finite. Comparing only the exponent
- * bits also refuses infinity and NaN and needs no branch for each element, so that the check runs
- * at the speed of memory. */
+/* Return whether all numbers are finite and below 2^30 in magnitude. No lung needs larger numbers,
+ * and sums over 256 modes of products of three such numbers stay finite. A comparison of exponent
+ * bits also refuses infinity and NaN. It needs no branch and runs at the speed of memory. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -45,22 +45,22 @@ static bool finite_floats(const float *values, size_t count) {
 static bool finite_doubles(const double *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
-    bad += fabs(values[i]) < 0x1p30 ? 0 : 1; /* NaN also counts as bad, because it compares false */
+    bad += fabs(values[i]) < 0x1p30 ? 0 : 1; /* the comparison is false for NaN */
   }
   return bad == 0;
 }
 
-/* Expected length that matches an axis of any length. */
+/* Length of an axis that require() does not check. */
 #define ANY SIZE_MAX
 
 /* Find a tensor and check its type, shape and numbers. Replace each ANY in `shape` by the length of
- * that axis. Return the numbers, or NULL with the error set if the tensor is missing or unfit. */
-static const void *want(const check *c, const char *name, supine_dtype dtype, size_t rank,
-                        size_t *shape) {
+ * that axis. Return the numbers of the tensor; if a check fails, set the error and return NULL. */
+static const void *require(const check *c, const char *name, supine_dtype dtype, size_t rank,
+                           size_t *shape) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, name);
   size_t count = 1;
   if (tensor == NULL || tensor->dtype != dtype || tensor->rank != rank) {
-    (void)refuse(c, "tensor '%s' is missing, or not of the type and rank of a basis file", name);
+    (void)refuse(c, "tensor '%s' is missing or has a wrong type or number of axes", name);
     return NULL;
   }
   for (size_t i = 0; i < rank; ++i) {
@@ -80,8 +80,8 @@ static const void *want(const check *c, const char *name, supine_dtype dtype, si
   return tensor->data;
 }
 
-/* Check the metadata and the checksum. Files of version 1 may have a checksum of 16 digits by an
- * older algorithm, which is not checked. */
+/* Check the metadata and the checksum, but not the older checksum of 16 digits in files of version
+ * 1. */
 static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *format = supine_safetensors_metadata(c->file, "format");
   const char *version = supine_safetensors_metadata(c->file, "version");
@@ -93,7 +93,7 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
                             c->name);
   }
   if (version == NULL || strlen(version) != 1 || strchr("123", version[0]) == NULL) {
-    return refuse(c, "its basis format has version %.16s, but this program reads 1 to 3",
+    return refuse(c, "its format has version %.16s, but this program reads versions 1 to 3",
                   version == NULL ? "unknown" : version);
   }
   info->volume_axes = version[0] == '3' ? 3 : 1;
@@ -111,8 +111,8 @@ static supine_status check_surface(const check *c, supine_basis *basis) {
   size_t vertices[2] = {ANY, 3};
   size_t triangles[2] = {ANY, 3};
   uint32_t highest = 0;
-  info->vertices = want(c, "vertices", SUPINE_F32, 2, vertices);
-  info->triangles = want(c, "triangles", SUPINE_U32, 2, triangles);
+  info->vertices = require(c, "vertices", SUPINE_F32, 2, vertices);
+  info->triangles = require(c, "triangles", SUPINE_U32, 2, triangles);
   if (info->vertices == NULL || info->triangles == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
@@ -135,8 +135,8 @@ static supine_status check_field(const check *c, supine_basis *basis) {
   size_t scalar[] = {n, ANY};
   size_t vector[] = {n, 3, ANY};
   size_t direction[] = {n, 3};
-  info->coefficients = info->vector ? want(c, "coefficients", SUPINE_F32, 3, vector)
-                                    : want(c, "coefficients", SUPINE_F32, 2, scalar);
+  info->coefficients = info->vector ? require(c, "coefficients", SUPINE_F32, 3, vector)
+                                    : require(c, "coefficients", SUPINE_F32, 2, scalar);
   if (info->coefficients == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
@@ -145,7 +145,7 @@ static supine_status check_field(const check *c, supine_basis *basis) {
     return refuse(c, "the number of modes is %zu, not 1 to %d", info->mode_count, SUPINE_MODES_MAX);
   }
   if (!info->vector) {
-    info->direction = want(c, "direction", SUPINE_F32, 2, direction);
+    info->direction = require(c, "direction", SUPINE_F32, 2, direction);
   }
   return info->vector || info->direction != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
@@ -153,7 +153,7 @@ static supine_status check_field(const check *c, supine_basis *basis) {
 static supine_status check_modes(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t shape[] = {info->mode_count, ANY};
-  info->modes = want(c, "modes", SUPINE_F64, 2, shape);
+  info->modes = require(c, "modes", SUPINE_F64, 2, shape);
   if (info->modes == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
@@ -186,8 +186,8 @@ static void bound_lungs(supine_basis *basis) {
   basis->info.bounds = basis->bounds[0][0];
 }
 
-/* Read the names of the lungs from the metadata "lungs", such as "left,right"; name further lungs
- * by their index. Return the number of names in the metadata. */
+/* Read the names of the lungs from the metadata "lungs", such as "left,right". The name of every
+ * other lung is its index. Return the number of names in the metadata. */
 static size_t name_lungs(const check *c, supine_basis *basis) {
   const char *at = supine_safetensors_metadata(c->file, "lungs");
   size_t named = 0;
@@ -207,11 +207,11 @@ static size_t name_lungs(const check *c, supine_basis *basis) {
 }
 
 /* Check that tensor 'lung' groups the vertices by lung (0 ... 0 1 ... 1 2 ...), and find where each
- * lung begins. A lung that the metadata names may be empty: content may lie in one lung only. */
+ * lung begins. A lung with a name may have no vertices, as embedded content may lie in one lung. */
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t n = info->vertex_count;
-  const unsigned char *lung = want(c, "lung", SUPINE_U8, 1, &n);
+  const unsigned char *lung = require(c, "lung", SUPINE_U8, 1, &n);
   if (lung == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
@@ -229,8 +229,9 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   }
   if (at != n) {
     return refuse(
-        c, "vertex %zu belongs to lung %u: vertices must be grouped by lung, 0 to at most %d", at,
-        lung[at], SUPINE_LUNGS_MAX - 1);
+        c,
+        "vertex %zu belongs to lung %u, but vertices must be grouped by lung, from 0 to at most %d",
+        at, lung[at], SUPINE_LUNGS_MAX - 1);
   }
   while (count < named) {
     basis->lung_begin[count++] = n;
@@ -259,9 +260,9 @@ static supine_status check_volume(const check *c, supine_basis *basis) {
   if (!info->has_volume) {
     return SUPINE_OK;
   }
-  info->volume_linear = want(c, names[0], SUPINE_F64, axes == 3 ? 3 : 2, shape);
-  info->volume_quadratic = want(c, names[1], SUPINE_F64, axes == 3 ? 4 : 3, shape);
-  info->volume_cubic = want(c, names[2], SUPINE_F64, 4, cubic);
+  info->volume_linear = require(c, names[0], SUPINE_F64, axes == 3 ? 3 : 2, shape);
+  info->volume_quadratic = require(c, names[1], SUPINE_F64, axes == 3 ? 4 : 3, shape);
+  info->volume_cubic = require(c, names[2], SUPINE_F64, 4, cubic);
   return info->volume_linear != NULL && info->volume_quadratic != NULL && info->volume_cubic != NULL
              ? SUPINE_OK
              : SUPINE_ERROR_FORMAT;
@@ -312,8 +313,8 @@ static void measure_lungs(supine_basis *basis) {
   }
 }
 
-/* Find the volume of each lung of the reference surface, mL. Measure the surface, unless the file
- * holds embedded content, whose metadata state the volumes. */
+/* Measure the volume of each lung of the reference surface, mL. Embedded content has no such
+ * surface; its metadata state the volumes. */
 static supine_status check_reference(const check *c, supine_basis *basis) {
   basis->info.reference_volume = basis->reference_volume;
   if (!basis->info.has_volume) {
@@ -327,8 +328,8 @@ static supine_status check_reference(const check *c, supine_basis *basis) {
   return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* Read the metadata of the scan's state and of full inflation. Without them, the scan is the
- * reference surface, supine. */
+/* Read the metadata of the scan's state and of full inflation. By default, the scan is the
+ * reference surface in the posture supine. */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
@@ -361,13 +362,13 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
   }
   size_t shape[2] = {basis->info.lung_count, RESTING_TERMS};
   basis->rest_by_lung = tensor->rank == 2;
-  basis->resting = basis->rest_by_lung ? want(c, "resting_volume", SUPINE_F64, 2, shape)
-                                       : want(c, "resting_volume", SUPINE_F64, 1, shape + 1);
+  basis->resting = basis->rest_by_lung ? require(c, "resting_volume", SUPINE_F64, 2, shape)
+                                       : require(c, "resting_volume", SUPINE_F64, 1, shape + 1);
   basis->info.has_rest = basis->resting != NULL;
   return basis->resting != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Check the optional normals: the tensors of their modes and of their weights, both or neither. */
+/* Check the optional tensors of the normals. Both or neither must exist. */
 static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t terms = supine_basis_normal_terms(basis);
@@ -376,7 +377,7 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
       supine_safetensors_find(c->file, "normal_weights") == NULL) {
     return SUPINE_OK;
   }
-  info->normals = want(c, "normals", SUPINE_I16, 3, shape);
+  info->normals = require(c, "normals", SUPINE_I16, 3, shape);
   if (info->normals == NULL) {
     return SUPINE_ERROR_FORMAT;
   }
@@ -387,8 +388,9 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   }
   size_t one[] = {info->lung_count, info->normal_count, terms};
   size_t by_axis[] = {info->lung_count, info->normal_count, 3, terms};
-  info->normal_weights = info->volume_axes == 3 ? want(c, "normal_weights", SUPINE_F64, 4, by_axis)
-                                                : want(c, "normal_weights", SUPINE_F64, 3, one);
+  info->normal_weights = info->volume_axes == 3
+                             ? require(c, "normal_weights", SUPINE_F64, 4, by_axis)
+                             : require(c, "normal_weights", SUPINE_F64, 3, one);
   return info->normal_weights != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
@@ -401,9 +403,10 @@ static supine_status prepare(const check *c, supine_basis *basis,
   supine_simd simd = options->simd;
   if ((int)storage < 0 || storage >= SUPINE_STORAGE_COUNT || (int)simd < 0 ||
       simd >= SUPINE_SIMD_COUNT) {
-    return supine_error_set(c->error, SUPINE_ERROR_ARGUMENT,
-                            "unknown storage %d or instruction set %d: give values of the enums",
-                            (int)storage, (int)simd);
+    return supine_error_set(
+        c->error, SUPINE_ERROR_ARGUMENT,
+        "storage %d or instruction set %d is unknown: use supine_storage, supine_simd",
+        (int)storage, (int)simd);
   }
   basis->kernels = supine_kernels_choose(&simd);
   if (basis->kernels == NULL) {

@@ -5,15 +5,15 @@
 
 #include <supine/breath.h>
 
-/* Number of equal parts of a limb's range for integration. Control parameters within their bounds
- * change the compliance by a factor of at most e^500 over the range and e^16 over one part, over
- * which a rule of 16 points is accurate to 1e-15. */
+/* Number of equal parts of a limb's range for integration. Allowed control parameters change the
+ * compliance by a factor of at most e^500 over the range, and of at most e^16 over one part. In
+ * such a part, a rule of 16 points is accurate to 1e-15. */
 enum { LIMB_PARTS = 32 };
 
 /* A limb and its integral, which is computed once for many pressures and volumes. */
 typedef struct integrated {
   supine_pv_curve curve;
-  double sum[LIMB_PARTS + 1]; /* integral of slope() from -1 to each end of a part */
+  double sum[LIMB_PARTS + 1]; /* sum[i] integrates slope() from x = -1 to the beginning of part i */
 } integrated;
 
 const char *supine_breath_limb_name(supine_pv_limb limb) {
@@ -35,22 +35,22 @@ supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_err
   }
   for (int i = 0; i < SUPINE_PV_CONTROLS; ++i) {
     if (!(fabs(curve->control[i]) <= SUPINE_PV_CONTROL_MAX)) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "control parameter c%d is %g; it must be within +-%d", i + 1,
-                              curve->control[i], (int)SUPINE_PV_CONTROL_MAX);
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT, "control parameter c%d is %g: give a number from -%d to %d",
+          i + 1, curve->control[i], (int)SUPINE_PV_CONTROL_MAX, (int)SUPINE_PV_CONTROL_MAX);
     }
   }
   return SUPINE_OK;
 }
 
-/* Compute exp(U(x)) of supine_breath_curve_evaluate. Term n of U is c_n+1 times the integral of the
- * Legendre polynomial P_n from -1 to x, (P_n+1 - P_n-1) / (2 n + 1). */
+/* Compute exp(U(x)) of supine_breath_curve_evaluate. The recurrence of Legendre polynomials L_n
+ * begins with before = L_0 and here = L_1. */
 static double slope(const supine_pv_curve *curve, double x) {
   double before = 1.0;
   double here = x;
   double sum = curve->control[0] * (x + 1.0);
   for (int n = 1; n < SUPINE_PV_CONTROLS; ++n) {
-    const double next = ((2 * n + 1) * x * here - n * before) / (n + 1); /* P_n+1(x) */
+    const double next = ((2 * n + 1) * x * here - n * before) / (n + 1); /* L_(n+1)(x) */
     sum += curve->control[n] * (next - before) / (2 * n + 1);
     before = here;
     here = next;
@@ -58,8 +58,7 @@ static double slope(const supine_pv_curve *curve, double x) {
   return exp(sum);
 }
 
-/* Integrate slope() between two x by the 16-point Gauss-Legendre rule [Abramowitz and Stegun,
- * 25.4]. */
+/* Integrate slope() from `from` to `to` by the 16-point rule [Abramowitz and Stegun, 25.4]. */
 static double integrate(const supine_pv_curve *curve, double from, double to) {
   static const double point[8] = {
       0.0950125098376374402, 0.2816035507792589132, 0.4580167776572273863, 0.6178762444026437484,
@@ -81,7 +80,7 @@ static double part_begin(int part) {
   return -1.0 + 2.0 * part / LIMB_PARTS;
 }
 
-/* Compute the integral of a curve that has passed supine_breath_curve_check. */
+/* Compute the integral of a limb that has passed supine_breath_curve_check. */
 static void limb_begin(const supine_pv_curve *curve, integrated *of) {
   of->curve = *curve;
   of->sum[0] = 0.0;
@@ -110,8 +109,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which the limb holds a volume, mL, within its range of volumes. The
- * volume at the result errs by at most 1e-11 of that range.
+/* Find the pressure, cmH2O, at which a limb holds a volume, mL, that is within its range. The
+ * volume at this pressure errs by at most 1e-11 of the range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };
@@ -135,7 +134,7 @@ static supine_status limb_pressure(const integrated *of, double volume, double *
     double next = at + (volume - held) / compliance;
     const bool inside = next >= low && next <= high;
     if (miss <= within || high - low <= 1e-15 * fabs(at)) {
-      *pressure = inside ? next : at; /* the Newton step is known already */
+      *pressure = inside ? next : at; /* take the Newton step, which is already known */
       return SUPINE_OK;
     }
     /* Bisect the bracket if the Newton step leaves it or the last step did not halve the error. */
@@ -178,7 +177,7 @@ const supine_pv *supine_breath_normal(void) {
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
-       /* Exhale limb: c_1 = -k (P_high - P_low) / 2, k = ln 2 / 7.58 [Salazar1964]. */
+       /* Exhale limb: c_1 = -k (P_high - P_low) / 2 with k = ln 2 / 7.58 cmH2O [Salazar1964]. */
        {{0.0, 30.0}, {0.0, 6000.0}, {-1.3716632861, 0.0, 0.0, 0.0, 0.0}}}};
   return &normal;
 }
@@ -207,14 +206,14 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   }
   if ((int)breath->course < 0 || breath->course >= SUPINE_PV_COURSE_COUNT) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "unknown pressure course %d: use supine_pv_course",
+                            "course %d is unknown: use a value of supine_pv_course",
                             (int)breath->course);
   }
   return SUPINE_OK;
 }
 
-/* Return the breath's position on its limb at a time in s: 0 at rest, 1 at the peak, linear in time
- * between them. Write the limb on which the breath is. */
+/* Return how far a breath is on its limb at a time in s: 0 at rest, 1 at the peak, and linear in
+ * time between them. Write the limb. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -234,7 +233,7 @@ typedef struct loop {
   double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained up to the peak pressure, mL */
 } loop;
 
-/* Check both limbs, and that the ranges of both hold a pressure. `what` names it in messages. */
+/* Check both limbs, and check that a pressure is in the range of both. Messages name it `what`. */
 static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
@@ -270,7 +269,7 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   if (full > inhale->volume[1]) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "tidal volume %g mL is larger than the %g mL that the inhale limb "
-                            "gains above %g cmH2O: give a smaller one",
+                            "gains above %g cmH2O: give a smaller volume",
                             breath->tidal, inhale->volume[1] - rest, cycle->rest);
   }
   status = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak);
@@ -295,8 +294,8 @@ static double between(double value, double low, double high) {
   return value < low ? low : value > high ? high : value;
 }
 
-/* Compute the volume, mL, and the pressure, cmH2O, at a time. At constant flow, find the pressure
- * from the volume; otherwise find the volume from the pressure. */
+/* Compute the volume, mL, and the pressure, cmH2O, at a time. If the flow is constant, find the
+ * pressure from the volume; otherwise, find the volume from the pressure. */
 static supine_status follow(const supine_pv_breath *breath, const loop *cycle, double time,
                             double *volume, double *pressure, supine_error *error) {
   static const double pi = 3.14159265358979323846;

@@ -4,7 +4,7 @@
 
 #include "runtime/rigid.h"
 
-/* Compute the factors that the kernels multiply by: K weights times the units of the packed
+/* Compute the factors by which the kernels multiply: K weights times the units of the packed
  * coefficients, then the three gains of a lung.
  * @param folded  [K + 3], written */
 static void fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded) {
@@ -123,7 +123,7 @@ void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xy
 
 void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
                          size_t begin, size_t end, float *xyz) {
-  enum { BLOCK_BYTES = 1 << 18 }; /* size of a block that stays in the cache */
+  enum { BLOCK_BYTES = 1 << 18 }; /* size of a block that fits in the cache */
   const size_t block = BLOCK_BYTES / basis->tiles.stride * TILE;
   const size_t apart = 3 * (end - begin);
   supine_target target = {.add_reference = true,

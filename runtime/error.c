@@ -17,8 +17,8 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
     scale = fmax(scale, fabs(pose->gains[i / 3][i % 3]));
   }
-  /* Packing, scaling the weights and the sum over K modes round the displacement K + 8 times;
-   * adding the reference position rounds each coordinate once more. */
+  /* The displacement is rounded K + 8 times: by packing, by the scaling of the weights and in the
+   * sum over K modes. The sum with the reference position rounds once more. */
   const double rounding =
       ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
   return 1.001 * (scale * stored + basis->reference_error + rounding);
@@ -51,7 +51,7 @@ double supine_basis_storage_error(const supine_basis *basis) {
     const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
     const supine_state state = {.gravity = {cell[0], cell[1], cell[2]}};
     if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
-      continue; /* the centre of the cube has no direction */
+      continue; /* gravity has no direction at the centre of the cube */
     }
     if (basis->info.has_volume) {
       if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {

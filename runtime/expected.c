@@ -6,7 +6,7 @@
 
 #include "runtime/expected.h"
 
-/* Standard deviation of an assumed volume at rest, as a fraction of the reference volume. */
+/* Standard deviation of an assumed volume at rest, divided by the reference volume. */
 static const double resting_spread = 0.05;
 const double supine_expected_shift = 0.01;
 
@@ -77,11 +77,11 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* Poses of a state (at) and of the state from which displacements count (from), and the same poses
- * with 1 % of the reference volume added if their state counts from an assumed rest. */
+/* Poses of a state (`at`) and of the state from which displacements count (`from`). `fuller_at` and
+ * `fuller_from` have 1 % of the reference volume more if the state counts from an assumed rest. */
 typedef struct poses {
   supine_pose at, from, fuller_at, fuller_from;
-  bool assumed; /* at least one of the two states counts from an assumed rest */
+  bool assumed; /* one state or both count from an assumed rest */
 } poses;
 
 static supine_status find_poses(const supine_basis *basis, const supine_state *state,

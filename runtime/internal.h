@@ -11,9 +11,10 @@
 /** Number of harmonics that describe the volume at rest: bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
-/** Bytes above which positions are written with stores that bypass the caches: STREAM_BYTES for the
- * tiles and positions of a frame, STREAM_BATCH_BYTES for the positions of a batch. A range of at
- * most STREAM_RANGE vertices is always stored in the caches, as its caller is likely to read it. */
+/** Number of bytes above which positions are written with stores that bypass the caches.
+ * STREAM_BYTES is for the tiles and positions of a frame, STREAM_BATCH_BYTES for the positions of a
+ * batch. A range of at most STREAM_RANGE vertices is always stored in the caches, as its caller is
+ * likely to read it. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
 /** Largest size of a lung's name in bytes, with its NUL. */
@@ -23,8 +24,8 @@ struct supine_basis {
   supine_basis_info info;
   size_t lung_begin[SUPINE_LUNGS_MAX + 1];
   supine_safetensors *file;
-  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE]; /**< NUL-terminated names of the lungs */
-  const char *name_of[SUPINE_LUNGS_MAX];        /**< pointers to `names`, for info.lung_names */
+  char names[SUPINE_LUNGS_MAX][LUNG_NAME_SIZE];
+  const char *name_of[SUPINE_LUNGS_MAX]; /**< pointers to `names`, for info.lung_names */
   float bounds[SUPINE_LUNGS_MAX][2][3];
 
   supine_tiles lit;   /**< modes of the normals; lit.bytes is NULL without normals */
@@ -37,12 +38,12 @@ struct supine_basis {
   /** Bounds on the packing error and the displacement of mode k at weight 1 and gain 1, mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< array that info.reference_volume points to, mL */
-  const double *resting; /**< harmonics of the volume at rest less the reference volume, mL: [G, 9],
-                            or [9] for all lungs together; NULL without rest */
-  bool rest_by_lung;     /**< `resting` is [G, 9], and each lung has its own gains */
-  double upright_gain;   /**< increase of the volume at full inflation from supine to upright, as a
-                            fraction of the reference volume */
-  double scan_volume;    /**< volume of all lungs in the scan less the reference volume, mL */
+  /** Coefficients of harmonics that describe the volume at rest minus the reference volume, mL:
+   * [G, 9] or, for all lungs together, [9]. NULL without rest. */
+  const double *resting;
+  bool rest_by_lung;   /**< `resting` has a row for each lung */
+  double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
+  double scan_volume;  /**< volume of all lungs in the scan minus the reference volume, mL */
   double scan_gravity[3];
   const uint32_t *rigid; /**< [rigid_count, 2] ranges of vertices (rigid.h) */
   size_t rigid_count;
@@ -58,26 +59,26 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
  * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
-/** Return the number of monomials of the K weights and of the gains in one coordinate of a normal,
+/** Return the number of terms that each coordinate of a normal has,
  *
  *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)
  *
- * where a and b are the gains of the two axes after that of the coordinate, cyclically. If all axes
- * have one gain (files of versions 1 and 2), a w_k and b w_k are one monomial. */
+ * for K weights w and the gains a and b of the other two axes. In files of versions 1 and 2, which
+ * have one gain, a w_k and b w_k are one term. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
 }
 
-/** Evaluate vertices begin <= i < end, all of one lung, with the weights and gains of the lung.
- * The target begins at vertex `begin`. */
+/** Evaluate vertices begin <= i < end of one lung. The target begins at vertex `begin`.
+ * @param folded  weights and gains of the lung for `kernel` (supine_deform_tiles) */
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
 
 /** Return a target that begins `count` vertices after another. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
-/** Compute supine_basis_info.storage_error for the current tiles, mm. */
+/** Compute supine_basis_info.storage_error, mm, for the current tiles. */
 double supine_basis_storage_error(const supine_basis *basis);
 
 /** Set all gains of a pose to the one number that adds `volume` mL to the reference volume.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fit the terms and the field of kriging.h to residuals of observed points. */
+/* Fit the terms and the random field of kriging.h to residuals of observed points. */
 #include <math.h>
 #include <string.h>
 
@@ -40,7 +40,8 @@ bool supine_kriging_factor(size_t count, double *matrix) {
   return true;
 }
 
-/* Solve L x = b for a lower triangle `factor` L [count, count]. `x` holds b before, x after. */
+/* Solve L x = b for the lower triangle L [count, count] in `factor`. Replace b in `x` by the
+ * solution. */
 static void forward(size_t count, const double *factor, double *x) {
   for (size_t i = 0; i < count; ++i) {
     double sum = x[i];
@@ -56,7 +57,7 @@ size_t supine_kriging_space(size_t count) {
 }
 
 /* Return the column that a term multiplies on an axis, and write the sign: 1, -1, or 0 if the term
- * does not change this axis. For a rotation, r x p = (r_y p_z - r_z p_y, ...). */
+ * does not change this axis. A rotation changes axis x by r_y p_z - r_z p_y, and so on. */
 static int column_of(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
@@ -71,7 +72,7 @@ static int column_of(size_t term, size_t axis, double *sign) {
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
-/* Compute the centre of the points, fill in the columns, and multiply each by L^-1. */
+/* Compute the centre of the points, fill in the columns, and multiply each column by L^-1. */
 static void whiten(supine_kriging *fit) {
   const size_t n = fit->count;
   memset(fit->centre, 0, sizeof fit->centre);
@@ -102,13 +103,16 @@ static double dot(size_t count, const double *a, const double *b) {
   return sum;
 }
 
-static bool absent(const supine_kriging_options *options, size_t term) {
+static bool is_known(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
-/* Compute the normal equations of the terms: matrix A = X' K^-1 X + P, right side X' K^-1 y + P m.
- * X are the columns of the terms, K is the covariance of the points, y are the residuals, P and m
- * the inverse covariance and mean of the prior. An absent term has a row of the identity. */
+/* Compute the matrix A and the right side of the normal equations of the terms:
+ *
+ *     A = X' K^-1 X + P        right = X' K^-1 y + P m
+ *
+ * X has the columns of the terms, K is the covariance of the points, and y are the residuals. The
+ * prior has the inverse covariance P and the mean m. A known term has a row of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -116,21 +120,22 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
   for (size_t k = 0; k < TERMS; ++k) {
     const bool prior = k == 3 && options->volume;
     right[k] = prior ? options->volume_mean : 0;
-    a[k * TERMS + k] = prior || absent(options, k) ? 1 : 0;
-    for (size_t axis = 0; axis < 3 && !absent(options, k); ++axis) {
+    a[k * TERMS + k] = prior || is_known(options, k) ? 1 : 0;
+    for (size_t axis = 0; axis < 3 && !is_known(options, k); ++axis) {
       double sign = 0;
       const double *x = fit->whitened + (size_t)column_of(k, axis, &sign) * n;
       right[k] += sign * dot(n, x, fit->whitened + (VALUE + axis) * n);
       for (size_t l = 0; l <= k; ++l) {
         double other = 0;
         const double *z = fit->whitened + (size_t)column_of(l, axis, &other) * n;
-        a[k * TERMS + l] += absent(options, l) ? 0 : sign * other * dot(n, x, z);
+        a[k * TERMS + l] += is_known(options, l) ? 0 : sign * other * dot(n, x, z);
       }
     }
   }
 }
 
-/* Return whether all pivots of `factor` are well above rounding errors of the diagonal of `a`. */
+/* Return whether the points determine all terms: all pivots of `factor` exceed rounding errors of
+ * `a`. */
 static bool determined(const double a[TERMS * TERMS], const double factor[TERMS * TERMS]) {
   for (size_t k = 0; k < TERMS; ++k) {
     const double pivot = factor[k * TERMS + k];
@@ -144,7 +149,7 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
 /* Compute the terms, their covariance A^-1, and supine_kriging.spread. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
-  double inverse[TERMS][TERMS]; /* row k: column k of the inverse of `factor` */
+  double inverse[TERMS][TERMS]; /* row k is column k of the inverse of `factor` */
   for (size_t k = 0; k < TERMS; ++k) {
     memset(inverse[k], 0, sizeof inverse[k]);
     inverse[k][k] = 1;
@@ -155,7 +160,7 @@ static void solve_terms(supine_kriging *fit, const supine_kriging_options *optio
   for (size_t k = 0; k < TERMS; ++k) {
     for (size_t l = 0; l < TERMS; ++l) {
       const double c =
-          absent(options, k) || absent(options, l) ? 0 : dot(TERMS, inverse[k], inverse[l]);
+          is_known(options, k) || is_known(options, l) ? 0 : dot(TERMS, inverse[k], inverse[l]);
       fit->covariance[k][l] = c;
       fit->terms[k] += c * right[l];
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -232,12 +237,12 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   return SUPINE_OK;
 }
 
-/* Compute the 3 x 3 block of point j in K^-1 - K^-1 X A^-1 X' K^-1 (normal_equations): the inverse
- * covariance of the point's residual less its prediction by all other points.
+/* Compute the inverse covariance [3, 3] of the residual of point j minus its prediction by all
+ * other points: the block of point j in K^-1 - K^-1 X A^-1 X' K^-1 (normal_equations).
  * @param row  [n] column j of L^-1 */
 static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
   const size_t n = fit->count;
-  double column[VALUE]; /* row j of K^-1 X */
+  double column[VALUE]; /* row j of K^-1 times the columns of X (normal_equations) */
   for (size_t c = 0; c < VALUE; ++c) {
     column[c] = dot(n, row, fit->whitened + c * n);
   }
@@ -279,7 +284,7 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double 
   double trace = 0;
   double solved[3];
   forward(3, block, residual);
-  for (size_t k = 0; k < 3; ++k) { /* column k of the inverse of `block` */
+  for (size_t k = 0; k < 3; ++k) { /* solve for column k of the inverse of `block` */
     double unit[3] = {k == 0, k == 1, k == 2};
     forward(3, block, unit);
     trace += dot(3, unit, unit);

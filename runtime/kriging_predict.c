@@ -7,11 +7,12 @@
 
 enum { RUN = 32, COLUMNS = SUPINE_KRIGING_TERMS };
 
-/* RUN points of a target, stored by axis. The last point of the target fills up its last run. */
+/* RUN points of a target, stored by axis. The last run is filled up with copies of the last
+ * point. */
 typedef struct run {
-  float place[3][RUN];  /* position less the centre of the fit, mm */
-  float volume[3][RUN]; /* displacement for one prior standard deviation of the volume, mm */
-  float root[RUN];      /* standard deviation of the field g on one axis, mm */
+  float place[3][RUN];  /* position minus supine_kriging.centre, mm */
+  float volume[3][RUN]; /* displacement if the volume grows by one prior standard deviation, mm */
+  float root[RUN];      /* standard deviation of the random field on one axis, mm */
 } run;
 
 static void fill(const supine_kriging *fit, const supine_kriging_target *target, size_t begin,
@@ -29,8 +30,8 @@ static void fill(const supine_kriging *fit, const supine_kriging_target *target,
   }
 }
 
-/* Compute the covariances of the field between a run and observed point j, mm^2. The factor exp(-a)
- * of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 5 approximates; its
+/* Compute the covariances of the random field between a run and observed point j, mm^2. exp(-a) of
+ * kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 5 approximates. The
  * relative error is 1e-6. */
 static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *in, float *out) {
   const supine_kriging_point *p = &fit->points[j];
@@ -67,7 +68,8 @@ static void project(size_t count, float (*w)[RUN], const double *numbers, float 
   }
 }
 
-/* Solve L w = k, where k are the covariances of g between the observed points and a run. */
+/* Solve L w = k for the lower triangle L in `fit`. k are the covariances of the random field
+ * between the observed points and a run. */
 static void solve(const supine_kriging *fit, size_t lung, const run *in, float (*w)[RUN]) {
   const size_t n = fit->count;
   for (size_t j = 0; j < n; ++j) {
@@ -87,9 +89,12 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
   }
 }
 
-/* Compute the 3-D variance of the prediction, 3 (k - w'w) + m' spread m, at each point of a run,
- * mm^2. k is the variance of g on one axis, w the result of solve(), and m the row (1, v, p - c)
- * (kriging.h) of the point less w' L^-1 times the rows of the observed points. */
+/* Compute the 3-D variance of the prediction at each point of a run, mm^2:
+ *
+ *     3 (k - w'w) + m' spread m
+ *
+ * k is the variance of g on one axis, w is the result of solve(), and m is the row (1, v, p - c) of
+ * the point (kriging.h) minus w' L^-1 times these rows of the observed points. */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute normals from a few modes, with weights quadratic in the weights of the displacement. */
+/* Compute normals from a few modes. */
 #include <string.h>
 
 #include "runtime/internal.h"
@@ -7,7 +7,7 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-/* Pack the normals of 16 vertices into a tile; row[v] points to the modes of vertex v, [3, Q]. */
+/* Pack the normals of 16 vertices into a tile. row[v] points to the modes [3, Q] of vertex v. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
                                     unsigned char *to) {
   const size_t words = supine_tiles_normal_words(tiles->modes);
@@ -47,7 +47,7 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Compute the sum of form_kl w_k w_l over k <= l; `form` holds the rows of an upper triangle. */
+/* Compute the sum of form_kl w_k w_l over k <= l. `form` holds the rows of an upper triangle. */
 static double triangle(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
@@ -93,7 +93,7 @@ void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *p
   }
 }
 
-/* Compute the weights of one lung's normals, in the unit of the packed modes. */
+/* Compute the weights of one lung's normals for the packed modes. */
 static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, pose, v);
@@ -108,7 +108,7 @@ static void light(const supine_basis *basis, const supine_pose *pose, size_t beg
   const supine_target target = {.xyz = normals,
                                 .stream = stream,
                                 .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* 0 for missing modes of the last word */
+  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* the missing modes of the last word stay 0 */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;

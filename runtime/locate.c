@@ -9,10 +9,10 @@
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
                "the largest numbers of points differ");
 
-/* Prior standard deviation of the volume as a fraction of the reference volume: 0.3 of the
- * difference between rest (0.43 of the reference volume) and full inflation. */
+/* Prior standard deviation of the volume, divided by the reference volume. It is 0.3 of the
+ * difference between full inflation (1) and rest (0.43). */
 static const double prior_spread = 0.17;
-static const double outlier_limit = 3.0; /* residual above which a point is an outlier, in sigma */
+static const double outlier_limit = 3.0; /* residual / sigma above which a point is an outlier */
 static const double outlier_noise = 300; /* noise that replaces the noise of an outlier, mm */
 static const double volume_step = 1;     /* change of the volume below which the search ends, mL */
 static const double angle_step = 1e-4;   /* rotation in a step below which the search ends, rad */
@@ -20,18 +20,18 @@ static const double angle_step = 1e-4;   /* rotation in a step below which the s
  * as it was measured after the best translation. */
 static const double sill_of_error = 4.0 / 3;
 
-/* Limits on the Gauss-Newton steps of a search and on the halvings of one change of the volume. */
+/* Largest number of Gauss-Newton steps, and of halvings of one change of the volume. */
 enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
-/* Inputs, outputs and work space of one call. */
+/* Input, output and work space of one call, for n observed points. */
 typedef struct workspace {
   const supine_locate_task *task;
   supine_location *found;
   supine_locate_fit *fit;
-  supine_kriging_point *points; /* [n] observed points */
+  supine_kriging_point *points; /* [n] */
   double *law;                  /* [n, 3] the law's positions in the current state, mm */
-  double *kriging;              /* [supine_kriging_space(n)] work space of the fit */
-  double *scratch;              /* [n] work space */
+  double *kriging;              /* [supine_kriging_space(n)] */
+  double *scratch;              /* [n] */
 } workspace;
 
 static size_t doubles_of(size_t bytes) {
@@ -86,7 +86,7 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
   }
 }
 
-/* Set all that does not depend on the state: scan positions, lungs, noise, options of the fit. */
+/* Set everything that does not depend on the state: scan positions, lungs, noise and options. */
 static supine_status initialise(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
@@ -123,7 +123,7 @@ static void rotate(const double rotation[9], const double x[3], double rotated[3
 }
 
 /* Compute the law's positions in the current state, their distances from the scan, and their change
- * for one prior standard deviation of the volume. */
+ * if the volume grows by one prior standard deviation. */
 static supine_status evaluate(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
@@ -181,7 +181,7 @@ static void find_residuals(workspace *s) {
   }
 }
 
-/* Start the search from the rotation that best fits the law's to the observed positions. */
+/* Start from the rotation that best turns the law's positions to the observed positions. */
 static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
@@ -228,7 +228,7 @@ static void rotate_further(double rotation[9], const double r[3]) {
   memcpy(rotation, product, sizeof product);
 }
 
-/* Change the volume by `ml` mL, at most by half its prior standard deviation; halve the change
+/* Change the volume by `ml` mL, but by at most half its prior standard deviation. Halve the change
  * until the lungs can hold the new volume. */
 static supine_status change_volume(workspace *s, double ml, supine_error *error) {
   const double most = 0.5 * s->fit->deviation;
@@ -274,9 +274,8 @@ static supine_status iterate(workspace *s, supine_error *error) {
   }
 }
 
-/* Compare each observed point with its prediction by all other points.
- * @return the point with the largest ratio of residual to sigma, or the number of points if no
- *         ratio exceeds outlier_limit */
+/* Compare each observed point with its prediction by all other points. Return the point with the
+ * largest ratio of residual to sigma, or the number of points if no ratio exceeds outlier_limit. */
 static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   const size_t n = s->task->count;
   size_t worst = n;

@@ -5,12 +5,12 @@
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
 
-/* Poses of the scan and of the located state (at; with more volume: fuller), and constants. */
+/* Poses of the located state (`at`), of the scan, and of the located state with 1 % of the
+ * reference volume added (`fuller`). */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* constant of the expected error, mm, limited to the RMS displacement (at least
-                      2 mm) */
-  double per_step; /* ratio of the prior standard deviation of the volume to the step to `fuller` */
+  double constant; /* c of supine/locate.h, mm, at most max(RMS displacement, 2 mm) */
+  double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
 } poses;
 
 static supine_status find_poses(const supine_location *found, const supine_basis *basis, poses *p,
@@ -66,10 +66,10 @@ static void predict(const supine_location *found, const supine_basis *basis, con
   supine_kriging_predict(&fit->kriging, &target, b->shift, b->variance);
 }
 
-/* Convert positions to the frame of the observations, and bound expected errors by those without
- * observations. Such a bound requires that three points or more determine the translation: with two
- * points, it would be too small by a factor of 0.85. It does not apply to a fitted rotation, whose
- * error it does not include. */
+/* Convert positions to the frame of the observations. If at least three points determine the
+ * translation and no rotation is fitted, limit the expected errors to those without observations.
+ * This limit does not include the error of a rotation. For two points, it would be too small by a
+ * factor of 0.85. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

@@ -14,7 +14,7 @@ void supine_normals(const supine_basis *basis, const float *xyz, float *normals)
     const float *c = xyz + 3 * (size_t)corner[2];
     const float u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
     const float v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    /* The normal of the triangle, with twice its area as length. */
+    /* The length of the triangle's normal is twice the area of the triangle. */
     const float n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
                         u[0] * v[1] - u[1] * v[0]};
     for (size_t j = 0; j < 3; ++j) {

@@ -9,7 +9,7 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of the number 1; fixed_narrow can hold it */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of 1, which fixed_narrow can hold */
   FLOAT_FRACTION_BITS = 23
 };
 
@@ -20,7 +20,7 @@ typedef struct source {
   float reference[TILE_NUMBERS];
 } source;
 
-/* Units of packed numbers, and the largest squared packing errors so far. */
+/* Units of packed numbers, and the largest squared packing errors. */
 typedef struct work {
   double mode[SUPINE_MODES_MAX]; /* unit of the coefficients of each mode, mm */
   double direction;              /* unit of a coordinate of a direction */
@@ -30,7 +30,7 @@ typedef struct work {
   source source;
 } work;
 
-/* Replace a number by 0 if it is so small that products with it could be subnormal, and slow. */
+/* Replace a number by 0 if products with it could be subnormal numbers, which are slow. */
 static float flush(float value) {
   return fabsf(value) < 1e-30F ? 0 : value;
 }
@@ -73,7 +73,8 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   }
 }
 
-/* Find the largest magnitude of each mode's coefficients times their direction's length, mm. */
+/* Find the largest magnitude of a coefficient of each mode times the length of its direction,
+ * mm. */
 static void largest_coefficients(const supine_basis *basis, float *top) {
   const size_t modes = basis->info.mode_count;
   const size_t rows = basis->tiles.axes;
@@ -90,8 +91,8 @@ static void largest_coefficients(const supine_basis *basis, float *top) {
   }
 }
 
-/* Return the power of two u for which top / u is 2^30 to 2^31, limited so that a product with u is
- * a normal float. */
+/* Return the power of two u for which top / u is 2^30 to 2^31. Limit u to values for which products
+ * with u are normal floats. */
 static double reference_unit(float top) {
   const int exponent = flush(top) > 0 ? ilogbf(top) - 30 : -130;
   return ldexp(1, exponent < 96 ? exponent : 96);
@@ -117,7 +118,7 @@ static void choose_units(supine_basis *basis, work *w) {
   largest_coefficients(basis, top);
   basis->reference_size = sqrt(3) * (double)farthest;
   w->reference = compact ? reference_unit(farthest) : 1;
-  /* Coordinates of directions are at most 1 here, as directions are divided by their lengths. */
+  /* Coordinates of directions are at most 1, as directions were divided by their lengths. */
   w->direction = compact && basis->info.direction != NULL ? 1.0 / FIXED_TOP : 1;
   basis->tiles.reference_unit = (uint32_t)ilogb(w->reference) << FLOAT_FRACTION_BITS;
   for (size_t k = 0; k < basis->info.mode_count; ++k) {

@@ -38,8 +38,8 @@ static void contract(const supine_basis *basis, size_t lung, const double *weigh
                          basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
-/* Compute the volume at rest less the reference volume, mL, from harmonics y: of lung `row` or, in
- * files of versions 1 and 2, of all lungs together (row 0). */
+/* Compute the volume at rest minus the reference volume, mL, from the harmonics y of gravity. `row`
+ * is a lung, or 0 for all lungs together if the file has only one row. */
 static double resting(const supine_basis *basis, size_t row, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
@@ -56,7 +56,7 @@ static double sum_of(const double *values, size_t count) {
   return sum;
 }
 
-/* Volumes in one posture less the reference volume, mL. */
+/* Volumes in a posture minus the reference volume, mL. */
 typedef struct volumes {
   size_t lung_count;
   supine_volume_form form[SUPINE_LUNGS_MAX];
@@ -65,13 +65,17 @@ typedef struct volumes {
   double rest_total;
 } volumes;
 
+static supine_status refuse_gravity(supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                          "gravity is zero or not finite: give a vector with a direction");
+}
+
 static supine_status find_volumes(const supine_basis *basis, const double gravity[3],
                                   const double *weights, volumes *v, supine_error *error) {
   double y[RESTING_TERMS];
   *v = (volumes){.lung_count = basis->info.lung_count};
   if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "gravity is zero or not finite: give a vector with a direction");
+    return refuse_gravity(error);
   }
   const double length =
       sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1] + gravity[2] * gravity[2]);
@@ -97,7 +101,7 @@ static supine_status refuse(const char *what, supine_error *error) {
                           what);
 }
 
-/* Find the volume of all lungs together less the reference volume, mL. */
+/* Find the volume of all lungs together minus the reference volume, mL. */
 static supine_status total_of(const supine_basis *basis, const volumes *v,
                               const supine_volume *volume, double *total, supine_error *error) {
   switch (volume->kind) {
@@ -115,13 +119,13 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
     return SUPINE_OK;
   default:
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "unknown kind of volume %d: use supine_volume_kind", (int)volume->kind);
+                            "volume kind %d is unknown: use a value of supine_volume_kind",
+                            (int)volume->kind);
   }
 }
 
-/* Divide a total volume among the lungs; all volumes are mL above the reference volume. Above rest,
- * every lung is the same fraction of the way from its volume at rest to its volume at full
- * inflation; below rest, all lungs hold the same fraction of their volumes at rest. */
+/* Divide a total volume among the lungs (supine_basis_pose). Volumes are mL above the reference
+ * volume. */
 static void share_out(const supine_basis *basis, const volumes *v, double total, double *lung_ml) {
   const double *reference = basis->info.reference_volume;
   const double whole = sum_of(reference, v->lung_count);
@@ -174,8 +178,8 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   return status;
 }
 
-/* Find the gains of each lung from its own volume. At rest, at full inflation and in the scan, a
- * lung has the volume that it holds when all lungs are in that state. */
+/* Find the gains of each lung from its own volume. If this volume counts from rest, full inflation
+ * or the scan, it counts from the volume that the lung holds when all lungs are in that state. */
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
@@ -220,7 +224,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set the gains for the reference surface, the only state that a basis without volumes has. */
+/* Set the gains for the reference surface. A basis without volumes has no other state. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;
@@ -270,8 +274,7 @@ supine_status supine_basis_gains(const supine_basis *basis, const supine_state *
 supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "gravity is zero or not finite: give a vector with a direction");
+    return refuse_gravity(error);
   }
   return supine_basis_gains(basis, state, pose, error);
 }

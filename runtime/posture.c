@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Find the direction of gravity in a posture, an orientation or a tilt. */
 #include <math.h>
-#include <stdbool.h>
 #include <string.h>
 
 #include <supine/posture.h>

@@ -11,7 +11,7 @@ void supine_rigid_rotation(const double h[3][3], double rotation[9]) {
       {h[1][2] - h[2][1], h[0][0] - h[1][1] - h[2][2], h[0][1] + h[1][0], h[2][0] + h[0][2]},
       {h[2][0] - h[0][2], h[0][1] + h[1][0], h[1][1] - h[0][0] - h[2][2], h[1][2] + h[2][1]},
       {h[0][1] - h[1][0], h[2][0] + h[0][2], h[1][2] + h[2][1], h[2][2] - h[0][0] - h[1][1]}};
-  double shift = 0; /* added to every eigenvalue so that all of them are positive */
+  double shift = 0; /* added to every eigenvalue, so that all are positive */
   for (size_t k = 0; k < 16; ++k) {
     shift += m[k / 4][k % 4] * m[k / 4][k % 4];
   }

@@ -7,29 +7,29 @@
 #include "runtime/internal.h"
 
 /** Find the rotation that best maps points p to points x, by least squares [Horn 1987, J Opt Soc Am
- * A 4(4)].
- * @param h         [3, 3] sum over the points of p_a x_b, where p and x count from their means
+ * A 4(4)]. The means of p and of x must be 0.
+ * @param h         [3, 3] sum over the points of p_a x_b
  * @param rotation  [3, 3] by rows, written */
 void supine_rigid_rotation(const double h[3][3], double rotation[9]);
 
-/** The rigid motion x = R (p - mean p) + mean x of a part, where p are its reference positions and
- * x its positions deformed without regard to rigidity. Zero-initialise. */
+/** The rigid motion x = R (p - mean of p) + mean of x of a rigid part. p are its reference
+ * positions, and x are its positions deformed as if it were not rigid. Zero-initialise. */
 typedef struct supine_rigid_motion {
   double count;          /**< number of vertices added */
-  double from[3], to[3]; /**< sums of p and x, mm; their means after supine_rigid_finish */
+  double from[3], to[3]; /**< sums of p and x, mm; supine_rigid_finish turns them into means */
   double cross[3][3];    /**< sum of p_a x_b; supine_rigid_finish subtracts the means of p and x */
-  double rotation[9];    /**< R by rows, set by supine_rigid_finish */
+  double rotation[9];    /**< rotation R by rows, set by supine_rigid_finish */
 } supine_rigid_motion;
 
-/** Add `count` vertices with positions p and x [count, 3] to the sums. */
+/** Add the positions p and x [count, 3] of `count` vertices to the sums of a motion. */
 void supine_rigid_add(supine_rigid_motion *motion, const float *p, const float *x, size_t count);
 /** Compute the means and the rotation R after all vertices were added. */
 void supine_rigid_finish(supine_rigid_motion *motion);
-/** Compute coordinate `axis` of the position, mm, to which the motion takes p. */
+/** Move one point p rigidly, and return coordinate `axis` of the result, mm. */
 double supine_rigid_move(const supine_rigid_motion *motion, const float *p, size_t axis);
 
-/** Replace the positions [N, 3] of each rigid part in `xyz`, mm, by the rigid motion of
- * its reference positions that fits the replaced positions best. */
+/** Replace the positions of each rigid part in `xyz` [N, 3], mm, by its reference positions, moved
+ * rigidly so that they fit the replaced positions best. */
 void supine_rigid_restore(const supine_basis *basis, float *xyz);
 
 #endif

@@ -20,7 +20,7 @@ static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
 _Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT,
                "one name for each kind of volume");
 
-enum { PIECE = 64 }; /* size in bytes of the text of a posture or volume, with its NUL */
+enum { PIECE = 64 }; /* size of the text of a posture or volume in bytes, with its NUL */
 
 /* Read a number, with or without the unit "mL". */
 static bool read_number(const char *text, double *value, bool *has_unit) {
@@ -173,7 +173,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
     return SUPINE_OK;
   }
   const char *equals = strchr(text, '=');
-  if (equals != NULL && colon != NULL && colon > equals) { /* no posture before the colon */
+  if (equals != NULL && colon != NULL && colon > equals) { /* no posture precedes the colon */
     colon = NULL;
   }
   if (colon == NULL) {
@@ -200,7 +200,7 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   return status;
 }
 
-/* A text being written, which is cut off at `size` bytes, and the length of the whole text. */
+/* A text being written, cut off at `size` bytes. `length` is the length of the whole text. */
 typedef struct writer {
   char *text;
   size_t size;
@@ -225,8 +225,7 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
     double named[3];
     (void)supine_posture_gravity(names[i], named);
     if (g[0] * named[0] + g[1] * named[1] + g[2] * named[2] > 1 - 1e-14) {
-      const bool side = described && named[0] != 0;
-      add(out, "%s%s", names[i], side ? " side" : "");
+      add(out, "%s%s", names[i], described && named[0] != 0 ? " side" : "");
       return;
     }
   }

@@ -2,8 +2,8 @@
 // Compute a vertex of a deformed lung and its normal in a vertex shader, in GLSL ES 3.00 or GLSL 3.30 core.
 // Put this text after the #version line (and, for ES, after "precision highp float;").
 //
-//     x = reference + gain (w . c) direction    w: K weights, gain: 3 numbers of each lung, c: K numbers a vertex
-//     n = sum over j of v_j n_j           v: Q numbers of each lung, n_j: Q vectors a vertex
+//     x = reference + gain (w . c) direction    w: K weights; gain: 3 numbers of a lung; c: K numbers of a vertex
+//     n = sum over j of v_j n_j                v: Q numbers of a lung; n: Q vectors of a vertex
 //
 // Attributes come from supine_gl_pack and supine_gl_pack_normals, the uniforms from supine_gl_weights
 // and supine_gl_normal_weights (supine/runtime.h). reference.w is the index of the lung and selects its gains, so

@@ -91,6 +91,20 @@ static double cubic_solve(const double c[3], double volume, double low, double h
   return s;
 }
 
+static supine_status refuse_constant(double volume, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "a change of the reference surface's volume by %g mL is out of reach: "
+                          "no gain changes the volume in this posture; choose another posture",
+                          volume);
+}
+
+static supine_status refuse_folded(double volume, double limit, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "a change of the reference surface's volume by %g mL is out of reach: "
+                          "the surface folds at a change of %g mL; choose a smaller change",
+                          volume, limit);
+}
+
 supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                   supine_error *error) {
   const double *c = cubic;
@@ -99,20 +113,14 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     return SUPINE_OK;
   }
   if (!isfinite(volume) || !isfinite(c[0] + c[1] + c[2]) || c[0] == 0) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "a change of the reference surface's volume by %g mL is out of reach: "
-                            "no gain changes the volume in this posture; choose another posture",
-                            volume);
+    return refuse_constant(volume, error);
   }
   const double side = volume / c[0] > 0 ? 1 : -1;
   double far = cubic_turn(c, side);
   if (isfinite(far)) {
     const double reach = cubic_at(c, far);
     if (fabs(reach) < fabs(volume)) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a change of the reference surface's volume by %g mL is out of "
-                              "reach: the surface folds at a change of %g mL; choose a smaller one",
-                              volume, reach);
+      return refuse_folded(volume, reach, error);
     }
   } else {
     far = volume / c[0];
@@ -121,11 +129,7 @@ supine_status supine_volume_scale(const double cubic[3], double volume, double *
     }
     far *= 2;
     if (!isfinite(far)) {
-      return supine_error_set(
-          error, SUPINE_ERROR_NUMERICAL,
-          "a change of the reference surface's volume by %g mL is out of reach: "
-          "no gain changes the volume in this posture; choose another posture",
-          volume);
+      return refuse_constant(volume, error);
     }
   }
   *scale = side > 0 ? cubic_solve(c, volume, 0, far) : cubic_solve(c, volume, far, 0);
@@ -167,8 +171,8 @@ static double volume_on_path(const supine_volume_form *form, const double bend[3
   return supine_volume_form_at(form, gains);
 }
 
-/* Find the gains on the path of supine_volume_bend at which the lung holds `volume`: step along the
- * path until that volume is passed, then bisect the last step. */
+/* Find the gains on the path of supine_volume_bend at which the lung holds `volume`. Step along the
+ * path until the volume is passed, then bisect the last step. */
 static supine_status follow_path(const supine_volume_form *form, const double bend[3], double scale,
                                  double rest, double volume, double gains[3], supine_error *error) {
   const double step = volume / rest > 0 ? 1.0 / 16 : -1.0 / 16;
@@ -182,10 +186,7 @@ static supine_status follow_path(const supine_volume_form *form, const double be
     far += step;
     held = volume_on_path(form, bend, scale, far, gains);
     if (!(side * held > side * before)) {
-      return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a change of the reference surface's volume by %g mL is out of "
-                              "reach: the surface folds at a change of %g mL; choose a smaller one",
-                              volume, before);
+      return refuse_folded(volume, before, error);
     }
   }
   for (int halving = 0; halving < 60; ++halving) {

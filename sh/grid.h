@@ -24,7 +24,7 @@ typedef struct supine_sh_grid {
  * integrates products of two functions of band L exactly if latitudes > L and longitudes > 2 L.
  * @param grid  written, NULL on failure; free it with supine_sh_grid_destroy
  * @retval SUPINE_ERROR_ARGUMENT  a number is out of range
- * @retval SUPINE_ERROR_MEMORY    an allocation failed (in GSL: after its error handler ran) */
+ * @retval SUPINE_ERROR_MEMORY    an allocation failed (GSL first calls its error handler) */
 supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_sh_grid **grid);
 
 /** Free a rule; NULL is legal. */

@@ -14,8 +14,8 @@
 #include <supine/status.h>
 
 /** Plan for transforms of a fixed number of fields on one grid, up to a highest band. Only one
- * thread at a time may use a plan, and only one thread of the process may create or destroy plans,
- * as FFTW's planner has global state. */
+ * thread at a time may use a plan. Only one thread of the process may create or destroy plans,
+ * because FFTW's planner has global state. */
 typedef struct supine_sh_transform supine_sh_transform;
 
 /** Create a plan.

@@ -199,7 +199,7 @@ TEST(test_breath_out_of_range_refused) {
   breath.tidal = 5000.0;
   expect_argument(normal, &breath, 1.0, "tidal volume 5000 mL is larger than");
   breath = breath_of(SUPINE_PV_COURSE_COUNT);
-  expect_argument(normal, &breath, 1.0, "unknown pressure course");
+  expect_argument(normal, &breath, 1.0, "course 3 is unknown");
   supine_pv narrow = *normal; /* an exhale limb that ends below the peak pressure */
   narrow.limb[SUPINE_PV_EXHALE].pressure[1] = 6.0;
   breath = breath_of(SUPINE_PV_COSINE);

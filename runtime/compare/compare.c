@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the Gram matrices of a basis, and from them RMS distances and energies; compute the
+/* Compute the Gram matrices of a basis, and from them RMS distances and energies. Compute the
  * distance of every vertex, and statistics of distances. */
 #include <math.h>
 #include <stdint.h>
@@ -17,7 +17,7 @@ struct supine_compare {
   double area;  /* area of the reference surface, mm^2 */
   float *share; /* [N] fraction a_i of the area that belongs to vertex i */
   double *gram; /* [G, 3, K, K] Gram matrix of each lung and axis, mm^2 */
-  double *sum;  /* [K, K] the sum of all Gram matrices, mm^2 */
+  double *sum;  /* [K, K] sum of all Gram matrices, mm^2 */
 };
 
 static const double four_pi = 12.566370614359172954;
@@ -37,8 +37,7 @@ static double twice_area(const supine_basis *basis, const uint32_t *corner) {
   return supine_length(product);
 }
 
-/* Compute the fraction a_i of the area of each vertex i: a third of the area of its triangles,
- * divided by the area of all triangles. */
+/* Compute the fraction a_i of the area for each vertex i (supine/compare.h). */
 static supine_status share_area(supine_compare *compare, supine_error *error) {
   const supine_basis *basis = compare->basis;
   const size_t n = basis->info.vertex_count;
@@ -239,9 +238,9 @@ void supine_compare_distances(const supine_compare *compare, const supine_pose *
   }
 }
 
-/* Find the smallest distance that at least `target` of the area does not exceed. Non-negative
- * floats have the same order as their bits, so three histograms of the area, each with 2^11 bins,
- * determine the upper, middle and lower bits of the result. */
+/* Find the smallest distance d for which a fraction `target` of the area has distances of at most
+ * d. Non-negative floats have the same order as their bits. Three histograms of the area, each with
+ * 2^11 bins, therefore determine the upper, middle and lower bits of d. */
 static double percentile(const supine_compare *compare, const float *distance, double target) {
   enum { ROUNDS = 3, BITS = 11, BINS = 1 << BITS };
   const size_t n = compare->basis->info.vertex_count;
@@ -258,7 +257,7 @@ static double percentile(const supine_compare *compare, const float *distance, d
       }
     }
     uint32_t at = 0;
-    uint32_t last = 0; /* last bin with area, used if rounding leaves `target` above the sum */
+    uint32_t last = 0; /* last bin with area, if rounding makes `target` too large */
     for (; at < BINS && (bin[at] == 0 || below + bin[at] < target); ++at) {
       below += bin[at];
       last = bin[at] > 0 ? at : last;
@@ -276,20 +275,20 @@ static double percentile(const supine_compare *compare, const float *distance, d
 
 void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                supine_distance_statistics *statistics) {
-  double area = 0;
+  double shares = 0;
   double sum = 0;
   double square = 0;
   float largest = 0;
   for (size_t i = 0; i < compare->basis->info.vertex_count; ++i) {
     const double share = (double)compare->share[i];
     const double d = (double)distance[i];
-    area += share; /* 1 after the last vertex, up to rounding */
+    shares += share;
     sum += share * d;
     square += share * d * d;
     largest = distance[i] > largest ? distance[i] : largest;
   }
-  statistics->mean = sum / area;
-  statistics->rms = sqrt(square / area);
-  statistics->p95 = percentile(compare, distance, 0.95 * area);
+  statistics->mean = sum / shares;
+  statistics->rms = sqrt(square / shares);
+  statistics->p95 = percentile(compare, distance, 0.95 * shares);
   statistics->max = (double)largest;
 }

@@ -11,35 +11,37 @@
 
 enum { BEFORE, AFTER, TIMES };
 
-/* A point of the surface. Levels increase along gravity: points above a cut have smaller levels. */
+/* A point of the surface. Its level is its coordinate along gravity before the breath, mm, so that
+ * lower points have larger levels. */
 typedef struct corner {
   double at[TIMES][3]; /* positions before and after the breath, mm */
-  double level;        /* coordinate along gravity before the breath, mm */
+  double level;
 } corner;
 
-/* A triangle, or its part between two levels, which has at most five corners. */
+/* A triangle, or the part of a triangle between two levels, which has at most five corners. */
 typedef struct polygon {
   size_t count;
   corner corner[6];
 } polygon;
 
-/* Sums over the edges (p, q) of a cut's outline, directed as in the polygons above the cut. */
+/* Sums over the edges from p to q of the outline of a cut. Edges have the direction that they have
+ * in the polygons above the cut. */
 typedef struct outline {
-  double length;           /* length of all edges before the breath, mm */
+  double length;           /* total length of the edges before the breath, mm */
   double middle[TIMES][3]; /* sum of edge midpoints times edge lengths, mm^2 */
   double area[TIMES][3];   /* sum of the cross products p x q, mm^2 */
 } outline;
 
-/* The slabs, and the cuts of one lung at the levels between them. */
+/* The slabs, and the cuts of one lung between them. */
 typedef struct cutter {
   const float *from;                  /* [N, 3] positions before the breath, mm */
   double down[3];                     /* unit vector along gravity */
   size_t count;                       /* number of slabs */
-  double level[SUPINE_SLABS_MAX + 1]; /* top of each slab, and bottom of the last, mm */
+  double level[SUPINE_SLABS_MAX + 1]; /* tops of the slabs, then bottom of the lowest slab, mm */
   outline cut[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-/* Read a vertex. Its positions are relative to the first vertex, for precision. */
+/* Read a vertex. For precision, subtract the position of the first vertex. */
 static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   corner out;
   for (size_t i = 0; i < 3; ++i) {
@@ -50,7 +52,7 @@ static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   return out;
 }
 
-/* Add the volume of the cone from the origin to a polygon, and what it gains in the breath, mL. */
+/* Add the volume of the cone from the origin to a polygon, mL, and its gain, to a slab. */
 static void add_polygon(const polygon *p, supine_slab *slab) {
   double volume[TIMES] = {0};
   for (size_t i = 1; i + 1 < p->count; ++i) {
@@ -91,7 +93,7 @@ static void add_edge(const corner *p, const corner *q, outline *cut) {
 /* Split a polygon at a level between its corners, and add the new edge to `cut`.
  * @param above, below  written; must not be `p` */
 static void split(const polygon *p, double level, polygon *above, polygon *below, outline *cut) {
-  /* Points where the outline of the polygon passes the level downwards and upwards. */
+  /* The points where the outline of the polygon crosses the level downwards and upwards. */
   corner end[2] = {{.level = level}, {.level = level}};
   above->count = below->count = 0;
   for (size_t i = 0; i < p->count; ++i) {
@@ -109,7 +111,6 @@ static void split(const polygon *p, double level, polygon *above, polygon *below
   add_edge(&end[0], &end[1], cut);
 }
 
-/* Find the slab that contains level t. */
 static size_t slab_of(const cutter *c, double t) {
   size_t slab = 0;
   while (slab + 1 < c->count && c->level[slab + 1] <= t) {
@@ -176,7 +177,7 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
   }
   if (!supine_normalise(gravity, c.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "gravity is 0 or not finite: give a direction");
+                            "gravity is zero or not finite: give a vector with a direction");
   }
   if (!basis->info.has_volume) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,

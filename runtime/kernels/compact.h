@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Compact numbers: two or three numbers in a word of 32 bits, or three in two words.
+ * Compact numbers: two or three numbers in a word of 32 bits, or three numbers in two words.
  *
  * To read a number, shift its word left until the number has the uppermost bits, and convert the
- * whole word as a signed integer. The lower bits belong to other numbers, which are packed first;
- * then the number is chosen so that the whole word is as near as possible to the value. */
+ * whole word as a signed integer. The lower bits of this integer come from other numbers, which
+ * were packed before. Packing therefore chooses the bits of a number so that the whole word is as
+ * near as possible to the number. */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
 
-#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
-/** Return a word as a signed integer. */
+/** Return the bits of a word as a signed integer. */
 static inline int32_t word_integer(uint32_t word) {
   int32_t value = 0;
   memcpy(&value, &word, sizeof value);
@@ -25,8 +25,8 @@ static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
 
-/** Return the word that is nearest to `value` and has the lowest `bits` bits of `low`; for NaN, the
- * smallest such word. */
+/** Return the word that is nearest to `value` and ends in the lowest `bits` bits of `low`. For NaN,
+ * return the smallest such word. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
@@ -40,7 +40,8 @@ static inline uint32_t pair_narrow(double first, double second) {
   return word_nearest(second, word_nearest(first, 0, 16) >> 16, 16);
 }
 
-/** Pack three numbers between -2^31 and 2^31 into the upper 11, middle 11 and lower 10 bits. */
+/** Pack three numbers between -2^31 and 2^31 into the upper 11, next 11 and last 10 bits of a
+ * word. */
 static inline uint32_t triple_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 22) >> 22;
   const uint32_t lower = word_nearest(second, low << 11, 21) >> 11;
@@ -48,15 +49,15 @@ static inline uint32_t triple_narrow(double first, double second, double third) 
 }
 
 /** Pack three modes of a normal, between -2^31 and 2^31, into the upper 13, the next 10 and the
- * lowest 9 bits of a word, as the first modes are the largest. */
+ * lowest 9 bits of a word. The first modes get more bits, as they are the largest. */
 static inline uint32_t normal_narrow(double first, double second, double third) {
   const uint32_t low = word_nearest(third, 0, 23) >> 23;
   const uint32_t lower = word_nearest(second, low << 13, 22) >> 13;
   return word_nearest(first, lower, 19);
 }
 
-/** Return the unit of normal_narrow, as a multiple of the unit of the file's 16-bit numbers: the
- * largest number, 32767, becomes 255 x 2^23, the largest value of 9 bits. */
+/** Return the unit of numbers for normal_narrow, in units of the 16-bit numbers of a file. The
+ * largest 16-bit number, 32767, becomes 255 x 2^23, the largest number that 9 bits can hold. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }
@@ -66,9 +67,10 @@ static inline float normal_number(uint32_t word, size_t number) {
   return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
 }
 
-/** Pack three numbers between -2^31 and 2^31 into two words: the first two into the upper 21 bits
- * of a word each, the third into the remaining 22 bits. Replace 0 by the smallest positive number,
- * as the kernels multiply by a power of two by adding it to the exponent bits (reference_unit). */
+/** Pack three numbers between -2^31 and 2^31 into two words. The first two numbers get the upper 21
+ * bits of a word each, the third number the remaining 22 bits. A number that would become 0 becomes
+ * the smallest positive number instead: the kernels multiply by a power of two by adding to the
+ * exponent bits of a float (reference_unit), which is wrong for 0. */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;

@@ -7,8 +7,8 @@
  *     LANES            4, 8 or 16
  *     FMA(a, b, c)     a * b + c
  *     RSQRT(x)         an estimate of 1 / sqrt(x), accurate to 12 bits at least
- *     STREAM(to, v)    store a vector and bypass the caches; or OWN_WRITER, if the file defines
- *                      its own writer in place of the one below */
+ *     STREAM(to, v)    store a vector and bypass the caches
+ *     OWN_WRITER       instead of STREAM, if the file defines its own `writer` */
 #include "runtime/kernels/tiles.h"
 #include <string.h>
 
@@ -25,7 +25,7 @@ enum {
   KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
 
-/* One number of each vertex of a tile. */
+/* One number for each vertex of a tile. */
 typedef struct row {
   vf v[GROUPS];
 } row;
@@ -45,7 +45,7 @@ typedef struct triples {
 #define EACH(F, j) EACH4(F, j, 0), EACH4(F, j, 4), EACH4(F, j, 8), EACH4(F, j, 12)
 #endif
 
-/* Lane i of vector j of x y z x y z ... holds coordinate AXIS(j, i) of vertex VERTEX(j, i). */
+/* In `triples`, lane i of vector j holds coordinate AXIS(j, i) of vertex VERTEX(j, i). */
 #define VERTEX(j, i) (((j)*LANES + (i)) / 3)
 #define AXIS(j, i) (((j)*LANES + (i)) % 3)
 
@@ -73,11 +73,11 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Constants for which the compiler specialises a loop. If `modes` is not 0, the loop writes only
+/* Constants for which the compiler specialises a loop. Loops with modes > 0 write only
  * positions. */
 typedef struct form {
   supine_storage storage;
-  size_t modes; /* number of modes; 0: any number */
+  size_t modes; /* 0 for any number of modes */
   bool vector;
 } form;
 
@@ -89,7 +89,7 @@ INLINE void add_mode(row *sum, vf w, const unsigned char *at, int shift, bool co
   }
 }
 
-/* Compute the sum of weight times coefficient over the modes of 16 vertices. */
+/* Sum weight times coefficient over the modes, for each of 16 vertices. */
 INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights *w, form f) {
   const bool compact = supine_tiles_compact(f.storage);
   const bool known = f.modes > 0;
@@ -98,7 +98,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   row *even = &sum[0];
   row *odd = &sum[CHAINS - 1];
   for (size_t q = 0; q < CHAINS * GROUPS; ++q) {
-    sum[q / GROUPS].v[q % GROUPS] = splat(-0.0F); /* -0 + x is x for every x, even for x = -0 */
+    sum[q / GROUPS].v[q % GROUPS] = splat(-0.0F); /* -0 + x is x for every x, even for -0 */
   }
   for (size_t k = 0; k < paired / 2; ++k, at += compact ? 64 : 128) {
     add_mode(even, weight(w, 2 * k, known), at, 16, compact);
@@ -119,7 +119,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   return *even;
 }
 
-/* Load the 48 numbers of directions or reference positions; compact numbers keep their unit. */
+/* Load 48 coordinates of directions or reference positions. Do not scale compact numbers to mm. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
   for (size_t j = 0; j < PIECES && !compact; ++j) {
@@ -135,7 +135,6 @@ INLINE triples numbers(const unsigned char *at, bool compact) {
   return n;
 }
 
-/* Load the reference positions of a tile, mm. */
 INLINE triples reference_positions(const supine_tiles *tiles, const unsigned char *tile,
                                    bool compact) {
   triples p = numbers(tile + tiles->reference_begin, compact);
@@ -145,7 +144,7 @@ INLINE triples reference_positions(const supine_tiles *tiles, const unsigned cha
   return p;
 }
 
-/* Interleave the coordinates of 16 vertices to x y z x y z ...: first x with y, then z. */
+/* Interleave the coordinates of 16 vertices as x y z x y z ... */
 INLINE triples interleave(const row *x, const row *y, const row *z) {
 #define FROM_XY(j, i) (VERTEX(j, i) + (AXIS(j, i) == 1 ? LANES : 0))
 #define FROM_Z(j, i) (AXIS(j, i) == 2 ? VERTEX(j, i) + LANES : (i))
@@ -162,7 +161,7 @@ INLINE triples interleave(const row *x, const row *y, const row *z) {
 #undef PIECE
 }
 
-/* Repeat the number of each vertex three times, once for each axis. */
+/* Repeat the number of each vertex three times, for x, y and z. */
 INLINE triples spread(const row *a) {
   triples t;
   for (size_t q = 0; q < GROUPS; ++q) {
@@ -174,7 +173,7 @@ INLINE triples spread(const row *a) {
 }
 
 #ifndef OWN_WRITER
-/* An array that is written in order; if `stream`, with stores that bypass the caches. */
+/* An array that is written in order. If `stream`, its stores bypass the caches. */
 typedef struct writer {
   float *to;
   bool stream;
@@ -249,9 +248,7 @@ INLINE void deform_tiles(const supine_tiles *any, const float *folded, size_t fi
     const triples xyz = deform_tile(&tiles, tile, &w, gain, add_reference, f);
     put_tile(&out, &xyz);
   }
-  if (count > 0) {
-    writer_close(&out);
-  }
+  writer_close(&out);
 }
 
 INLINE void deform_kind(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
@@ -263,8 +260,8 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *folded, size_t f
   }
 }
 
-/* Choose the loop for the storage. The loop of INT16 for any number of modes also evaluates MIXED,
- * as it reads from `tiles` all numbers in which the two storages differ. */
+/* Choose the loop for the storage. The loop for INT16 with any number of modes also evaluates
+ * MIXED, because it reads the layout from `tiles`. */
 INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_t first,
                            size_t count, const supine_target *target, size_t modes) {
   if (tiles->storage == SUPINE_STORAGE_EXACT) {
@@ -288,7 +285,7 @@ static void deform(const supine_tiles *tiles, const float *folded, size_t first,
   }
 }
 
-/* Compute one coordinate of unnormalised normals, in partial sums for the three modes of a word. */
+/* Compute one coordinate of unnormalised normals. Sum the three modes of a word separately. */
 INLINE vf dot_normal(const unsigned char *at, const float *w, size_t words) {
   vf sum[3] = {{0}, {0}, {0}};
   for (size_t j = 0; j < words; ++j, at += 64) {
@@ -313,8 +310,8 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
       for (size_t axis = 0; axis < 3; ++axis) {
         v[axis] = dot_normal(tile + axis * axis_bytes + q * sizeof(vf), w, words);
       }
-      /* FLT_MIN is added so that a zero vector does not become NaN. One Newton step doubles the
-       * number of correct bits of the estimate. */
+      /* Add FLT_MIN so that a zero vector does not become NaN. One Newton step doubles the number
+       * of correct bits of the estimate. */
       const vf square = FMA(v[0], v[0], FMA(v[1], v[1], v[2] * v[2])) + 0x1p-126F;
       const vf guess = RSQRT(square);
       const vf error = FMA(-(square * guess), guess, splat(1));
@@ -326,9 +323,7 @@ INLINE void light_words(const supine_tiles *tiles, const float *w, size_t first,
     const triples xyz = interleave(&n[0], &n[1], &n[2]);
     put_tile(&out, &xyz);
   }
-  if (count > 0) {
-    writer_close(&out);
-  }
+  writer_close(&out);
 }
 
 static void light(const supine_tiles *tiles, const float *w, size_t first, size_t count,

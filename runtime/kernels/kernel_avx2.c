@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Kernels for AVX2 and FMA: two vectors hold one number of the 16 vertices of a tile. */
+/* Kernels for AVX2 and FMA: two vectors hold one number for each of the 16 vertices of a tile. */
 #include "runtime/kernels/tiles.h"
 
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
 
-/* Store a vector and bypass the caches. If the array is aligned to only 16 bytes, as by malloc,
- * store two halves, which the processor combines. With less alignment, do not bypass the caches. */
+/* Store a vector. Bypass the caches if the array is aligned to 16 bytes, like memory of malloc: the
+ * processor combines two halves. If the array is aligned to 32 bytes, one store suffices. */
 static inline __attribute__((always_inline)) void stream8(float *to, __m256 v) {
   if ((uintptr_t)to % 16 != 0) {
     _mm256_storeu_ps(to, v);

@@ -5,15 +5,15 @@
  *     coefficients   for each axis (1 for scalar fields, 3 for vector fields)
  *                      EXACT  16 floats for each mode
  *                      INT16  16 words of 32 bits for every two modes (compact.h)
- *                      MIXED  as INT16, but 16 words for every three of the last modes
+ *                      MIXED  like INT16, but 16 words for every three of the last modes
  *     direction      48 numbers x y z x y z ...; none for vector fields
  *     reference      48 numbers x y z x y z ..., reference positions
  *
  * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. Directions and
- * reference positions are floats (EXACT) or fixed-point numbers, three in two words (compact.h), in
- * a unit that suits the largest number: within half a metre of the origin, a position errs by at
- * most 0.0005 mm in each coordinate. The units of coefficients and directions are multiplied into
- * the weights, once a frame. */
+ * reference positions are floats (EXACT), or fixed-point numbers of which three share two words
+ * (compact.h). Their unit suits the largest number: within half a metre of the origin, a position
+ * errs by at most 0.0005 mm in each coordinate. Once a frame, the weights are multiplied by the
+ * units of coefficients and directions. */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
 
@@ -32,10 +32,10 @@ typedef struct supine_tiles {
   size_t direction_begin; /**< byte offset of the directions in a tile */
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
   size_t stride;          /**< size of a tile in bytes */
-  size_t count;           /**< number of tiles */
-  /** Unit of compact reference positions, a power of two: the bits of its exponent in a float. */
+  size_t count;
+  /** Unit of compact reference positions, a power of two, as the exponent bits of a float. */
   uint32_t reference_unit;
-  unsigned char *bytes; /**< [count, stride] the tiles */
+  unsigned char *bytes; /**< [count, stride] */
 } supine_tiles;
 
 /** Return whether a storage is compact: two or three coefficients share a word, and directions and
@@ -44,13 +44,13 @@ static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return the number of words of a vertex that hold three coefficients each, of the last modes. */
+/** Return the number of words per vertex that each hold three of the last modes. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
 
-/** Return the number of modes outside the words of supine_tiles_thirds. In a compact storage, two
- * of these modes share a word. */
+/** Return the number of modes that are not in the words of supine_tiles_thirds. In a compact
+ * storage, two of these modes share a word. */
 static inline size_t supine_tiles_paired(supine_storage storage, size_t modes) {
   return modes - 3 * supine_tiles_thirds(storage, modes);
 }
@@ -80,21 +80,22 @@ static inline size_t supine_tiles_normal_words(size_t modes) {
   return (modes + 2) / 3;
 }
 
-/** Fill in the layout of tiles of normals: rows of 16 words, supine_tiles_normal_words per axis. */
+/** Fill in the layout of tiles of normals. Each axis has supine_tiles_normal_words rows of 16
+ * words. */
 static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, size_t count) {
   *tiles = (supine_tiles){.modes = modes, .axes = 3, .count = count};
   tiles->axis_bytes = TILE * sizeof(uint32_t) * supine_tiles_normal_words(modes);
   tiles->stride = 3 * tiles->axis_bytes;
 }
 
-/** How to prefetch tiles. */
+/** What to prefetch. */
 typedef enum supine_prefetch {
-  SUPINE_PREFETCH_NONE, /**< not at all, as the tiles are in the cache */
+  SUPINE_PREFETCH_NONE, /**< nothing, as the tiles are in the cache */
   SUPINE_PREFETCH_NEAR, /**< every other line, 640 bytes ahead, to the second-level cache */
   SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
 
-/** Prefetch `stride` bytes ahead of a tile. */
+/** Prefetch `stride` bytes, at the distance ahead of `tile` that `how` states. */
 static inline __attribute__((always_inline)) void
 supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch how) {
   enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality arguments of __builtin_prefetch */
@@ -111,14 +112,15 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
 
 /** Where and how a kernel writes. */
 typedef struct supine_target {
-  float *xyz;         /**< [vertices of the tiles, 3] positions, displacements or normals */
-  bool add_reference; /**< write positions; false: displacements */
+  float *xyz;         /**< positions, displacements or normals of all vertices of the tiles */
+  bool add_reference; /**< write positions, not displacements */
   bool stream;        /**< use stores that bypass the caches */
   supine_prefetch prefetch;
 } supine_target;
 
 /** Evaluate tiles first <= t < first + count of one lung, and write their vertices to the target.
- * @param weights  [K + 3] weights and gains of the lung */
+ * @param weights  [K + 3] weights times units (top of this file), then the gains of the lung
+ * @param count    at least 1 */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
 
@@ -135,8 +137,8 @@ static inline void supine_stream_fence(bool stream) {
 
 typedef struct supine_kernels {
   supine_deform_tiles *deform;
-  /** Evaluate unit normals from tiles of supine_tiles_layout_lit. `weights` has three numbers for
-   * each word of a coordinate, in the order of the modes. */
+  /** Evaluate unit normals from tiles of supine_tiles_layout_lit. `weights` holds the weights of
+   * the modes, padded with 0 to 3 supine_tiles_normal_words numbers. */
   supine_deform_tiles *light;
 } supine_kernels;
 

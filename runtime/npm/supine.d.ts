@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-/** A posture and a volume as text: "prone", "left:rest+500", "full-300", "2600mL". Or an object:
- * `gravity` is the direction in which things fall in the patient's axes (default: supine, [0, 1, 0]); `volume` is a text
- * (default: the volume of the basis); `gain`, in place of a volume, is one gain for all lungs, 0 on the reference surface. */
+/** A posture and a volume, as text ("prone", "left:rest+500", "full-300", "2600mL") or as an object. `gravity` is the
+ * direction in which things fall, in the patient's axes; the default is supine, [0, 1, 0]. `volume` is a text; the
+ * default is the volume of the basis. `gain` replaces the volume by one gain of all lungs; 0 is the reference surface. */
 export type State = string | { gravity?: ArrayLike<number>; volume?: string; gain?: number };
 
 /** The numbers of a tensor of the file: a view, row-major. */
@@ -11,7 +11,7 @@ export interface Tensor {
 }
 
 /** An open basis and its posed surface. Arrays are views of WebAssembly memory that never moves: write only to
- * `positions` and `normals`. Lengths are mm, volumes mL, axes LPS: +x left, +y posterior, +z head. */
+ * `positions` and `normals`. Lengths are in mm, volumes in mL, axes are LPS: +x left, +y posterior, +z head. */
 export interface Basis {
   readonly vertexCount: number;
   /** Reference positions [3 N], mm. */

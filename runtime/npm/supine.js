@@ -74,7 +74,8 @@ class Basis {
     this.#read(state);
     const fixed = state.gain !== undefined;
     this.#check(fixed ? this.#c.supine_basis_weights(this.#basis, this.#nextState, this.#nextPose)
-      : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error), fixed && 'gravity has no direction');
+      : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error),
+    fixed && 'gravity is zero or not finite: give a vector with a direction');
     if (fixed) this.#c.supine_pose_fill(this.#nextPose, state.gain);
     new Uint8Array(this.#c.memory.buffer).copyWithin(this.#state, this.#nextState, this.#nextState + STATE + POSE);
     return this;

@@ -18,17 +18,17 @@ enum { CHECKSUM_SIZE = 23 };
 struct supine_safetensors {
   const unsigned char *bytes;
   size_t size;
-  supine_platform_file mapping; /**< mapping that holds `bytes`; zero if the caller owns them */
+  supine_platform_file mapping; /**< mapping that contains `bytes`; zero if the caller owns them */
   char *header;                 /**< a copy of the header, in which strings are decoded */
-  supine_tensor *tensors;       /**< tensors, sorted by the position of their data */
-  void **copies;                /**< aligned copy of each misaligned tensor, else NULL */
+  supine_tensor *tensors;       /**< sorted by the position of their data */
+  void **copies; /**< [tensor_count] aligned copy of each misaligned tensor; else NULL */
   size_t tensor_count;
   supine_metadata *metadata;
   size_t metadata_count;
   char name[]; /**< name of the file in messages */
 };
 
-/** Return the name of an element type in the header, such as "F32"; `dtype` must be in range. */
+/** Return the name of an element type in the header, such as "F32". `dtype` must be in range. */
 const char *supine_safetensors_dtype_name(supine_dtype dtype);
 
 /** Return the size of one element in bytes. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Parse the header of a safetensors file, which is strict JSON (RFC 8259), and check every number
- * in it; look up element types. */
+ * in it. Look up element types. */
 #include <inttypes.h>
 #include <limits.h>
 #include <stdarg.h>
@@ -41,7 +41,7 @@ bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size) {
   return true;
 }
 
-/* The header being parsed; a NUL follows it. After a failure, take() accepts no character, and
+/* The header being parsed, which a NUL follows. After a failure, take() accepts no character, and
  * further failures do not change the error. */
 typedef struct parser {
   supine_safetensors *file;
@@ -130,7 +130,7 @@ static char *take_escape(parser *p, char *to) {
 static const char *take_string(parser *p) {
   expect(p, '"');
   char *const begin = p->at;
-  char *to = begin; /* never overtakes p->at, as an escape is longer than its decoded text */
+  char *to = begin; /* never overtakes p->at, because an escape is longer than its decoded text */
   while (p->status == SUPINE_OK && *p->at != '"') {
     const size_t length = supine_utf8_length(p->at, (size_t)(p->end - p->at));
     if (*p->at == '\\') {
@@ -151,8 +151,8 @@ static const char *take_string(parser *p) {
   return begin;
 }
 
-/* Take an array of at most `capacity` integers without sign, fraction, exponent or leading zeros;
- * return their number. Refuse ULLONG_MAX, which strtoull also returns for overflow. */
+/* Take an array of at most `capacity` integers without sign, fraction, exponent or leading zeros.
+ * Return how many there are. Refuse ULLONG_MAX, which strtoull also returns after an overflow. */
 static size_t take_counts(parser *p, size_t *values, size_t capacity) {
   size_t count = 0;
   expect(p, '[');
@@ -210,7 +210,7 @@ static supine_dtype take_dtype(parser *p, const char *tensor) {
 }
 
 /* Parse a tensor such as {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, with members
- * in any order. Its `data` holds the first offset until place_tensors is called. */
+ * in any order. Its member `data` holds the first offset until place_tensors() is called. */
 static void parse_tensor(parser *p, const char *name) {
   static const char *const members[] = {"dtype", "shape", "data_offsets"};
   supine_safetensors *file = p->file;
@@ -297,7 +297,7 @@ static int compare_places(const void *left, const void *right) {
   return (places[0][key] > places[1][key]) - (places[0][key] < places[1][key]);
 }
 
-/* Check that the tensors fill the data exactly; point each to its data or to an aligned copy. */
+/* Check that the tensors fill the data exactly. Point each to its data or to an aligned copy. */
 static supine_status place_tensors(parser *p, size_t data_begin) {
   supine_safetensors *file = p->file;
   const size_t data_size = file->size - data_begin;

@@ -8,8 +8,7 @@
 #include "runtime/safetensors/safetensors_file.h"
 #include "sh/base/utf8.h"
 
-/* The content of a file to write. Tensors are laid out by descending element size, so that each is
- * aligned to its element size. */
+/* The content of a file to write. */
 typedef struct content {
   const supine_tensor *tensors;
   size_t tensor_count;
@@ -45,10 +44,11 @@ static supine_status check_tensors(const content *c, const char *path, supine_er
       bad = bad || strcmp(tensor->name, c->tensors[j].name) == 0;
     }
     if (bad) {
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "%s: tensor '%s': dtype, rank or size out of range, or the name is "
-                              "repeated, reserved or not UTF-8",
-                              path, tensor->name);
+      return supine_error_set(
+          error, SUPINE_ERROR_ARGUMENT,
+          "%s: tensor '%s': dtype, rank or size is out of range, or the name is "
+          "repeated, reserved or not UTF-8",
+          path, tensor->name);
     }
   }
   return SUPINE_OK;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Read small CSV files strictly; errors name the line. */
+/* Read small CSV files. */
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
@@ -21,7 +21,8 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Return the next line, trimmed, except blank lines and comments; NULL at the end or on failure. */
+/* Return the next line that is neither blank nor a comment, trimmed; NULL at the end or on
+ * failure. */
 static char *csv_line(supine_csv *csv, supine_status *status, supine_error *error) {
   *status = SUPINE_OK;
   for (;;) {
@@ -52,9 +53,9 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
-/* Return the field at *rest, ended by a NUL, and move *rest to the next field, or to NULL after the
- * last. A quoted field may contain the separator, and "" for a quote. Return NULL if a quote is not
- * closed. */
+/* Return the field at *rest, ended by a NUL, and move *rest to the next field; NULL after the last
+ * field. A quoted field may contain the separator; "" in it is one quote. Return NULL if a quote is
+ * not closed. */
 static char *csv_field(char **rest, char separator) {
   char *field = *rest + strspn(*rest, " ");
   char *end = field;

@@ -11,8 +11,9 @@
 
 enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
-/* A CSV file being read: comments (#), blank lines, one header, quoted fields. The separator is the
- * one in the header: ',', ';' (numbers may then have a decimal comma) or tab. Zero-initialise. */
+/* A CSV file being read. It has a header, and may have comments (#), blank lines and quoted fields.
+ * The header tells the separator: ',', ';' or tab. With ';', numbers may have a decimal comma.
+ * Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;

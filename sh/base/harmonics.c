@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute real spherical harmonics of a direction (x, y, z).
+/* Compute real spherical harmonics of a direction (x, y, z), for m >= 0:
  *
- * Y(l, +-m) = q(l, m)(z) * { Re, Im } (x + i y)^m, where q is the normalised Legendre function
- * without its factor sin^m: a polynomial in z, regular at the poles. Its recurrence in l is
+ *     Y(l, m) = q(l, m) Re (x + i y)^m        Y(l, -m) = q(l, m) Im (x + i y)^m
+ *
+ * q(l, m) is the normalised Legendre function divided by sin^m of the colatitude. It is a
+ * polynomial in z, and regular at the poles:
  *
  *     q(l, m) = a(l, m) (z q(l - 1, m) - q(l - 2, m) / a(l - 1, m))
  *     a(l, m)^2 = (4 l^2 - 1) / (l^2 - m^2) */
@@ -20,8 +22,8 @@ size_t supine_sh_index(size_t l, int m) {
   return (size_t)((ptrdiff_t)(l * l + l) + m);
 }
 
-/* Evaluate Y(l, m) and Y(l, -m) for l = m to band, with q(m, m) in `top` and the real and imaginary
- * part of (x + i y)^m in `re` and `im`. */
+/* Evaluate Y(l, m) and Y(l, -m) for l = m to band. `top` is q(m, m); `re` and `im` are the real and
+ * the imaginary part of (x + i y)^m. */
 static void evaluate_order(size_t band, size_t m, double z, double top, double re, double im,
                            double *y) {
   double before = 0; /* q(l - 2, m) / a(l - 1, m) */
@@ -29,7 +31,7 @@ static void evaluate_order(size_t band, size_t m, double z, double top, double r
   for (size_t l = m;; ++l) {
     double *centre = y + l * l + l;
     centre[-(ptrdiff_t)m] = q * im;
-    centre[m] = q * re; /* if m = 0, replaces the sine term above */
+    centre[m] = q * re; /* replaces the sine term above if m = 0 */
     if (l == band) {
       return;
     }
@@ -51,8 +53,7 @@ supine_status supine_sh_evaluate(size_t band, const double direction[3], double 
   double re = 1;
   double im = 0;
   evaluate_order(band, 0, unit[2], top, re, im, y);
-  top *=
-      1.41421356237309504880; /* sqrt(2), as the terms have cos or sin instead of exp(+-i m phi) */
+  top *= 1.41421356237309504880; /* sqrt(2), for cos and sin in place of exp(+-i m phi) */
   for (size_t m = 1; m <= band; ++m) {
     const double turned = re * unit[0] - im * unit[1];
     im = re * unit[1] + im * unit[0];

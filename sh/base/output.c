@@ -35,7 +35,7 @@ bool supine_output_take_standard(void) {
   return atomic_load(&standard_output) >= 0 && dup2(STDERR_FILENO, STDOUT_FILENO) >= 0;
 }
 
-/* Names of existing temporary files, for supine_output_abandon_all; NULL in free entries. */
+/* Names of existing temporary files; NULL in free entries. */
 static char *_Atomic live[LIVE_MAX];
 
 /* Replace one entry of `live` that equals `from` by `to`. */
@@ -99,8 +99,8 @@ static void descriptor_path(int descriptor, char path[32]) {
 }
 
 /* Choose a unique temporary name beside the target. If `link` is NULL, create a file of that name
- * and return its descriptor; otherwise give the name to the file that `link` refers to and return
- * 0. Return -1 and set errno on failure. */
+ * and return its descriptor. Otherwise, give the name to the file to which `link` refers, and
+ * return 0. Return -1 and set errno on failure. */
 static int take_temporary(supine_output *output, const char *link) {
   enum { TRIES = 100 };
   const size_t size = strlen(output->target) + sizeof ".part-0123456789abcdef";
@@ -125,8 +125,8 @@ static int take_temporary(supine_output *output, const char *link) {
   return -1;
 }
 
-/* Open a file without a name in the target's folder if the file can be named later, else a file
- * with a temporary name. Return its descriptor, or -1 and set errno. */
+/* Open a file in the target's folder: without a name if it can be named later, otherwise with a
+ * temporary name. Return its descriptor, or -1 and set errno. */
 static int open_regular(supine_output *output) {
   char *folder = supine_path_beside(output->target, ".");
   if (folder == NULL) {

@@ -12,7 +12,7 @@
 
 #include <supine/status.h>
 
-/** A file being written. Write to `file` with stdio; it is seekable except in a pipe or device.
+/** A file being written. Write to `file` with stdio. It is seekable unless it is a pipe or device.
  * supine_output_commit reports errors. */
 typedef struct supine_output {
   FILE *file;
@@ -22,8 +22,8 @@ typedef struct supine_output {
   bool standard;   /**< the file is standard output */
 } supine_output;
 
-/** Open an output file. A new file gets its mode from the umask; a replaced file keeps its mode. A
- * symbolic link stays, and its target is replaced. Write directly to a device, pipe or standard
+/** Open an output file. A new file gets its mode from the umask; a replaced file keeps its mode. If
+ * the path is a symbolic link, replace its target. Write directly to a device, pipe or standard
  * output.
  * @retval SUPINE_ERROR_WRITE   the folder is missing or not writable, or the path is a folder or a
  *                              read-only file
@@ -41,7 +41,7 @@ void supine_output_abandon(supine_output *output);
 /** Return whether the path means standard output: "-", alone or with an ending ("-.ply"). */
 bool supine_output_is_standard(const char *path);
 
-/** Reserve standard output for supine_output_open: from then on, all other output goes to standard
+/** Reserve standard output for supine_output_open. From then on, all other output goes to standard
  * error. Return false if standard output is closed. */
 bool supine_output_take_standard(void);
 

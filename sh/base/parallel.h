@@ -6,18 +6,17 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/** A function for items begin <= i < end; `thread` is its thread's index, 0 to threads - 1. */
+/** A function for items begin <= i < end. `thread` is the index of its thread, from 0. */
 typedef void supine_range_function(void *context, size_t begin, size_t end, size_t thread);
 
-/** Return the default number of threads: the environment variable SUPINE_THREADS (1 to 256) or, if
- * it is not set or not valid, the number of processors that this process may use. */
+/** Return the default number of threads: the environment variable SUPINE_THREADS (1 to 256). If it
+ * is not set or not valid, return the number of processors that this process may use. */
 size_t supine_thread_count(void);
 
 /** Return whether the environment variable SUPINE_THREADS is unset or valid. */
 bool supine_thread_count_is_valid(void);
 
 /** Call `function` on consecutive pieces of 0 <= i < count, one for each thread, and wait.
- *
  * @param count    number of items
  * @param grain    smallest number of items for a thread, at least 1; small counts use fewer threads
  * @param threads  largest number of threads; 0 selects supine_thread_count()

@@ -16,7 +16,7 @@ void supine_text_add(char *text, size_t size, const char *format, ...) {
   va_end(arguments);
 }
 
-/* Return the end of `name` with the length of `ending`; "" if the name is not longer. */
+/* Return the last characters of `name`, as many as `ending` has; "" if `name` is not longer. */
 static const char *tail_of(const char *name, const char *ending) {
   const size_t length = strlen(name);
   const size_t tail = strlen(ending);

@@ -8,8 +8,7 @@
 
 #include <supine/status.h>
 
-/** Append to `text` by a printf format. `text` has room for `size` bytes with its NUL; longer text
- * is cut off. */
+/** Append to `text` [size] by a printf format. Longer text is cut off. */
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 

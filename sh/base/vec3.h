@@ -55,7 +55,7 @@ static inline double supine_distance(const double a[3], const double b[3]) {
   return supine_length(d);
 }
 
-/** Compute the normal of the triangle p, q, r, with twice its area as its length. */
+/** Compute the normal of the triangle p, q, r. Its length is twice the area of the triangle. */
 static inline void supine_normal(const double p[3], const double q[3], const double r[3],
                                  double normal[3]) {
   double u[3];
@@ -65,8 +65,8 @@ static inline void supine_normal(const double p[3], const double q[3], const dou
   supine_cross(u, v, normal);
 }
 
-/** Compute a direction of a golden-angle spiral of `count` directions, which covers the sphere
- * evenly from +z to -z.
+/** Compute one of `count` directions that cover the sphere evenly, on a golden-angle spiral from +z
+ * to -z.
  * @param at    index of the direction, 0 to count - 1, not necessarily an integer
  * @param from  longitude of direction 0, rad */
 static inline void supine_spiral(double at, double count, double from, double direction[3]) {

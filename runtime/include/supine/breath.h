@@ -1,36 +1,38 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The pressure-volume relation of a lung, and the breath that follows from it ([Santhanam2008]
- * III-B, V), as in `supine breathe`. One frame of a breathing basis:
+ * The pressure-volume (P-V) relation of a lung, and breaths that follow it ([Santhanam2008] III-B,
+ * V). In each frame of an animated breath, call
  *
- *     supine_breath_evaluate(&pv, &breath, 1, &time, &volume, NULL, &error);   mL above rest
+ *     supine_breath_evaluate(&pv, &breath, 1, &time, &volume, NULL, &error); // mL above rest
  *     state.volume = (supine_volume){SUPINE_VOLUME_REST, volume};
  *     supine_basis_pose(basis, &state, &pose, &error);
  *     supine_deform(basis, &pose, xyz);
  *
- * Each limb of the P-V loop, inhale and exhale, is a second-order differential equation for the
- * volume V over the normalised pressure x, -1 to 1 over the limb's range, driven by a control
- * function u that is a sum of five control parameters times basis functions:
+ * The P-V loop has two limbs, inhale and exhale. On each limb, the volume V satisfies a
+ * second-order differential equation in the normalised pressure x. Its control function u is the
+ * sum of five Legendre polynomials L_0 to L_4, each multiplied by a control parameter:
  *
- *     V''(x) = u(x) V'(x)      u(x) = c_1 P_0(x) + c_2 P_1(x) + ... + c_5 P_4(x)
+ *     V''(x) = u(x) V'(x)      u(x) = c_1 L_0(x) + c_2 L_1(x) + ... + c_5 L_4(x)
  *     x = (2 P - P_low - P_high) / (P_high - P_low)      V(-1) = V_low      V(1) = V_high
  *
- * [Santhanam2008] gives the form of the equation but not the functions. They are chosen because:
+ * [Santhanam2008] states such an equation with five parameters, but does not define the control
+ * function. It has the form above for these reasons:
  * - V' is the compliance, so u is the relative rate at which compliance changes as the lung
- *   inflates. Compliance is positive for all parameters, so V rises with P everywhere and P(V)
- *   exists. With an added control function (V'' = u) a noisy limb can fold over, and V is a
- *   polynomial, which does not follow the flat ends of a stiff lung's sigmoid.
+ *   inflates. Compliance is positive for all parameters. V therefore rises with P everywhere, and
+ *   P(V) exists. In the equation V'' = u, noisy data could make V fall while P rises, and a
+ *   polynomial V could not follow the flat ends of a stiff lung's sigmoid.
  * - A constant u gives exactly the exponential V = Vmax (1 - exp(-k P)) of [Salazar1964], with
- *   c_1 = -k (P_high - P_low) / 2. The sigmoid V = a + b / (1 + exp(-(P - c) / d)) of [Venegas1998]
- *   has u = -tanh((P - c) / 2d) in units of 1/d: smooth and bounded, so that few polynomials
- *   approximate it.
- * - Legendre polynomials P_0 to P_4 are orthogonal over the range, so that the parameters are as
- *   independent as evenly spread samples allow. c_1 is half the logarithm of the ratio of the
- *   compliances at the two ends (negative: stiffer when full), c_2 < 0 puts the greatest compliance
- *   inside the range (a sigmoid), c_3 skews it, c_4 and c_5 sharpen its knees.
+ *   c_1 = -k (P_high - P_low) / 2. For the sigmoid V = a + b / (1 + exp(-(P - c) / d)) of
+ *   [Venegas1998], u is proportional to -tanh((P - c) / (2 d)). A few polynomials approximate this
+ *   function, as it is smooth and bounded.
+ * - Legendre polynomials are orthogonal over the range of x, so that the parameters hardly depend
+ *   on each other if samples are spread evenly. c_1 is half the logarithm of the compliance at
+ *   P_high divided by the compliance at P_low; it is negative if the lung is stiffer when full. A
+ *   negative c_2 makes a sigmoid: the compliance is greatest inside the range. c_3 skews the
+ *   sigmoid, and c_4 and c_5 sharpen its knees.
  *
- * Pressures are in cmH2O: transpulmonary for a lung, airway for lung and chest wall together,
- * whichever was sampled. Volumes are in mL. A limb is not defined outside its range. Every function
+ * Pressures are in cmH2O: transpulmonary pressures for a lung alone, airway pressures for lung and
+ * chest wall together. Volumes are in mL. A limb is not defined outside its range. Every function
  * is thread-safe and allocates nothing.
  *
  * [Santhanam2008]  Santhanam, Imielinska, Davenport, Kupelian, Rolland, IEEE Trans. Inf. Technol.
@@ -49,22 +51,20 @@ extern "C" {
 #endif
 
 enum {
-  SUPINE_PV_CONTROLS = 5,    /**< number of control parameters of a limb */
-  SUPINE_PV_CONTROL_MAX = 50 /**< largest |c_i|; c_1 = 50 changes the compliance e^100-fold over the
-                                range, far more than in any lung */
+  SUPINE_PV_CONTROLS = 5,
+  SUPINE_PV_CONTROL_MAX = 50 /**< largest |c_i|, more than any lung needs */
 };
 
-/** The limbs of a P-V loop. */
 typedef enum supine_pv_limb {
   SUPINE_PV_INHALE = 0,
   SUPINE_PV_EXHALE,
   SUPINE_PV_LIMB_COUNT
 } supine_pv_limb;
 
-/** One limb of the P-V loop. */
+/** One limb of a P-V loop. */
 typedef struct supine_pv_curve {
-  double pressure[2]; /**< pressures P_low < P_high at the ends of the limb, cmH2O */
-  double volume[2];   /**< volumes V_low < V_high at the ends of the limb, mL */
+  double pressure[2];                 /**< pressures P_low < P_high at the ends, cmH2O */
+  double volume[2];                   /**< volumes V_low < V_high at the ends, mL */
   double control[SUPINE_PV_CONTROLS]; /**< control parameters c_1 to c_5 */
 } supine_pv_curve;
 
@@ -76,31 +76,31 @@ typedef struct supine_pv {
 /** Return "inhale", "exhale" or, for other values, "unknown limb"; never NULL. */
 SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
 
-/** Return the P-V loop of a normal adult lung, the default if no loop was measured: 0 to 30 cmH2O,
- * 0 to 6000 mL.
+/** Return the P-V loop of a normal adult lung, for use if no loop was measured. Both limbs run from
+ * 0 mL at 0 cmH2O to 6000 mL, an adult's total lung capacity, at 30 cmH2O.
  *
- * The exhale limb is the exponential of [Salazar1964] with k = ln 2 / 7.58 cmH2O, the mean
- * half-inflation pressure of 20 normal subjects, and 6000 mL, an adult's total lung capacity, at 30
- * cmH2O. The inhale limb is a sigmoid [Venegas1998] between the same ends with c = 10 and d = 6
- * cmH2O; it stays below the exhale limb. The product b d, 44,600 mL cmH2O, lies between the 10^4
- * and 10^5 that Narusawa (J. Appl. Physiol. 91, 2001, 201-210) found in published curves, but c and
- * d are round numbers, not means of measured lungs. */
+ * The exhale limb is the exponential of [Salazar1964] with k = ln 2 / 7.58 cmH2O, where 7.58 cmH2O
+ * is the mean half-inflation pressure of 20 normal subjects. The inhale limb is the sigmoid of
+ * [Venegas1998] with c = 10 and d = 6 cmH2O, and stays below the exhale limb. Its product b d,
+ * 44,600 mL cmH2O, lies between the 10^4 and 10^5 that Narusawa (J. Appl. Physiol. 91, 2001,
+ * 201-210) found in published curves. c and d are round numbers, not means of measured lungs. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
-/** Check a limb: finite numbers, rising ranges, and parameters within SUPINE_PV_CONTROL_MAX.
- * @retval SUPINE_ERROR_ARGUMENT  the limb fails one of these checks */
+/** Check that the numbers of a limb are finite, that P_low < P_high and V_low < V_high, and that
+ * |c_i| <= SUPINE_PV_CONTROL_MAX.
+ * @retval SUPINE_ERROR_ARGUMENT  a check failed */
 SUPINE_API supine_status supine_breath_curve_check(const supine_pv_curve *curve,
                                                    supine_error *error);
 
-/** Compute the volume V(P) and the compliance dV/dP of a limb. The solution of its equation is
+/** Compute the volume V(P) and the compliance dV/dP of a limb. The solution of the limb's equation
+ * is
  *
  *     V(x) = V_low + (V_high - V_low) I(x) / I(1)        I(x) = integral from -1 to x of exp(U)
  *     U(x) = integral from -1 to x of u
- *          = c_1 (x + 1) + sum over n of c_n+1 (P_n+1 - P_n-1) / (2 n + 1)
+ *          = c_1 (x + 1) + sum over n = 1 to 4 of c_(n+1) (L_(n+1)(x) - L_(n-1)(x)) / (2 n + 1)
  *
- * I is computed by Gauss-Legendre quadrature, with 16 points in each of 32 parts of the range.
- * Cost: 512 exponentials, and 16 for each pressure.
- *
+ * I is computed by Gauss-Legendre quadrature, with 16 points in each of 32 equal parts of the
+ * range. Cost: 512 exponentials, and about 16 more for each pressure.
  * @param pressures    [count] cmH2O within the limb's range, in any order
  * @param volumes      [count] mL, written; may be NULL
  * @param compliances  [count] mL/cmH2O, written; may be NULL
@@ -110,49 +110,46 @@ SUPINE_API supine_status supine_breath_curve_evaluate(const supine_pv_curve *cur
                                                       const double *pressures, double *volumes,
                                                       double *compliances, supine_error *error);
 
-/** The course of pressure from rest to its peak and back. */
+/** How pressure or volume changes in each half of a breath, between rest and the peak. */
 typedef enum supine_pv_course {
-  SUPINE_PV_COSINE = 0,    /**< half a cosine of pressure each way, as in quiet breathing */
-  SUPINE_PV_RAMP,          /**< pressure linear in time, as a ventilator's ramp */
-  SUPINE_PV_CONSTANT_FLOW, /**< volume linear in time, as in [Santhanam2008] V: 500 mL in 5 s of
-                              inhalation, 1.5 mL in each step of 15 ms */
+  SUPINE_PV_COSINE = 0,    /**< pressure follows half a cosine, as in quiet breathing */
+  SUPINE_PV_RAMP,          /**< pressure is linear in time, like the ramp of a ventilator */
+  SUPINE_PV_CONSTANT_FLOW, /**< volume is linear in time, as in [Santhanam2008] V */
   SUPINE_PV_COURSE_COUNT
 } supine_pv_course;
 
-/** A breath, repeated without end. */
+/** A breath that repeats without end. */
 typedef struct supine_pv_breath {
-  double tidal;           /**< volume of a breath, mL, > 0 */
-  double rate;            /**< breaths per minute, > 0 */
-  double inhale_fraction; /**< fraction of the breath's time that is inhalation, > 0 and < 1 */
+  double tidal;           /**< tidal volume, mL, above 0 */
+  double rate;            /**< breaths per minute, above 0 */
+  double inhale_fraction; /**< fraction of a breath's time that is inhalation, between 0 and 1 */
   double rest_pressure;   /**< pressure at the end of an exhalation, cmH2O */
   supine_pv_course course;
 } supine_pv_breath;
 
-/** Return the default breath: 500 mL, 12 per minute, a third of the time inhaling, from a pressure
- * of 5 cmH2O at rest, by half cosines of pressure. */
+/** Return the default breath: 500 mL, 12 breaths per minute, inhalation in a third of the time, 5
+ * cmH2O at rest, and the course SUPINE_PV_COSINE. */
 SUPINE_API supine_pv_breath supine_breath_default(void);
 
 /** Compute the volume above rest, and the pressure, at given times. A breath begins at time 0, at
  * rest.
  *
- * At the peak pressure, the inhale limb holds the tidal volume above rest. The breath follows both
- * limbs between the pressure at rest and the peak, scaled to the tidal volume so that the loop
- * closes:
+ * The pressure rises along the inhale limb from the rest pressure P_rest to P_peak, where this limb
+ * has gained the tidal volume, and falls along the exhale limb. Volumes are scaled so that both
+ * limbs gain the tidal volume, which closes the loop:
  *
  *     V(t) = tidal (V_limb(P(t)) - V_limb(P_rest)) / (V_limb(P_peak) - V_limb(P_rest))
  *
- * The scale is 1 on the inhale limb. V is 0 at rest and the tidal volume at the peak, to rounding.
- *
- * @param pv         may be NULL for constant flow if `pressures` is NULL
- * @param times      [count] s, any finite
+ * V is 0 at rest and the tidal volume at the peak, to rounding.
+ * @param pv         P-V loop; may be NULL for constant flow if `pressures` is NULL
+ * @param times      [count] s, finite
  * @param volumes    [count] mL above rest, written; may be NULL
  * @param pressures  [count] cmH2O, written; may be NULL
- * @retval SUPINE_ERROR_ARGUMENT   the breath is outside its documented ranges, the pressure at rest
- *                                 is outside the range of a limb, or the tidal volume or its peak
- *                                 pressure is beyond the end of a limb
+ * @retval SUPINE_ERROR_ARGUMENT   a time or a member of `breath` is out of range, a limb fails
+ *                                 supine_breath_curve_check, or a limb ends before the rest
+ *                                 pressure, the peak pressure or the tidal volume
  * @retval SUPINE_ERROR_NUMERICAL  a limb is so flat that its volume does not rise between rest and
  *                                 peak
- *
  * Cost: about 20 microseconds, and less than 1 microsecond for each time. */
 SUPINE_API supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath *breath,
                                                 size_t count, const double *times, double *volumes,

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Comparisons of states: distances between deformed lungs, and ventilation by height.
+ * Compare poses: distances between deformed lungs, and ventilation by height.
  *
- * Averages are over the area of the reference surface: the weight a_i of vertex i is a third of the
- * area of its triangles, divided by the area of all triangles. States are given as supine_pose. */
+ * Averages are weighted by area. The weight a_i of vertex i is a third of the area of its triangles
+ * on the reference surface, divided by the area of all triangles. */
 #ifndef SUPINE_COMPARE_H
 #define SUPINE_COMPARE_H
 
@@ -16,19 +16,19 @@
 extern "C" {
 #endif
 
-/** Areas and Gram matrices of a basis. They never change: any number of threads may share them. */
+/** Areas and Gram matrices of a basis, which never change. Any number of threads may share them. */
 typedef struct supine_compare supine_compare;
 
-/** Compute the Gram matrix of each lung and axis j, in one pass over the vertices i of the lung,
- * with the symbols of supine/runtime.h:
+/** Compute the Gram matrix G_j [K, K] of each lung and each axis j:
  *
- *     G_j,kl = sum over i of a_i d_ij^2 c_ik c_il       (vector fields: a_i c_ijk c_ijl)
+ *     G_j[k, l] = sum over the vertices i of the lung of a_i d_ij^2 c_ik c_il
  *
+ * For a vector field, the terms are a_i c_ijk c_ijl. supine/runtime.h explains K, N, c and d.
  * @param basis    must outlive the comparison
  * @param compare  written; free it with supine_compare_destroy
  * @retval SUPINE_ERROR_MESH    the area of the surface is 0 or not finite
  * @retval SUPINE_ERROR_MEMORY  an allocation failed
- * Cost: 3 N K^2 / 2 multiplications. */
+ * Cost: 3 N K^2 / 2 multiplications, in one pass over the vertices. */
 SUPINE_API supine_status supine_compare_create(const supine_basis *basis, supine_compare **compare,
                                                supine_error *error);
 /** Free a comparison; NULL is legal. */
@@ -37,20 +37,20 @@ SUPINE_API void supine_compare_destroy(supine_compare *compare);
 /** Return the area of the reference surface, mm^2. */
 SUPINE_API double supine_compare_area(const supine_compare *compare);
 
-/** Return the RMS distance between two poses, mm, from the Gram matrices alone:
+/** Compute the RMS distance D between two poses, mm, from the Gram matrices alone:
  *
- *     d^2 = sum over lungs and axes of q^T G q,     q = A w - A' w'
+ *     D^2 = sum over all lungs and axes of q^T G q,     q = A w - A' w'
  *
- * with the gains A and weights w of `pose`, and A' and w' of `from`.
+ * `pose` has the gains A and weights w, and `from` has A' and w'.
  * @param from  NULL for the reference surface
- * Cost: 3 G K^2 multiplications, no pass over the vertices. */
+ * Cost: 3 K^2 multiplications for each lung, without a pass over the vertices. */
 SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
                                      const supine_pose *from);
 
 /** Compute the distance of every vertex between two poses.
  * @param from      NULL for the reference surface
  * @param distance  [N] mm, written
- * Cost: one pass over the vertices, 3 K + 6 multiplications per vertex. */
+ * Cost: one pass over the vertices, with 3 K + 6 multiplications per vertex. */
 SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
                                          const supine_pose *from, float *distance);
 
@@ -62,48 +62,48 @@ typedef struct supine_distance_statistics {
   double max;  /**< largest distance of any vertex */
 } supine_distance_statistics;
 
-/** Compute the statistics of distances, mm: exactly, in four passes, without allocation.
+/** Compute the statistics of distances exactly, in four passes over the vertices, without
+ * allocation.
  * @param distance  [N] mm, none negative */
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Compute the energy of each band of harmonics: its part of the squared displacement at gain 1,
- * averaged over the area and over all directions of gravity,
+/** Compute the energy of each band l of harmonics. It is the band's part of the squared
+ * displacement at gain 1, averaged over the area and over all directions of gravity:
  *
- *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm       M_lm: column lm of `modes`
+ *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm
  *
- * with the sum G of all Gram matrices. When gravity changes its sign, so do the odd bands; the even
- * bands do not change.
+ * M_lm is the column of supine_basis_info.modes for Y_lm, and G is the sum of all Gram matrices.
+ * Reversed gravity reverses the displacements of odd bands, but not those of even bands.
  * @param energy  [L + 1] mm^2, written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
 /** The part of one lung between two heights. */
 typedef struct supine_slab {
   double volume; /**< volume before the breath, mL */
-  double gain;   /**< volume gained in the breath, mL; gain / volume is the regional expansion */
+  double gain;   /**< volume that the breath adds, mL; gain / volume is the regional expansion */
 } supine_slab;
 
-/** Largest number of slabs. */
 enum { SUPINE_SLABS_MAX = 64 };
 
-/** Compute ventilation by height: cut the surface before a breath into slabs of equal thickness
- * across gravity, from the highest to the lowest point of all lungs, and find the volume that the
- * tissue in each slab gains:
+/** Compute ventilation by height. Horizontal planes cut the lungs before a breath into slabs of
+ * equal thickness, from the highest to the lowest point of all lungs. The gain of a slab is the
+ * volume that the breath adds to its tissue:
  *
  *     gain = volume after the breath - volume before the breath
  *
- * between the slab's part of the surface and its two cuts. The part of the surface is exact, so
- * that the gains of a lung's slabs sum to the gain of the lung. A cut inside the lung has no
- * vertices: after the breath, it is approximated by triangles from the mean of its outline to each
- * edge. This is exact for displacements that are linear in position: the gains are 0 for a
- * rotation, and gain / volume is the same in all slabs for a uniform expansion.
- *
+ * A slab is bounded by its part of the surface and by its cuts along two planes. The parts of the
+ * surface are exact, so that the gains of a lung's slabs sum to the gain of the lung. A cut has no
+ * vertices inside the lung. Both before and after the breath, it consists of triangles from the
+ * mean of its outline to each edge of the outline. The gains are exact if displacements are linear
+ * in position: they are 0 for a rotation, and gain / volume is the same in all slabs for a uniform
+ * expansion.
  * @param gravity  [3], any length but 0
  * @param from     [N, 3] positions before the breath, mm; NULL for the reference surface
  * @param xyz      [N, 3] positions after the breath (supine_deform), mm
  * @param count    number of slabs, 1 to SUPINE_SLABS_MAX
  * @param slabs    [G, count], uppermost first, written
- * @retval SUPINE_ERROR_ARGUMENT      gravity has no direction, or the count is out of range
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, or the count is out of range
  * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes
  * Cost: one pass over the triangles for each lung. */
 SUPINE_API supine_status supine_compare_slabs(const supine_basis *basis, const double gravity[3],

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The direction of gravity in a posture, a DICOM patient position, an orientation or a tilt.
+ * Find the direction of gravity in a posture, a DICOM patient position, an orientation or a tilt.
  *
  * Gravity is a unit vector in body axes (DICOM LPS: +x left, +y posterior, +z head) that points
  * where things fall. */
@@ -15,14 +15,14 @@
 extern "C" {
 #endif
 
-/** Find gravity in a named posture, in upper or lower case:
+/** Find gravity in a posture by its name, in upper or lower case:
  *
  *     supine  HFS  FFS    (0, 1, 0)      left   left-lateral   HFDL  FFDL   ( 1, 0, 0)
  *     prone   HFP  FFP    (0,-1, 0)      right  right-lateral  HFDR  FFDR   (-1, 0, 0)
  *     upright             (0, 0,-1)      inverted                           (0, 0, 1)
  *
- * "left" is lying on the left side. The capitals are DICOM patient positions (0018,5100); head or
- * feet first makes no difference to gravity.
+ * "left" means lying on the left side. Names in capitals are DICOM patient positions (0018,5100).
+ * Head first (HF) and feet first (FF) have the same gravity.
  * @param gravity  [3] unit vector, written
  * @retval SUPINE_ERROR_ARGUMENT  the name is unknown; `gravity` is unchanged */
 SUPINE_API supine_status supine_posture_gravity(const char *name, double gravity[3]);
@@ -30,35 +30,32 @@ SUPINE_API supine_status supine_posture_gravity(const char *name, double gravity
 /** Return the number of names that supine_posture_gravity knows. */
 SUPINE_API size_t supine_posture_count(void);
 
-/** Return the posture name with an index, in lower case except DICOM's; NULL past the last. */
+/** Return the posture name with an index, or NULL if there is none. Only names of DICOM have
+ * capitals. */
 SUPINE_API const char *supine_posture_name(size_t index);
 
-/** Return the posture name nearest to `name`, by the number of characters to insert, delete or
- * replace, for a suggestion; never NULL. */
+/** Return the posture name most similar to `name`, for a suggestion; never NULL. The most similar
+ * name needs the fewest insertions, deletions and replacements of characters. */
 SUPINE_API const char *supine_posture_nearest(const char *name);
 
-/** Compute gravity for a body's orientation, a rotation from body axes to world axes, in a world
- * whose z points up:
+/** Compute gravity in a body that is rotated by R from body axes to world axes, v_world = R v_body.
+ * The world's z axis points up:
  *
- *     gravity = R^T (0, 0, -1)         R: v_world = R v_body
+ *     gravity = R^T (0, 0, -1)
  *
- * The identity (1, 0, 0, 0) is upright; a turn about the world's z changes nothing.
- *
- * @param quaternion  W, X, Y, Z of any length but 0
+ * The identity (1, 0, 0, 0) is upright. Turning the body about the world's z axis changes nothing.
+ * @param quaternion  R as W, X, Y, Z, of any length but 0
  * @param gravity     [3] unit vector, written
  * @retval SUPINE_ERROR_ARGUMENT  the quaternion is zero or not finite */
 SUPINE_API supine_status supine_posture_quaternion(const double quaternion[4], double gravity[3]);
 
-/** Turn gravity by t = `degrees` about the left-right axis, in the sagittal plane, from posterior
- * towards the head:
+/** Turn gravity by the angle t = `degrees` in the sagittal plane, from posterior towards the head:
  *
  *     (x, y, z) -> (x, y cos t - z sin t, y sin t + z cos t)
  *
- * Supine with +15 degrees is Trendelenburg, head down: (0, cos 15, sin 15). As gravity turns in the
- * axes of the body, a positive angle lowers the feet from prone and leans the body back from
- * upright; a lateral posture does not change.
- *
- * @param tilted  [3], written; may be `gravity`
+ * A positive angle lowers the head from supine (+15 degrees is Trendelenburg), lowers the feet from
+ * prone, and leans the body back from upright. Lateral postures do not change.
+ * @param tilted  [3], written; may be the array `gravity`
  * @retval SUPINE_ERROR_ARGUMENT  gravity or the angle is not finite */
 SUPINE_API supine_status supine_posture_tilt(const double gravity[3], double degrees,
                                              double tilted[3]);

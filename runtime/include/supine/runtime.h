@@ -6,18 +6,22 @@
  *     w_k(g) = sum over l, m of modes[k, lm] Y_lm(g)
  *
  * x_ij is coordinate j (x, y, z) of vertex i in mm, p_ij its reference position, d_ij its direction
- * and c_ik its coefficient of mode k. The weights w_k depend on gravity g, the gains A_j of each
- * lung on its volume. A program parses or fills in a supine_state (posture and volume), gets its
- * weights and gains from supine_basis_pose, and the positions from supine_deform. In shapes, N is
- * the number of vertices, M of triangles, G of lungs, K of modes, Q of modes of the normals, and L
- * the highest band of the harmonics.
+ * and c_ik its coefficient of mode k. A vector field has c_ijk in place of c_ik d_ij. The weights
+ * w_k depend on gravity g, and the gains A_j of each lung on its volume. A program parses or fills
+ * in a supine_state (posture and volume), calls supine_basis_pose for the weights and gains, and
+ * then supine_deform for the positions.
+ *
+ * In the shapes of arrays, N is the number of vertices, M the number of triangles, G the number of
+ * lungs, K the number of modes, Q the number of modes of the normals, and L the highest band of the
+ * harmonics.
  *
  * After opening, no function allocates, reads files or locks; any number of threads may use one
  * basis. Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine
  * (0,1,0), prone (0,-1,0), left lateral (1,0,0), right lateral (-1,0,0), upright (0,0,-1).
  *
- * A compiled program works with newer libraries: supine_basis_info only grows at its end,
- * supine_basis_options begins with its size, and no other struct changes. */
+ * A compiled program works with newer versions of the shared library of the same name:
+ * supine_basis_info only grows at its end, supine_basis_options begins with its size, and no other
+ * struct changes. */
 #ifndef SUPINE_RUNTIME_H
 #define SUPINE_RUNTIME_H
 
@@ -34,28 +38,22 @@
 extern "C" {
 #endif
 
-/** Largest number of modes of a basis. */
 enum { SUPINE_MODES_MAX = 256 };
-/** Largest number of lungs of a basis. */
 enum { SUPINE_LUNGS_MAX = 16 };
-/** Largest number of modes of the normals. */
 enum { SUPINE_NORMAL_MODES_MAX = 64 };
 
-/** An open basis. */
 typedef struct supine_basis supine_basis;
 
 /** How an open basis keeps coefficients, directions and reference positions in memory. */
 typedef enum supine_storage {
   SUPINE_STORAGE_AUTO = 0, /**< the smallest storage with an error of at most 0.005 mm */
   SUPINE_STORAGE_EXACT,    /**< float32, as in the file */
-  SUPINE_STORAGE_INT16,    /**< 16-bit coefficients with a scale for each mode; coordinates of
-                              directions and reference positions of 21 or 22 bits */
-  SUPINE_STORAGE_MIXED, /**< INT16, but the last 3 floor(K / 8) of the K modes have coefficients of
-                           10 or 11 bits; the same as INT16 if K is below 8 */
+  SUPINE_STORAGE_INT16,    /**< coefficients of 16 bits, coordinates of 21 or 22 bits */
+  SUPINE_STORAGE_MIXED,    /**< like INT16, but the last 3 floor(K / 8) modes have 10 or 11 bits */
   SUPINE_STORAGE_COUNT
 } supine_storage;
 
-/** The instruction set of the evaluation. All sets give the same positions within
+/** The instruction set. Positions from different sets differ by at most twice
  * supine_basis_error. */
 typedef enum supine_simd {
   SUPINE_SIMD_AUTO = 0, /**< the widest instruction set that this processor has */
@@ -70,8 +68,7 @@ typedef struct supine_basis_options {
   size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
-  bool without_normals; /**< do not load normals; saves 4 Q bytes per vertex for Q modes of the
-                           normals */
+  bool without_normals; /**< do not load normals, which saves 4 Q bytes per vertex */
 } supine_basis_options;
 
 /** The content of an open basis. The basis owns the struct and all arrays. */
@@ -81,54 +78,50 @@ typedef struct supine_basis_info {
   size_t mode_count;        /**< number K of modes */
   size_t band;              /**< highest band L of the harmonics */
   size_t lung_count;        /**< number G of lungs */
-  const size_t *lung_begin; /**< [G + 1] first vertex of each lung, and N at the end */
-  bool vector; /**< each vertex has three coefficients for each mode and no direction; false: one
-                  coefficient for each mode and a direction */
-  bool has_volume;         /**< the surface is closed, and states may have volumes */
+  const size_t *lung_begin; /**< [G + 1] index of the first vertex of each lung; N at the end */
+  bool vector;     /**< each vertex has 3 coefficients per mode, instead of 1 and a direction */
+  bool has_volume; /**< the surface is closed, so that lungs have volumes */
   supine_storage storage;  /**< the storage in use, never AUTO */
   supine_simd simd;        /**< the instruction set in use, never AUTO */
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
-  /** Bound on the error of storage and rounding, mm: the largest over 26 directions of gravity (the
-   * faces, edges and corners of a cube) 500 mL above the reference surface or, on an open surface,
-   * where the largest displacement is 20 mm. supine_basis_error returns the bound for any pose. */
+  /** Bound on the error of storage and rounding, mm: the largest supine_basis_error of 26 poses,
+   * with gravity towards the faces, edges and corners of a cube. The poses have 500 mL more than
+   * the reference surface or, on an open surface, a largest displacement of 20 mm. */
   double storage_error;
-  const char *const *lung_names;  /**< [G] such as "left"; "0", "1", ... for lungs without a name */
-  const float *bounds;            /**< [G, 2, 3] lowest and highest corner of each lung's box, mm */
-  const float *vertices;          /**< [N, 3] reference positions p, mm, LPS */
-  const uint32_t *triangles;      /**< [M, 3] vertices of each triangle */
-  const float *direction;         /**< [N, 3] directions d, mm; NULL if `vector` */
-  const float *coefficients;      /**< [N, K] coefficients c; [N, 3, K] in mm if `vector` */
-  const double *modes;            /**< [K, (L + 1)^2] coefficients of the weights in harmonics */
-  const double *volume_linear;    /**< [G, A, K] linear volume forms, mL (supine_volume_contract),
-                                     A: volume_axes; NULL without volumes */
+  const char *const *lung_names; /**< [G] such as "left"; lungs without a name are "0", "1", ... */
+  const float *bounds;           /**< [G, 2, 3] lowest and highest corner of each lung's box, mm */
+  const float *vertices;         /**< [N, 3] reference positions p, mm, LPS */
+  const uint32_t *triangles;     /**< [M, 3] vertices of each triangle */
+  const float *direction;        /**< [N, 3] directions d, mm; NULL if `vector` */
+  const float *coefficients;     /**< [N, K] coefficients c; [N, 3, K], mm, if `vector` */
+  const double *modes; /**< [K, (L + 1)^2] coefficients of the weights in spherical harmonics */
+  const double *volume_linear;    /**< [G, A, K] linear volume forms, mL; NULL without volumes */
   const double *volume_quadratic; /**< [G, A, K, K] quadratic volume forms, mL; or NULL */
   const double *volume_cubic;     /**< [G, K, K, K] cubic volume forms, mL; or NULL */
-  /** The memory that an evaluation reads: tiles of 16 vertices, each of 16 times bytes_per_vertex.
-   * Use it only to measure memory traffic, as the layout changes between versions. */
+  /** The memory that an evaluation reads, in tiles of 16 vertices. Use it only to measure memory
+   * traffic, as the layout changes between versions. */
   const void *packed;
   size_t normal_count;    /**< number Q of modes of the normals; 0 without normals */
-  const int16_t *normals; /**< [N, 3, Q] modes n of the normals (supine_deform_lit) */
-  /** [G, Q, 3, T] V of supine_basis_normal_weights, where T is 1 + 2 K + K (K + 1) / 2; in files
-   * of versions 1 and 2 [G, Q, (K + 1)(K + 2) / 2]. */
+  const int16_t *normals; /**< [N, 3, Q] modes of the normals (supine_deform_lit) */
+  /** The matrix V of supine_basis_normal_weights: [G, Q, 3, 1 + 2 K + K (K + 1) / 2], or [G, Q,
+   * (K + 1) (K + 2) / 2] in files of versions 1 and 2. */
   const double *normal_weights;
-  const double *reference_volume; /**< [G] volume of each lung of the reference surface, gas and
-                                       tissue, mL; 0 without volumes */
-  bool has_rest;                  /**< the file has the volume at rest for every posture */
-  bool has_full;                  /**< the reference surface is at full inflation */
-  bool is_fields; /**< the file was made from another simulator's fields, which gain 1 reproduces */
-  size_t volume_axes; /**< number A of axes with their own gain: 3; 1 in versions 1 and 2 */
-  double bend[3];     /**< bend of the path between full inflation and rest on each axis
-                         (supine_volume_bend); 0 for a straight path */
+  const double
+      *reference_volume; /**< [G] volume of each lung at gain 0, mL; 0 if the surface is open */
+  bool has_rest;         /**< the file has the volume at rest for every posture */
+  bool has_full;         /**< the reference surface is at full inflation */
+  bool is_fields; /**< the file was made from another simulator's fields; gain 1 reproduces them */
+  size_t volume_axes; /**< number A of gains of a lung: 3, or 1 in files of versions 1 and 2 */
+  double bend[3];     /**< bend of the path of gains on each axis (supine_volume_bend) */
 } supine_basis_info;
 
-/** Weights and gains of one state. */
 typedef struct supine_pose {
   double weights[SUPINE_MODES_MAX];  /**< weight w_k of each mode */
-  double gains[SUPINE_LUNGS_MAX][3]; /**< gains A_j of each lung; all 0: the reference surface */
+  double gains[SUPINE_LUNGS_MAX][3]; /**< gains A_j of each lung; 0 for the reference surface */
 } supine_pose;
 
-/** Open a basis from a file, or from `size` bytes in memory, which must outlive the basis: check
- * all of it, and pack it for evaluation.
+/** Open a basis from a file, or from `size` bytes in memory. Check all of it, and pack it for
+ * evaluation. The bytes must outlive the basis.
  * @param options  NULL for the defaults
  * @param basis    written; NULL on failure
  * @retval SUPINE_ERROR_READ         the file is missing or unreadable
@@ -136,8 +129,8 @@ typedef struct supine_pose {
  * @retval SUPINE_ERROR_ARGUMENT     an option is out of range, or the size is not set
  * @retval SUPINE_ERROR_UNSUPPORTED  the processor or the library lacks the instruction set
  * @retval SUPINE_ERROR_MEMORY       an allocation failed
- * Cost: a few passes over the file. Memory: bytes_per_vertex for each vertex, 12 bytes for each
- * vertex and three modes of the normals, and the mapped file. */
+ * Cost: a few passes over the file. Memory: the mapped file, and for each vertex bytes_per_vertex
+ * and 12 bytes for every three modes of the normals. */
 SUPINE_API supine_status supine_basis_open_with(const char *path,
                                                 const supine_basis_options *options,
                                                 supine_basis **basis, supine_error *error);
@@ -152,19 +145,19 @@ SUPINE_API supine_status supine_basis_open_memory(const void *bytes, size_t size
 /** Close a basis; NULL is legal. */
 SUPINE_API void supine_basis_close(supine_basis *basis);
 
-/** Return the content of a basis; it is valid until the basis is closed. */
+/** Return the content of a basis, which is valid until the basis is closed. */
 SUPINE_API const supine_basis_info *supine_basis_get_info(const supine_basis *basis);
-/** Return the metadata string of a key, such as "format" or "error_rms_percent"; NULL if none. */
+/** Return the metadata string of a key, such as "format"; NULL if there is none. */
 SUPINE_API const char *supine_basis_metadata(const supine_basis *basis, const char *key);
 /** Return all metadata, in the order of the file.
  * @param count  number of strings, written */
 SUPINE_API const supine_metadata *supine_basis_all_metadata(const supine_basis *basis,
                                                             size_t *count);
-/** Return the tensor of the file with a name, such as "error_modes"; NULL if there is none. */
+/** Return a tensor of the file by its name, such as "error_modes"; NULL if there is none. */
 SUPINE_API const supine_tensor *supine_basis_tensor(const supine_basis *basis, const char *name);
 /** Return the reference positions [N, 3], mm, LPS. */
 SUPINE_API const float *supine_basis_vertices(const supine_basis *basis);
-/** Return the triangles [M, 3], each as the indices of three vertices. */
+/** Return the triangles [M, 3], each as three indices of vertices. */
 SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
 
 /** Compute the weights of the modes for a direction of gravity.
@@ -175,17 +168,17 @@ SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
 SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                               double *weights);
 
-/** Compute the weights and gains of a state. The lungs of the pose hold exactly the volume of the
- * state, without a pass over the vertices.
+/** Compute the weights and gains of a state, without a pass over the vertices. With these gains,
+ * the lungs hold exactly the volume of the state.
  *
- * A total volume is divided among the lungs. Above rest, every lung is the same fraction of the way
- * from its own volume at rest to its own volume at full inflation [MilicEmili1966]; below rest, all
- * lungs hold the same fraction of their volumes at rest. The gains of a lung lie on a path from
- * full inflation through rest (supine_volume_bend). Files of versions 1 and 2 have one gain for all
- * lungs and axes.
+ * A total volume is divided among the lungs. Above rest, every lung is inflated by the same
+ * fraction of the difference between its volumes at rest and at full inflation [MilicEmili1966].
+ * Below rest, all lungs hold the same fraction of their volumes at rest. The gains of a lung lie on
+ * a path from full inflation through rest (supine_volume_bend). Files of versions 1 and 2 have one
+ * gain for all lungs and axes.
  *
- * SUPINE_VOLUME_DEFAULT is rest if the basis has it; else gain 1 if the basis was made from another
- * simulator's fields; else 500 mL above the scan.
+ * SUPINE_VOLUME_DEFAULT means rest if the basis has it. If not, it means gain 1 for another
+ * simulator's fields, and 500 mL above the scan for any other basis.
  * @param state  its gravity has any length but 0
  * @param pose   written
  * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis lacks the volume that
@@ -194,49 +187,49 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
  * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume; single
  *                                    triangles that turn over earlier are not detected
- *
- * Cost: K (L + 1)^2 multiplications for the weights, G K^3 for the gains, once a frame.
+ * Cost: K (L + 1)^2 multiplications for the weights and G K^3 for the gains, once a frame.
  *
  * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
  *                   749-759 */
 SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                            supine_pose *pose, supine_error *error);
 
-/** Compute the gains of a state for the weights that `pose` already has, for example in a breath.
- * They must be the weights of the state's gravity. Statuses: as supine_basis_pose. */
+/** Compute only the gains of a state, for example in a breath. `pose` must already have the weights
+ * for the gravity of the state. Statuses: as supine_basis_pose. */
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
 /** Return the volume that SUPINE_VOLUME_DEFAULT means for this basis (supine_basis_pose). If it
- * means gain 1, return SUPINE_VOLUME_DEFAULT itself. */
+ * means gain 1, return SUPINE_VOLUME_DEFAULT. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
-/** Set every gain of a pose to one number, regardless of volumes: for open surfaces and fields. */
+/** Set every gain of a pose to one number, regardless of volumes, for open surfaces and fields. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
-/** Return the state of the scan: its posture, and SUPINE_VOLUME_SCAN as its volume. */
+/** Return the state of the scan. Its volume is SUPINE_VOLUME_SCAN. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
-/** Compute the volume of each lung in a pose, if supine_basis_info.has_volume is true.
+/** Compute the volume of each lung in a pose. The basis must have volumes
+ * (supine_basis_info.has_volume).
  * @param volumes  [G] gas and tissue, mL, written */
 SUPINE_API void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
                                      double *volumes);
 
-/** Return a bound on the error of storage and rounding in a pose, mm: on the distance of every
- * deformed vertex from the position that exact arithmetic gives for the numbers of the file. */
+/** Return a bound on the error of storage and rounding in a pose, mm. No deformed vertex is farther
+ * than this from the position that exact arithmetic computes from the numbers of the file. */
 SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pose *pose);
 
 /** Compute the deformed position of every vertex, in the caller's thread.
  *
  *     x_ij = p_ij + A_j (w . c_i) d_ij        A: the gains of the lung of vertex i
  *
- * Rigid parts (ranges of vertices in the tensor "rigid", U32 [R, 2]) move by the rigid motion that
- * fits these positions best, as in all functions below for positions and displacements.
- *
- * @param xyz  [N, 3] mm, LPS, written; aligned as a float
- * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). If positions
- * and basis are larger than the cache, positions are written with stores that bypass the cache,
- * fastest if `xyz` is aligned to 64 bytes. */
+ * In this and all functions below for positions and displacements, each rigid part moves by the
+ * rigid motion that fits these positions best. Rigid parts are ranges of vertices in the tensor
+ * "rigid", U32 [R, 2].
+ * @param xyz  [N, 3] mm, LPS, written; aligned like a float
+ * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). If the
+ * positions and the basis exceed 4 MiB, positions are written with stores that bypass the caches.
+ * These are fastest if `xyz` is aligned to 64 bytes. */
 SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz);
 
 /** Compute supine_deform for vertices begin <= i < end, so that several threads can share the work.
@@ -252,32 +245,32 @@ SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
                                     const supine_pose *poses, size_t begin, size_t end, float *xyz);
 
 /** Compute the displacements A_j (w . c_i) d_ij of vertices begin <= i < end from the reference
- * surface. Except in rigid parts, they are linear in the gains: the difference between the gains of
- * two poses gives the displacements from one pose to the other (supine_step).
+ * surface. Except in rigid parts, displacements are linear in the gains. The difference between the
+ * gains of two poses with the same weights gives the displacements from one pose to the other
+ * (supine_step).
  * @param xyz  [end - begin, 3] mm, written */
 SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
                                       size_t begin, size_t end, float *xyz);
 
-/** Add one step of a breath in a fixed posture, three additions a vertex [Santhanam2008] (III-B):
+/** Add one step of a breath in a fixed posture [Santhanam2008, supine/breath.h] (III-B), with three
+ * additions per vertex:
  *
  *     xyz += step
- *
  * @param count  number of vertices
- * @param step   [count, 3] displacements of the step, mm: supine_displace_range for the difference
- *               of the gains; their negatives undo the step
+ * @param step   [count, 3] displacements of the step, mm, from supine_displace_range for the
+ *               difference of the gains
  * @param xyz    [count, 3] mm, changed; must not overlap `step`
  * Each step rounds a coordinate by at most 2^-24 of its value. These errors add up, so begin each
- * breath from supine_deform.
- *
- * [Santhanam2008]  full reference in supine/breath.h */
+ * breath with supine_deform. */
 SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
 
-/** Compute the weights v of the normals' modes for each lung. Component c of a normal is quadratic
- * in the weights w, and linear in each of the gains a and b of the two axes after c (cyclically):
+/** Compute the weights v of the modes of the normals for each lung. They are sums over the three
+ * axes of a normal:
  *
- *     v_j = sum over c of V_jc . (1, a w_k, b w_k, a b w_k w_l (k <= l))
+ *     v_j = sum over axes c of V_jc . (1, a w_k, b w_k, a b w_k w_l (k <= l))
  *
- * Files of versions 1 and 2 have one gain a: v_j = V_j . (1, a w_k, a^2 w_k w_l (k <= l)).
+ * Here a and b are the gains of the two axes after c, cyclically. In files of versions 1 and 2,
+ * which have one gain a, v_j = V_j . (1, a w_k, a^2 w_k w_l (k <= l)).
  * @param normal_weights  [G, Q] v, written
  * Cost: 1.5 G Q K^2 multiplications, once a frame. */
 SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
@@ -287,15 +280,14 @@ SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const sup
  *
  *     n_i = sum over j of v_j n_ij, normalised
  *
- * The file states the angle between these normals and those of supine_normals, measured on held-out
- * states: its mean and its 99.9th percentile are metadata "normals_mean_degrees" and
- * "normals_p999_degrees". They hold in the range of volumes "normals_range_ml" or, without rest, in
- * the range of largest displacements "normals_range_mm"; the angle is larger outside.
- *
- * @param xyz      [N, 3] mm, written; NULL for the normals alone
+ * The angles between these normals and those of supine_normals were measured on held-out states.
+ * Their mean and 99.9th percentile are metadata "normals_mean_degrees" and "normals_p999_degrees"
+ * of the file. They hold for volumes in "normals_range_ml" or, without rest, for largest
+ * displacements in "normals_range_mm". Outside these ranges, angles are larger.
+ * @param xyz      [N, 3] mm, written; NULL to compute only normals
  * @param normals  [N, 3], written; 0 for a vertex without triangles
  * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals
- * Cost per vertex in addition to its position: 3 Q + 8 multiplications, and as many additions. */
+ * Cost of a normal: 3 Q + 8 multiplications, and as many additions. */
 SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose,
                                            float *xyz, float *normals);
 
@@ -305,8 +297,8 @@ SUPINE_API supine_status supine_deform_lit_range(const supine_basis *basis, cons
                                                  size_t begin, size_t end, float *xyz,
                                                  float *normals);
 
-/** Compute the unit normals of a deformed surface from its triangles: at each vertex the mean of
- * its triangles' normals, weighted by area.
+/** Compute the unit normals of a deformed surface from its triangles. The normal of a vertex is the
+ * mean of its triangles' normals, weighted by area.
  * @param xyz      [N, 3] positions of all vertices, mm
  * @param normals  [N, 3], written; 0 for a vertex without a triangle of positive area
  * Cost: one pass over the triangles, in the caller's thread. */
@@ -316,14 +308,14 @@ SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, floa
  * coefficients in the attributes of a vertex. */
 enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 
-/** Fill a vertex buffer for supine.glsl with vertices begin <= i < end, each of which has
+/** Fill a vertex buffer for supine.glsl with vertices begin <= i < end. Each vertex has
  *
  *     reference     vec4 at byte 0: reference position, mm, and the index of the lung as w
  *     direction     vec3 at byte 16, mm
  *     coefficients  (K + 3) / 4 vec4s from byte 28; the last may have fewer than four numbers
- *
- * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes a vertex if K is 4
- * @retval SUPINE_ERROR_UNSUPPORTED  more than SUPINE_GL_MODES modes, or a vector field */
+ * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes per vertex if K is 4
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes or is a vector
+ *                                   field */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
@@ -334,14 +326,15 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 
-/** Pack the normals' modes of vertices begin <= i < end for supine.glsl: three modes to a word, in
- * W = (Q + 2) / 3 attributes of type uvec3. W is SUPINE_WORDS of supine.glsl.
- * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes each if Q is 6
+/** Pack the modes of the normals of vertices begin <= i < end for supine.glsl. Three modes share a
+ * word; W = (Q + 2) / 3 attributes of type uvec3 hold a vertex. W is SUPINE_WORDS of supine.glsl.
+ * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes per vertex if Q
+ *               is 6
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis has no normals, or was opened without_normals */
 SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
                                                 uint32_t *words);
 
-/** Compute the uniform supine_normal_weights of supine.glsl, with W of supine_gl_pack_normals.
+/** Compute the uniform supine_normal_weights of supine.glsl. W is that of supine_gl_pack_normals.
  * @param uniforms  [G, W, 3], written, for glUniform3fv(location, G * W, uniforms)
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_normals */
 SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis,

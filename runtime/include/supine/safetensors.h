@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * Safetensors files: named tensors of raw little-endian numbers behind a JSON header.
+ * Safetensors files: named tensors of raw little-endian numbers after a JSON header.
  *
  *     8 bytes   length of the header, unsigned little-endian
  *     header    JSON: name -> {dtype, shape, data_offsets [begin, end)}, __metadata__ -> strings
  *     data      the tensors, one after the other without gaps
  *
- * Files that Supine writes have the metadata "checksum", which does not depend on the layout of the
- * file. It detects accidents, not forgery. It is the sum, modulo 2^64, over
+ * Files that Supine writes have a metadata string "checksum". It detects accidental changes, not
+ * forgery, and does not depend on the layout of the file. It is the sum, modulo 2^64, of a hash for
+ * each tensor and a hash for each other metadata string:
  *
- *     tensors   h(data, h("F32 [20000,3]", h(name, 0)))    with the element type and shape as text
- *     metadata  h(value, h(key, 1))                        without the key "checksum"
+ *     tensor    h(data, h("F32 [20000,3]", h(name, 0)))    with the element type and shape as text
+ *     metadata  h(value, h(key, 1))
  *
  * where h(bytes, seed) is XXH64, text is UTF-8 and numbers are little-endian. In Python, with
  * `import xxhash`:
@@ -43,15 +44,14 @@ typedef enum supine_dtype {
   SUPINE_DTYPE_COUNT
 } supine_dtype;
 
-/** Largest number of axes of a tensor. */
 enum { SUPINE_TENSOR_RANK_MAX = 4 };
 
-/** One tensor, row-major. A tensor that is written belongs to the caller. A tensor that is read
- * points into the memory of the file, with `data` aligned to the element size. */
+/** A tensor, row-major. The caller owns a tensor that it writes. A tensor of an open file points
+ * into the memory of the file, with `data` aligned to the element size. */
 typedef struct supine_tensor {
   const char *name;
   supine_dtype dtype;
-  size_t rank;                          /**< number of axes, 1 to SUPINE_TENSOR_RANK_MAX */
+  size_t rank;                          /**< number of axes */
   size_t shape[SUPINE_TENSOR_RANK_MAX]; /**< length of each axis */
   const void *data;
 } supine_tensor;
@@ -62,12 +62,10 @@ typedef struct supine_metadata {
   const char *value;
 } supine_metadata;
 
-/** An open safetensors file. */
 typedef struct supine_safetensors supine_safetensors;
 
-/** Map a file and check all of it except its checksum (supine_safetensors_verify): length of the
- * header, JSON, element types, shapes, sizes that overflow, offsets that overlap, leave gaps or
- * pass the end, trailing bytes, repeated names. The file must not change while it is open.
+/** Map a file, and check its header and the layout of its tensors, but not its checksum
+ * (supine_safetensors_verify). The file must not change while it is open.
  * @param file  written; NULL on failure
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  a check failed
@@ -76,7 +74,7 @@ SUPINE_API supine_status supine_safetensors_open(const char *path, supine_safete
                                                  supine_error *error);
 
 /** Open a file in memory. The caller must not change its bytes until the file is closed. The bytes
- * need no alignment, as misaligned tensors are copied. Statuses: as supine_safetensors_open.
+ * need no alignment, because misaligned tensors are copied. Statuses: as supine_safetensors_open.
  * @param name  name of the file in messages */
 SUPINE_API supine_status supine_safetensors_open_memory(const void *bytes, size_t size,
                                                         const char *name, supine_safetensors **file,
@@ -96,16 +94,16 @@ SUPINE_API const char *supine_safetensors_metadata(const supine_safetensors *fil
 SUPINE_API const supine_metadata *supine_safetensors_all_metadata(const supine_safetensors *file,
                                                                   size_t *count);
 
-/** Check the content against the metadata "checksum".
- * @retval SUPINE_ERROR_FORMAT  the file states no checksum, or its content has a different one
+/** Compare the checksum of the content with the metadata "checksum".
+ * @retval SUPINE_ERROR_FORMAT  the file has no checksum, or its content has a different one
  * Cost: one pass over the file, at about the speed of memory. */
 SUPINE_API supine_status supine_safetensors_verify(const supine_safetensors *file,
                                                    supine_error *error);
 
-/** Write a safetensors file to a stream, with the metadata "checksum" added. Tensors are laid out
- * by descending element size and, for one size, in the given order, so that each begins at a
- * multiple of its element size. The header is padded with spaces to a multiple of 8 bytes. Errors
- * of the stream are not reported: check ferror and fclose.
+/** Write a safetensors file to a stream, and add the metadata "checksum". Tensors are sorted by
+ * descending element size, so that each begins at a multiple of its element size; tensors of the
+ * same element size keep their order. The header is padded with spaces to a multiple of 8 bytes.
+ * Errors of the stream are not reported: check ferror and fclose.
  * @param name  name of the file in messages
  * @retval SUPINE_ERROR_ARGUMENT  two tensors or two keys have the same name, a dtype, rank or size
  *                                is out of range, text is not UTF-8, or metadata has the key

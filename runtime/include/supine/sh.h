@@ -2,8 +2,8 @@
 /** @file
  * Real spherical harmonics of a direction.
  *
- * Convention: orthonormal on the unit sphere, no Condon-Shortley phase, the polar axis is z. The
- * index of Y(l, m) is l*l + l + m; m < 0 denotes the sine terms.
+ * They are orthonormal on the unit sphere, without the Condon-Shortley phase; the polar axis is z.
+ * The index of Y(l, m) is l*l + l + m, and m < 0 denotes the sine terms.
  *
  *     Y(0, 0) = 0.28209479        Y(1,-1) = 0.48860251 y
  *     Y(1, 0) = 0.48860251 z      Y(1, 1) = 0.48860251 x
@@ -20,7 +20,7 @@
 extern "C" {
 #endif
 
-/** The highest band. The recurrences are tested up to this band. */
+/** The highest band. The recurrences are accurate up to this band (tested). */
 #define SUPINE_SH_BAND_MAX 64
 
 /** Return the number of harmonics with l <= band: (band + 1)^2. */
@@ -30,9 +30,8 @@ SUPINE_API size_t supine_sh_count(size_t band);
 SUPINE_API size_t supine_sh_index(size_t l, int m);
 
 /** Compute every Y(l, m) with l <= band at one direction.
- *
  * @param band       0 to SUPINE_SH_BAND_MAX
- * @param direction  [3], any length but 0; normalised here
+ * @param direction  [3], any length but 0
  * @param y          [(band + 1)^2], written
  * @retval SUPINE_ERROR_ARGUMENT  the band is too high, or the direction is zero or not finite */
 SUPINE_API supine_status supine_sh_evaluate(size_t band, const double direction[3], double *y);

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The state of a lung, posture and volume, as text and as a struct.
+ * The state of the lungs, a posture and a volume, as text and as a struct.
  *
  *     POSTURE  supine, prone, left, right (lying on that side), upright, inverted, a DICOM patient
  *              position, any of them tilted (supine+15), or gravity X:Y:Z
  *     VOLUME   rest   the end of a quiet expiration in that posture (FRC, with the tissue)
  *              full   full inflation (TLC, with the tissue)
  *              scan   the volume in the scan
- *              each with +ML or -ML added, as rest+500 or full-3000;
+ *              each alone or with +ML or -ML, such as rest+500 or full-3000;
  *              2600mL, an absolute volume of gas and tissue;
  *              left=VOLUME,right=VOLUME for each lung
  *     STATE    POSTURE, VOLUME or POSTURE:VOLUME
@@ -32,14 +32,14 @@ typedef enum supine_volume_kind {
   SUPINE_VOLUME_REST,        /**< the end of a quiet expiration in the posture */
   SUPINE_VOLUME_FULL,        /**< full inflation */
   SUPINE_VOLUME_SCAN,        /**< the volume in the scan */
-  SUPINE_VOLUME_ABSOLUTE,    /**< 0 mL: `ml` is the volume of gas and tissue, as in a CT */
+  SUPINE_VOLUME_ABSOLUTE,    /**< 0 mL, so that `ml` is the whole volume of gas and tissue */
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;
 
 /** A volume, counted from a reference. */
 typedef struct supine_volume {
   supine_volume_kind kind;
-  double ml; /**< volume above the reference, mL; negative: below */
+  double ml; /**< volume above the reference, mL; negative if below it */
 } supine_volume;
 
 /** Largest number of named lungs, and size of a name in bytes with its NUL. */
@@ -49,7 +49,7 @@ enum { SUPINE_STATE_LUNGS_MAX = 2, SUPINE_STATE_NAME_SIZE = 16 };
 typedef struct supine_state {
   double gravity[3];    /**< unit vector in body axes (LPS) that points where things fall */
   supine_volume volume; /**< volume of all lungs together; unused if lungs are named */
-  size_t lung_count;    /**< number of lungs with volumes of their own; 0: none */
+  size_t lung_count;    /**< number of named lungs, each with a volume of its own */
   struct {
     char name[SUPINE_STATE_NAME_SIZE];
     supine_volume volume;
@@ -70,14 +70,14 @@ SUPINE_API supine_status supine_state_parse_posture(const char *text, supine_sta
 SUPINE_API supine_status supine_state_parse_volume(const char *text, supine_state *state,
                                                    supine_error *error);
 
-/** Print a state as supine_state_parse reads it, such as "left:rest+500"; volumes have up to 9
+/** Print a state as text for supine_state_parse, such as "left:rest+500". Volumes have up to 9
  * digits.
- * @param size  size of `text` in bytes; longer text is cut off; 160 bytes are enough for any state
+ * @param size  size of `text` in bytes; 160 are enough for any state; longer text is cut off
  * @return the length of the whole text, without its NUL */
 SUPINE_API size_t supine_state_print(const supine_state *state, char *text, size_t size);
 
-/** Print a state in words, such as "left side at rest + 500 mL"; omit a default volume. Parameters
- * and result: as supine_state_print. */
+/** Print a state in words, such as "left side at rest + 500 mL", without a default volume.
+ * Parameters and result: as supine_state_print. */
 SUPINE_API size_t supine_state_describe(const supine_state *state, char *text, size_t size);
 
 #ifdef __cplusplus

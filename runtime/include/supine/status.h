@@ -33,7 +33,7 @@ typedef enum supine_status {
   SUPINE_ERROR_READ,         /**< a file is missing or cannot be read */
   SUPINE_ERROR_FORMAT,       /**< the content of a file violates its format */
   SUPINE_ERROR_MESH,         /**< a mesh is unfit for the computation */
-  SUPINE_ERROR_OPEN_SURFACE, /**< a volume was asked for, but the surface is open */
+  SUPINE_ERROR_OPEN_SURFACE, /**< a volume is needed, but the surface is open */
   SUPINE_ERROR_UNSUPPORTED,  /**< this build, processor or file lacks the feature */
   SUPINE_ERROR_WRITE,        /**< an output cannot be written */
   SUPINE_ERROR_NUMERICAL,    /**< a computation did not converge or left its range */
@@ -44,8 +44,8 @@ typedef enum supine_status {
 /** Return a phrase for a status; never NULL, even for values outside the enumeration. */
 SUPINE_API const char *supine_status_string(supine_status status);
 
-/** The detail of a failure, such as the file, the vertex and the remedy. The caller owns the struct
- * and passes it as the last argument, or NULL to get no detail. */
+/** Details of a failure, such as the file, the vertex and the remedy. The caller owns the struct
+ * and passes it as the last argument, which may be NULL. */
 typedef struct supine_error {
   supine_status status;
   char message[512]; /**< one line, NUL-terminated, no trailing newline */

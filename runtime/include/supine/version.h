@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file
- * The version. Before 1.0, a new minor version may change the interface, and the name of the shared
- * library contains the minor version. A new patch version never changes the interface. */
+ * The version. Before 1.0, a new minor version may change the interface; the name of the shared
+ * library therefore contains the minor version. A new patch version never changes the interface. */
 #ifndef SUPINE_VERSION_H
 #define SUPINE_VERSION_H
 
@@ -11,10 +11,9 @@
 extern "C" {
 #endif
 
-/** @{ The version of these headers. */
+/* The version of these headers. */
 #define SUPINE_VERSION "0.3.0"
 #define SUPINE_VERSION_NUMBER 300 /**< 10000 major + 100 minor + patch */
-/** @} */
 
 /** Return the version of the linked or loaded library in the form of SUPINE_VERSION; never NULL. */
 SUPINE_API const char *supine_version(void);

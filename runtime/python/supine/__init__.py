@@ -81,7 +81,7 @@ def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
 
 
 def tilt(posture: Gravity, degrees: float) -> Doubles:
-    """Turn gravity in the sagittal plane: supine by +15 degrees is head down."""
+    """Turn gravity in the sagittal plane. Supine tilted by +15 degrees is head down."""
     out = (ctypes.c_double * 3)()
     status = _c.posture_tilt(_three(posture), degrees, out)
     if status != 0:
@@ -121,7 +121,7 @@ class Pose(_c.CPose):
     """The weights and gains of one state of a basis, made by `Basis.pose`."""
 
     def fill(self, gain: float) -> Pose:
-        """Set every gain to one number, without regard to volumes: for open surfaces and fields."""
+        """Set every gain to one number, regardless of volumes, for open surfaces and fields."""
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
 
@@ -150,7 +150,7 @@ def _state(state: Gravity, volume: str = "") -> Any:
 
 
 class _Owner:
-    """An open basis of the C library, closed when no view of its memory exists any more."""
+    """An open basis of the C library. It is closed when no view of its memory exists any more."""
 
     def __init__(self, source: Source, options: _c.Options) -> None:
         self.pointer = ctypes.c_void_p()
@@ -394,8 +394,9 @@ class Location:
     """The result of `Basis.locate`: lungs found from observed points.
 
     volume, volume_error   volume of all lungs and its standard deviation, mL (0 if the volume was given)
-    rotation, translation  observed = rotation @ (body + correction) + translation
-    distances, sigmas      [n] distance of each point from its prediction by all others, and its standard deviation, mm
+    rotation, translation  observed = rotation @ (law's position + correction) + translation
+    distances, sigmas      [n] distance of each point from its prediction by all other points, and the standard deviation of
+                           this distance, mm
     outliers               [n] True for observations that do not fit; the result ignores them
     log_evidence           log likelihood, to compare results that differ only in the posture
     """
@@ -449,9 +450,9 @@ def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **o
         precompute("lungs.nii.gz", resting={"supine": "2600mL"}, output="lungs.safetensors")
 
     The basis has the vertices of the left lung first, and the vertices of each lung in the given order. Options are
-    those of `supine precompute --help`: held_out=200 stands for --held-out 200, the value True for a flag, a tuple
-    for a,b,c and a dict for a=b,c=d; a list repeats the option. Without `output`, the basis is only in memory.
-    Warnings of the program become Python warnings.
+    those of `supine precompute --help`: held_out=200 becomes --held-out 200. The value True becomes a flag, a tuple
+    becomes a,b,c and a dict becomes a=b,c=d; a list repeats the option. Without `output`, the basis is only in
+    memory. Warnings of the program become Python warnings.
 
     progress  called with the fraction done, 0 to 1; an exception from it stops the program
     """

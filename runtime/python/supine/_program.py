@@ -30,8 +30,8 @@ def _find() -> str:
 
 
 def _words(options: dict[str, Any]) -> list[str]:
-    """Convert options to arguments of the program: held_out=200 becomes --held-out 200, the value True a flag, a tuple
-    a,b,c and a dict a=b,c=d; a list repeats the option."""
+    """Convert options to arguments of the program. held_out=200 becomes --held-out 200. The value True becomes a flag,
+    a tuple becomes a,b,c and a dict becomes a=b,c=d; a list repeats the option."""
     words: list[str] = []
     for name, given in options.items():
         for value in given if isinstance(given, list) else [given]:
@@ -105,7 +105,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
     """Run a command and return its standard output. Its warnings become Python warnings. Its errors become exceptions
     with the same message.
 
-    names  what messages show instead of the paths of temporary files: path -> name"""
+    names  the names that messages show instead of the paths of temporary files: path -> name"""
     import pty  # not at the top, as Windows does not have this module
 
     arguments = [_find(), command, *_words(options), "--", *operands]
