@@ -29,35 +29,36 @@ typedef struct request {
   const char *path;
   bool allow_folds, as_scanned;
   supine_from from;
-  double fps, seconds; /* frames per second; duration, s, or 0 if not given */
+  double fps;
+  double duration; /* s; 0 if not given */
 } request;
 
-/* Names of the values of supine_pv_course. */
+/* Names of the courses, indexed by supine_pv_course. */
 static const char *const courses[] = {"cosine", "ramp", "flow", NULL};
 
 static const supine_option table[] = {
     {"output", 'o', "OUT",
-     "NAME.vtp: one file for ParaView, with normals, lungs, gravity and volumes; its time is the "
-     "index of the frame, and positions are rounded to 1/256 mm. NAME.safetensors, for T frames, N "
-     "vertices, M triangles and G lungs: positions [T,N,3] in mm, triangles [M,3], time [T] in s, "
-     "volume [T,G] in mL and gravity [T,3]",
+     "NAME.vtp: one file of all frames for ParaView, which shows the index of a frame as its time. "
+     "It has normals, lungs, gravity and volumes; positions are rounded to 1/256 mm\n"
+     "NAME.safetensors: positions [T,N,3] in mm, triangles [M,3], time [T] in s, volume [T,G] in "
+     "mL and gravity [T,3], for T frames, N vertices, M triangles and G lungs",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".vtp or .safetensors"},
     {"turn", 0, "FROM:TO:SECONDS",
      "turn gravity from one posture to another at constant speed, such as supine:left:10s. Between "
-     "opposite postures gravity passes the left side, or the back if it starts along the body or "
-     "at a side. The volume at rest follows the posture",
+     "opposite postures, such as supine and prone, gravity passes the left side; if it starts "
+     "along the body or at a side, it passes the back. The volume at rest changes with the posture",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
-     "tidal volume of both lungs, above rest in the posture (above the scan if rest is unknown); "
-     "default 500",
+     "tidal volume of both lungs, in mL, which is added to rest in the posture, or to the scan if "
+     "rest is unknown; default 500",
      SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
     {"inhale", 0, "SHARE",
-     "share of the breath's duration for inhaling, between 0 and 1; default 1/3",
+     "share of the breath's duration that is spent inhaling, between 0 and 1; default 1/3",
      SUPINE_FILLS(request, breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
      .wants = "a share between 0 and 1", .more = true},
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default: a normal adult's",
@@ -65,28 +66,28 @@ static const supine_option table[] = {
     {"rest-pressure", 0, "P", "pressure at the end of an exhalation, in cmH2O; default 5",
      SUPINE_FILLS(request, breath.rest_pressure), .wants = "a number of cmH2O", .more = true},
     {"course", 0, "NAME",
-     "cosine (default): pressure follows a cosine; ramp: pressure is linear in time; flow: the "
-     "flows in and out are constant",
+     "cosine (default): pressure follows a cosine; ramp: pressure is linear in time; flow: inflow "
+     "and outflow are constant",
      SUPINE_FILLS(request, breath.course), .choices = courses, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
     {"fps", 0, "N", "frames per second", SUPINE_FILLS(request, fps), SUPINE_ABOVE_ZERO,
      .standard = "66.66"},
-    {"seconds", 0, "S", "duration in s; default: that of the turn, or one breath",
-     SUPINE_FILLS(request, seconds), SUPINE_ABOVE_ZERO},
+    {"seconds", 0, "S", "duration in s; default: the duration of the turn, or of one breath",
+     SUPINE_FILLS(request, duration), SUPINE_ABOVE_ZERO},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
 
-/* Check that the options fit each other, set the turn, and compute the number of frames. */
+/* Check the options, set the turn, and compute the number of frames. */
 static supine_status complete(request *wanted, size_t *count, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
   supine_pv_breath *breath = &wanted->breath;
   if (wanted->as_scanned && supine_text_ends_in_any_case(wanted->path, ".safetensors")) {
-    return supine_error_set(
-        error, SUPINE_ERROR_ARGUMENT,
-        "--as-scanned is for VTP files only: leave it out, as safetensors are in LPS and mm");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "--as-scanned is for VTP files only: leave it out, as safetensors "
+                            "files are always in LPS and mm");
   }
   if (wanted->turns && wanted->orientation.given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --turn or one posture, not both");
@@ -100,7 +101,7 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
     memcpy(wanted->turn.from, wanted->turn.to, sizeof wanted->turn.from);
   }
   double seconds = wanted->turns ? wanted->turn.seconds : 60.0 / breath->rate;
-  seconds = wanted->seconds > 0.0 ? wanted->seconds : seconds;
+  seconds = wanted->duration > 0.0 ? wanted->duration : seconds;
   const double frames = floor(seconds * wanted->fps * (1.0 + 1e-12)) + 1.0;
   *count = (size_t)fmin(frames, FRAMES_MAX);
   return frames <= FRAMES_MAX
@@ -111,21 +112,21 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
                    seconds, wanted->fps, FRAMES_MAX);
 }
 
-/* A breath, and the memory for its surfaces. */
+/* A breath, and the memory for its frames. */
 typedef struct playing {
   const request *wanted;
   supine_basis *basis;
-  size_t count, lungs; /* numbers of frames, T, and of lungs, G */
-  double *time;        /* [T] time of each frame, s */
-  double *above;       /* [T] volume above rest, or above the scan if rest is unknown, mL */
-  double *gravity;     /* [T, 3] unit vectors along gravity */
-  double *volumes;     /* [T, G] volume of gas and tissue in each lung, mL */
-  supine_mesh mesh;    /* triangles; for VTP, also the positions of the current frame */
-  float *normals;      /* [N, 3] normals of the current frame, for VTP */
-  float *positions;    /* [N, 3] current frame, mm; for safetensors, then [T, N, 3] all frames */
-  double *seconds;     /* [T] compute time of each frame, s */
-  double *origin;      /* [N, 3] positions that displacements start from, mm */
-  char comment[512];   /* comment in the VTP file */
+  size_t frame_count, lung_count; /* T and G below */
+  double *time;                   /* [T] s */
+  double *above;    /* [T] volume above rest, or above the scan if rest is unknown, mL */
+  double *gravity;  /* [T, 3] unit vectors */
+  double *volumes;  /* [T, G] gas and tissue, mL */
+  supine_mesh mesh; /* triangles and, for VTP, the positions of the current frame */
+  float *normals;   /* [N, 3] normals of the current frame, for VTP */
+  float *positions; /* [1 + T, N, 3] mm: the current frame; for safetensors, all T frames follow */
+  double *compute_time; /* [T] s */
+  double *origin;       /* [N, 3] positions that displacements start from, mm */
+  char vtp_comment[512];
 } playing;
 
 static void end(playing *p) {
@@ -133,24 +134,24 @@ static void end(playing *p) {
   supine_mesh_free(&p->mesh);
   free(p->normals);
   free(p->positions);
-  free(p->seconds);
+  free(p->compute_time);
   free(p->origin);
   supine_basis_close(p->basis);
 }
 
-/* Allocate memory for `count` frames; a VTP series keeps the positions of one frame only. */
+/* Allocate memory for `count` frames; for a VTP `series`, p->positions holds one frame only. */
 static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
-  p->count = count;
-  p->lungs = supine_basis_get_info(p->basis)->lung_count;
-  p->time = malloc((5 + p->lungs) * count * sizeof *p->time);
+  p->frame_count = count;
+  p->lung_count = supine_basis_get_info(p->basis)->lung_count;
+  p->time = malloc((5 + p->lung_count) * count * sizeof *p->time);
   const size_t kept = series ? 1 : 1 + count;
   if (frame <= SIZE_MAX / sizeof(float) / kept) {
     p->positions = malloc(kept * frame * sizeof *p->positions);
   }
   p->normals = malloc(frame * sizeof *p->normals);
-  p->seconds = malloc(count * sizeof *p->seconds);
-  if (p->time == NULL || p->normals == NULL || p->seconds == NULL ||
+  p->compute_time = malloc(count * sizeof *p->compute_time);
+  if (p->time == NULL || p->normals == NULL || p->compute_time == NULL ||
       supine_options_basis_mesh(p->basis, &p->mesh) != SUPINE_OK) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
@@ -171,58 +172,68 @@ static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, su
   return supine_basis_pose(p->basis, &state, pose, error);
 }
 
-/* Compute times, directions of gravity and volumes. */
+/* Compute the time, the direction of gravity and the volumes of each frame. */
 static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error *error) {
-  for (size_t t = 0; t < p->count; ++t) {
+  for (size_t t = 0; t < p->frame_count; ++t) {
     p->time[t] = (double)t / p->wanted->fps;
     supine_breath_turn_gravity(&p->wanted->turn, p->time[t], p->gravity + 3 * t);
   }
-  supine_status status =
-      supine_breath_evaluate(pv, &p->wanted->breath, p->count, p->time, p->above, NULL, error);
-  for (size_t t = 0; t < p->count && status == SUPINE_OK; ++t) {
+  supine_status status = supine_breath_evaluate(pv, &p->wanted->breath, p->frame_count, p->time,
+                                                p->above, NULL, error);
+  for (size_t t = 0; t < p->frame_count && status == SUPINE_OK; ++t) {
     supine_pose pose;
     supine_error cause;
     status = find_pose(p, t, &pose, &cause);
     if (status != SUPINE_OK) {
       return supine_error_set(error, status, "at %.3f s: %s", p->time[t], cause.message);
     }
-    supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lungs);
+    supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
   }
   return status;
 }
 
-/* Print the range of the volumes and the compute time of frames. */
-static void report(const playing *p) {
-  double least = INFINITY;
-  double peak = 0.0;
-  for (size_t t = 0; t < p->count; ++t) {
-    double sum = 0.0;
-    for (size_t lung = 0; lung < p->lungs; ++lung) {
-      sum += p->volumes[t * p->lungs + lung];
-    }
-    least = fmin(least, sum);
-    peak = fmax(peak, sum);
+/* Return the volume of all lungs in a frame, mL. */
+static double volume_at(const playing *p, size_t t) {
+  double sum = 0.0;
+  for (size_t lung = 0; lung < p->lung_count; ++lung) {
+    sum += p->volumes[t * p->lung_count + lung];
   }
+  return sum;
+}
+
+/* Find the frames of smallest and largest volume. */
+static void find_ends(const playing *p, size_t ends[2]) {
+  ends[0] = ends[1] = 0;
+  for (size_t t = 1; t < p->frame_count; ++t) {
+    ends[0] = volume_at(p, t) < volume_at(p, ends[0]) ? t : ends[0];
+    ends[1] = volume_at(p, t) > volume_at(p, ends[1]) ? t : ends[1];
+  }
+}
+
+static void report(const playing *p) {
+  size_t ends[2];
+  find_ends(p, ends);
   (void)printf("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-               p->wanted->path, p->count, p->count == 1 ? "" : "s", p->time[p->count - 1],
-               p->wanted->fps, least, peak);
+               p->wanted->path, p->frame_count, p->frame_count == 1 ? "" : "s",
+               p->time[p->frame_count - 1], p->wanted->fps, volume_at(p, ends[0]),
+               volume_at(p, ends[1]));
   (void)printf("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
-               1e3 * gsl_stats_median(p->seconds, 1, p->count),
-               1e3 * gsl_stats_max(p->seconds, 1, p->count), 1e3 * budget);
+               1e3 * gsl_stats_median(p->compute_time, 1, p->frame_count),
+               1e3 * gsl_stats_max(p->compute_time, 1, p->frame_count), 1e3 * budget);
 }
 
 /* Compute all frames.
- * @param series  receives each frame; NULL: all frames are stored in p->positions */
+ * @param series  receives each frame; NULL to store all frames in p->positions */
 static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
   const size_t frame = 3 * p->mesh.vertex_count;
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
-  for (size_t t = 0; t < p->count && status == SUPINE_OK; ++t) {
+  for (size_t t = 0; t < p->frame_count && status == SUPINE_OK; ++t) {
     supine_pose pose;
     const double start = supine_clock_seconds();
     (void)find_pose(p, t, &pose, NULL); /* cannot fail: find_volumes has computed this pose */
     supine_deform(p->basis, &pose, p->positions);
-    p->seconds[t] = supine_clock_seconds() - start;
+    p->compute_time[t] = supine_clock_seconds() - start;
     if (series != NULL) {
       for (size_t i = 0; i < frame; ++i) {
         p->mesh.vertices[i] = (double)p->positions[i];
@@ -232,7 +243,7 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
     } else {
       memcpy(p->positions + (1 + t) * frame, p->positions, frame * sizeof *p->positions);
     }
-    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->count)) {
+    if (!supine_options_progress_step(&progress, (double)(t + 1) / (double)p->frame_count)) {
       status =
           supine_error_set(error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
     }
@@ -242,13 +253,13 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
 }
 
 /* Compute the frames, and write them as VTP.
- * @param save  with axes, unit and comment already set */
+ * @param save  has its axes, unit and comment set */
 static supine_status write_series(playing *p, supine_mesh_save_options save, supine_error *error) {
-  /* Step of rounding, mm; half of it is less than the storage error (supine_basis_info). */
+  /* Positions are rounded to multiples of this, mm; the basis itself errs by up to 0.005 mm. */
   static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
-                                      {"volume_mL", p->lungs, p->volumes}};
+                                      {"volume_mL", p->lung_count, p->volumes}};
   supine_mesh_series *series = NULL;
   save.from = p->origin;
   save.normals = p->normals;
@@ -256,8 +267,8 @@ static supine_status write_series(playing *p, supine_mesh_save_options save, sup
   save.fields = fields;
   save.field_count = sizeof fields / sizeof *fields;
   save.rounding = rounding;
-  supine_status status =
-      supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->count, p->time, &series, error);
+  supine_status status = supine_mesh_series_open(p->wanted->path, &p->mesh, &save, p->frame_count,
+                                                 p->time, &series, error);
   if (status == SUPINE_OK) {
     status = play_frames(p, series, error);
   }
@@ -268,9 +279,8 @@ static supine_status write_series(playing *p, supine_mesh_save_options save, sup
   return status;
 }
 
-/* Compute the frames, and write them as safetensors. */
 static supine_status write_tensors(playing *p, const char *made_by, supine_error *error) {
-  const size_t t = p->count;
+  const size_t t = p->frame_count;
   const supine_tensor tensors[] = {
       {"positions",
        SUPINE_F32,
@@ -279,7 +289,7 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
        p->positions + 3 * p->mesh.vertex_count},
       {"triangles", SUPINE_U32, 2, {p->mesh.triangle_count, 3}, p->mesh.triangles},
       {"time", SUPINE_F64, 1, {t}, p->time},
-      {"volume", SUPINE_F64, 2, {t, p->lungs}, p->volumes},
+      {"volume", SUPINE_F64, 2, {t, p->lung_count}, p->volumes},
       {"gravity", SUPINE_F64, 2, {t, 3}, p->gravity}};
   const supine_metadata metadata[] = {{"format", "supine-breath"},
                                       {"version", "1"},
@@ -294,15 +304,10 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
              : status;
 }
 
-/* Check that the surfaces of smallest and largest volume are plausible; warn or fail if not. */
+/* Check that the surfaces in the frames of smallest and largest volume are plausible. */
 static supine_status check_ends(const playing *p, supine_error *error) {
-  size_t least = 0;
-  size_t most = 0;
-  for (size_t t = 1; t < p->count; ++t) {
-    least = p->above[t] < p->above[least] ? t : least;
-    most = p->above[t] > p->above[most] ? t : most;
-  }
-  const size_t ends[2] = {least, most};
+  size_t ends[2];
+  find_ends(p, ends);
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < 2 && status == SUPINE_OK; ++i) {
     supine_pose pose;
@@ -317,7 +322,7 @@ static supine_status check_ends(const playing *p, supine_error *error) {
 static supine_status play(playing *p, size_t count, const char *made_by, supine_error *error) {
   const request *wanted = p->wanted;
   const bool tensors = supine_text_ends_in_any_case(wanted->path, ".safetensors");
-  supine_mesh_save_options save = {.comment = p->comment};
+  supine_mesh_save_options save = {.comment = p->vtp_comment};
   supine_pv pv = *supine_breath_normal();
   supine_reference_pose from;
   supine_status status = supine_options_basis_frame(p->basis, wanted->as_scanned, &save, error);
@@ -342,7 +347,7 @@ static supine_status play(playing *p, size_t count, const char *made_by, supine_
   }
   supine_options_signals_catch(true);
   if (status == SUPINE_OK) {
-    (void)snprintf(p->comment, sizeof p->comment,
+    (void)snprintf(p->vtp_comment, sizeof p->vtp_comment,
                    "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
                    made_by);
     status = tensors ? write_tensors(p, made_by, error) : write_series(p, save, error);
@@ -377,10 +382,10 @@ const supine_command supine_command_breathe = {
     name,
     "compute a breath, in one posture or during a turn",
     .usage = "BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]",
-    .about =
-        "Computes breathing lungs from a basis file, in one posture or during a turn, and writes "
-        "the surface of each frame. The volume follows the pressure-volume relation and is exact "
-        "in each frame. The compute time per frame is printed; a smooth display allows 15 ms.",
+    .about = "Computes breathing lungs from a basis file, in one posture or during a turn, and "
+             "writes the surface of each frame. The volume follows the pressure-volume relation "
+             "and is exact in each frame. The printed compute time per frame must be below 15 ms "
+             "for a smooth display.",
     .options = table,
     .notes =
         "Examples:\n"

@@ -50,17 +50,16 @@ static const supine_option table[] = {
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
-/* Displacements of all named structures in all postures. */
 typedef struct structures {
   const supine_basis *basis;
   const supine_posture_list *postures;
   supine_command_names names;
   float *displacement;   /* [N, 3] displacement of each vertex in one posture, mm */
   double *mean;          /* [postures, names, 3] mean displacement from the reference surface, mm */
-  double *square_errors; /* [names] mean squared expected error, mm^2; 0: unknown */
+  double *square_errors; /* [names] mean squared expected error, mm^2; NAN if unknown */
 } structures;
 
-/* Average `width` values per vertex over the vertices of each name; 0 if a name has none. */
+/* Average values [N, width] over the vertices of each name; 0 for a name without vertices. */
 static void average(const structures *c, size_t width, const float *values, double *mean) {
   const supine_command_names *names = &c->names;
   for (size_t part = 0; part < names->count; ++part) {
@@ -89,7 +88,7 @@ static supine_status find_means(const structures *c, const supine_state *state, 
   return status;
 }
 
-/* Compute the mean squared expected error of each name's vertices between two states. */
+/* Compute the mean squared expected error of each name's displacement between two states. */
 static supine_status find_square_errors(const structures *c, const supine_state *to,
                                         const supine_state *from, supine_error *error) {
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
@@ -97,6 +96,9 @@ static supine_status find_square_errors(const structures *c, const supine_state 
   const supine_status status = supine_options_expected_find(c->basis, to, from, &expected, error);
   for (size_t i = 0; i < n && expected.sigma != NULL; ++i) {
     expected.sigma[i] *= expected.sigma[i];
+  }
+  for (size_t part = 0; part < c->names.count; ++part) {
+    c->square_errors[part] = (double)NAN;
   }
   if (expected.sigma != NULL) {
     average(c, 1, expected.sigma, c->square_errors);
@@ -115,10 +117,10 @@ static void add_pair(const structures *c, size_t from, size_t to, json_t *list) 
     const double move[3] = {after[0] - before[0], after[1] - before[1], after[2] - before[2]};
     const double length = supine_length(move);
     const double sigma = sqrt(c->square_errors[part]);
-    (void)json_array_append_new(list,
-                                json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:f}", "from", text[0],
-                                          "to", text[1], "name", text[2], "move", move[0], move[1],
-                                          move[2], "mm", length, "expected_error_mm", sigma));
+    (void)json_array_append_new(
+        list, json_pack("{s:s, s:s, s:s, s:[f,f,f], s:f, s:o}", "from", text[0], "to", text[1],
+                        "name", text[2], "move", move[0], move[1], move[2], "mm", length,
+                        "expected_error_mm", isnan(sigma) ? json_null() : json_real(sigma)));
   }
 }
 
@@ -224,22 +226,24 @@ const supine_command supine_command_compare = {
     name,
     "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
-    .about = "Reports displacements from supine at rest (or from --from) to each posture, the "
-             "volume of each lung, and ventilation by height in a breath; then finds the direction "
-             "of gravity with the largest displacement from supine. For structures inside ('supine "
-             "embed'), reports the displacement of each named part between every two postures.",
+    .about =
+        "Reports displacements from supine at rest, or from the state of --from, to each posture, "
+        "the volume of each lung, and ventilation by height in a breath; then finds the direction "
+        "of gravity with the largest displacement from supine. For structures inside ('supine "
+        "embed'), reports the displacement of each named part between every two postures.",
     .options = table,
-    .notes = "Statistics are weighted by the area of the surface; '95 %' is the 95th percentile. "
-             "Ventilation by height: the lungs before a breath are cut into ten slabs of equal "
-             "thickness across gravity. The gain of a slab is the volume that its part of the "
-             "surface and its two cut faces enclose after the breath, minus that before. The gains "
-             "sum to the volume of the breath. The regional expansion of a slab is its gain "
-             "divided by its volume before the breath. For structures inside, the displacement is "
-             "the mean over a part, in mm to the left, to the back and to the head.\n"
-             "\n"
-             "Examples:\n"
-             "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
-             "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
+    .notes =
+        "Statistics are weighted by the area of the surface; '95 %' is the 95th percentile. "
+        "Ventilation by height: the lungs before a breath are cut into ten slabs of equal "
+        "thickness across gravity. The gain of a slab is the volume that its part of the surface "
+        "and its two cut faces enclose after the breath, minus the volume that they enclose before "
+        "it. The gains sum to the volume of the breath. The regional expansion of a slab is its "
+        "gain divided by its volume before the breath. For structures inside, the displacement is "
+        "the mean over a part, in mm to the left, to the back and to the head.\n"
+        "\n"
+        "Examples:\n"
+        "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
+        "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

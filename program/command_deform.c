@@ -23,8 +23,8 @@ typedef struct request {
   supine_from from;
   bool as_scanned;
   supine_deform_content content;
-  const char *states; /* CSV file of --states; NULL: one state */
-  char *output;       /* output file named by a row of --states, owned */
+  const char *states; /* CSV file; NULL if the options give one state */
+  char *output;       /* file named by a row of `states`; owned by the request */
 } request;
 
 #define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
@@ -33,13 +33,13 @@ static const supine_option table[] = {
     {"output", 'o', "FILE",
      SUPINE_MESH_ENDINGS
      "; PLY and VTP files include displacements and expected errors. Embedded points can also be "
-     "written as .csv, moved images as .nrrd, .nii, .nii.gz or .mha",
+     "written as .csv, and moved images as .nrrd, .nii, .nii.gz or .mha",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS,
      .rivals = "output"},
     {"states", 0, "LIST",
-     "CSV file of many states, with the columns posture, volume and output; the basis and the "
-     "image are read once. Each output is a surface, points, a field, or the moved image of "
-     "--image or --labels, named relative to the folder of LIST",
+     "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
+     "the image are read once for all states. An output is a surface, points, a field, or the "
+     "moved image of --image or --labels; its path is relative to the folder of LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
@@ -78,7 +78,6 @@ static double largest_displacement(const supine_mesh *rest, const supine_mesh *m
   return largest;
 }
 
-/* Print the file written, the displacement and the volume in one line. */
 static void report(const char *path, const double gravity[3], const supine_mesh *mesh,
                    const supine_mesh *from, const char *reference, bool volumes) {
   (void)printf("%s: gravity %.4g,%.4g,%.4g, largest displacement %.3f mm from %s", path, gravity[0],
@@ -90,7 +89,6 @@ static void report(const char *path, const double gravity[3], const supine_mesh 
   (void)putchar('\n');
 }
 
-/* Write the surface of a pose, with its volumes, normals and expected errors. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    supine_deformation *moved, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -132,10 +130,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
   supine_deformation moved = {.state = wanted->volume.state, .from_given = wanted->from.given};
   char comment[128];
-  supine_status status = supine_options_gravity(&wanted->orientation, moved.state.gravity, error);
-  if (status == SUPINE_OK) {
-    status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
-  }
+  supine_status status = supine_options_reference(basis, &wanted->from, false, &moved.from, error);
   if (status == SUPINE_OK) {
     status =
         supine_options_pose(basis, name, &wanted->volume, moved.state.gravity, &moved.pose, error);
@@ -179,8 +174,6 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s",
                             csv->path, csv->line, output, ENDINGS);
   }
-  memcpy(row->orientation.gravity, state->gravity, sizeof state->gravity);
-  row->orientation.given = true;
   row->output = supine_path_beside(csv->path, output);
   *(voxels && !image ? &row->content.field : &row->content.path) = row->output;
   return row->output == NULL ? SUPINE_ERROR_MEMORY
@@ -209,7 +202,7 @@ static supine_status check_row(const char *basis, const request *rows, size_t co
   return status == SUPINE_OK ? supine_output_try(row->output, error) : status;
 }
 
-/* Make a request for each row of --states, and check them all before any is computed. */
+/* Make a request for each row of --states, and check all rows before any state is computed. */
 static supine_status read_rows(const char *basis, const request *wanted, request **rows,
                                size_t *count, supine_error *error) {
   static const char *const columns[] = {"posture", "output", "volume"};
@@ -246,11 +239,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   request *rows = many ? NULL : wanted;
   size_t count = many ? 0 : 1;
   supine_basis *basis = NULL;
-  double gravity[3];
   supine_status status = many ? read_rows(given->operand[0], wanted, &rows, &count, error)
                               : supine_command_deform_content_check(&wanted->content, error);
   if (status == SUPINE_OK && !many) {
-    status = supine_options_gravity(&wanted->orientation, gravity, error);
+    status = supine_options_gravity(&wanted->orientation, wanted->volume.state.gravity, error);
   }
   if (status == SUPINE_OK) {
     status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &basis, error);
@@ -277,7 +269,7 @@ const supine_command supine_command_deform = {
     .usage = "BASIS --posture NAME [--volume VOLUME] -o FILE\n"
              "BASIS --states LIST",
     .about = "Deforms the lungs of a basis file to a posture and a volume, as the run-time library "
-             "does in each frame, and writes the surface. Each point carries its expected error, "
+             "does in each frame, and writes the surface. Each point has its expected error, "
              "expected_error_mm: " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT,
     .options = table,
     .notes =

@@ -2,9 +2,6 @@
 /* supine embed: make a basis of structures that move with the lungs. */
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-
-#include "sh/base/text.h"
 
 #include "mesh/io/image.h"
 #include "mesh/io/points.h"
@@ -23,10 +20,10 @@ static const double margin = 60.0;
 
 enum { LABELS_MOST = 64 };
 
-/* Labels to embed, and the names of their parts, as --labels gives them. */
+/* Labels to embed, and a name for each, from --labels. */
 typedef struct label_list {
   bool given;
-  size_t count; /* number of labels; 0: all labels of the map */
+  size_t count; /* 0 if all labels of the map are wanted */
   unsigned label[LABELS_MOST];
   char name[LABELS_MOST][32];
 } label_list;
@@ -35,7 +32,7 @@ typedef struct request {
   const char *path;
   label_list labels;
   bool has_grid;
-  double grid; /* spacing of the nodes, mm */
+  double grid_spacing; /* mm */
   bool clamp;
   const char *rigid; /* names of rigid parts, or "all" */
   supine_mesh_load_options load;
@@ -72,14 +69,14 @@ static const supine_option table[] = {
     {"output", 'o', "FILE", "basis of the structures (.safetensors)", SUPINE_FILLS(request, path),
      .required = true, .file = SUPINE_FILE_OUT},
     {"grid", 0, "MM",
-     "embed the nodes of a grid over the lungs, for displacement fields, at this spacing; if "
-     "CONTENT is an image, the nodes are voxels of the image, and the spacing is rounded to a "
-     "multiple of theirs",
-     SUPINE_FILLS(request, grid), SUPINE_SAYS_GIVEN(request, has_grid), .standard = "4",
+     "embed the nodes of a grid over the lungs, MM apart, for displacement fields. If CONTENT is "
+     "an image, the nodes are voxels of the image, and MM is rounded to a multiple of the distance "
+     "between voxels",
+     SUPINE_FILLS(request, grid_spacing), SUPINE_SAYS_GIVEN(request, has_grid), .standard = "4",
      SUPINE_ABOVE_ZERO, .wants = "millimetres"},
     {"labels", 0, "all|N[=NAME],...",
-     "read images as label maps, and embed the surface of each of these labels under its name; "
-     "points and meshes may be embedded with them",
+     "read images as label maps, and embed the surface of each label N as a part with this NAME; "
+     "points and meshes may be embedded too",
      SUPINE_FILLS(request, labels), .read = read_labels,
      .wants =
          "all, or at most 64 labels with names of up to 31 letters, such as 7=nodule,8=vessels"},
@@ -89,22 +86,21 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
      "move structures outside the lungs like the nearest point of the surface; default: "
-     "extrapolate the motion inside",
+     "extrapolate the motion from inside the lungs",
      SUPINE_FILLS(request, clamp)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
-/* Make the nodes of a regular grid; if there is an image, take them from its voxels. */
+/* Make the nodes of a regular grid, or, if an image is named, choose them from its voxels. */
 static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
                                const char *image_path, supine_inside_content *content,
                                supine_error *error) {
-  if (image_path == NULL) {
-    return supine_inside_content_grid(shells, NULL, wanted->grid, margin, content, error);
-  }
   supine_image image = {0};
-  supine_status status = supine_image_read(image_path, &image, error);
+  supine_status status =
+      image_path != NULL ? supine_image_read(image_path, &image, error) : SUPINE_OK;
   if (status == SUPINE_OK) {
-    status = supine_inside_content_grid(shells, &image, wanted->grid, margin, content, error);
+    status = supine_inside_content_grid(shells, image_path != NULL ? &image : NULL,
+                                        wanted->grid_spacing, margin, content, error);
   }
   supine_image_free(&image);
   return status;
@@ -257,13 +253,15 @@ const supine_command supine_command_embed = {
     "make points, meshes or a grid move with the lungs",
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
-    .about = "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json of "
-             "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
-             "nodules), the parts of a label map, or the nodes of a regular grid or of the voxels "
-             "of an image (.nrrd, .nii, .nii.gz). 'supine deform', 'breathe', 'compare', 'info' "
-             "and 'stream' read the file like any basis; 'render' and 'export' show it with "
-             "--inside.\n\nDisplacements inside are interpolated from those of each lung's surface "
-             "by biharmonic splines, which are exact on the surface and for affine motion.",
+    .about =
+        "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json of 3D "
+        "Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, nodules), "
+        "the parts of a label map, or the nodes of a regular grid or of the voxels of an image "
+        "(.nrrd, .nii, .nii.gz). 'supine deform', 'breathe', 'compare', 'info' and 'stream' read "
+        "the file like any basis; 'render' and 'export' show it with --inside.\n"
+        "\n"
+        "Displacements inside are interpolated from the displacements of each lung's surface by "
+        "biharmonic splines, which are exact on the surface and for affine motion.",
     .options = table,
     .notes = "Examples:\n"
              "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"

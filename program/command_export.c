@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine export: write a basis as a page for the browser, or as glTF morph targets. */
 #include <string.h>
-#include <strings.h>
 
 #include <export.h>
+
+#include "sh/base/text.h"
 
 #include "program/inside.h"
 #include "program/options/basis_input.h"
@@ -33,8 +34,8 @@ static const supine_option table[] = {
      .wants = "millilitres above 0"},
     {.help = "For a page:"},
     {"inside", 0, "FILE",
-     "structures made by 'supine embed' from the same basis, shown through the lungs; the page "
-     "shows the name and displacement of each part at the pointer and in a table",
+     "structures made by 'supine embed' from the same basis, shown inside transparent lungs; the "
+     "page shows the name and displacement of each part at the pointer and in a table",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"title", 0, "TEXT", "title of the page; default: the name of the basis file",
      SUPINE_FILLS(request, title)},
@@ -45,8 +46,8 @@ static const supine_option table[] = {
      "nor KHR_mesh_quantization",
      SUPINE_FILLS(request, glb.plain), SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
-     "add animations: one breathes while gravity turns from supine over the left side to prone and "
-     "back over the right side; others breathe in each lying posture",
+     "add animations of breathing: one while gravity turns from supine over the left side to prone "
+     "and back over the right side, and one in each lying posture",
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
     {.name = NULL}};
 
@@ -66,7 +67,6 @@ static supine_status write_glb(const export_source *source, const request *wante
   return SUPINE_OK;
 }
 
-/* Open the structures named by --inside, and write the page. */
 static supine_status write_page(const export_source *source, const request *wanted,
                                 const char *basis_path, supine_error *error) {
   supine_reference_pose from;
@@ -111,7 +111,7 @@ static supine_status write_page(const export_source *source, const request *want
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
-  const bool page = strcasecmp(strrchr(wanted->path, '.'), ".html") == 0;
+  const bool page = supine_text_ends_in_any_case(wanted->path, ".html");
   export_source source = {0};
   if (page && wanted->glb_only) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

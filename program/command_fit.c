@@ -22,8 +22,8 @@ typedef struct request {
   int law;
   supine_source_options source;
 
-  supine_state first, second;           /* states of the first and of the second scan */
-  const char *first_path, *second_path; /* files of their surfaces; NULL: none */
+  supine_state first, second;           /* states of the two scans */
+  const char *first_path, *second_path; /* surfaces of the two scans; NULL if not given */
   size_t further_count;
   supine_state further[SUPINE_PATIENT_OTHERS_MAX];
   const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
@@ -32,7 +32,7 @@ typedef struct request {
 typedef struct scan_data {
   supine_lungs lungs[2]; /* the fuller and the emptier scan, once order_states has ordered them */
   supine_patient_pairs pairs;
-  bool swapped; /* the second scan is the fuller one */
+  bool second_is_fuller;
 } scan_data;
 
 static void begin(void *chosen) {
@@ -49,8 +49,8 @@ static supine_status read_state(const char *text, void *field, supine_error *err
   const supine_status status = supine_state_parse(text, state, error);
   return status == SUPINE_OK && (state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0)
              ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "'%s' is not a state here: give rest, full or a volume of both "
-                                "lungs, such as 2600mL",
+                                "'%s' cannot be the state of a scan: give rest, full or a volume "
+                                "of both lungs, such as 2600mL",
                                 text)
              : status;
 }
@@ -78,24 +78,24 @@ static const supine_option table[] = {
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"rest", 0, "STATE",
      "state of the first scan: POSTURE, VOLUME or POSTURE:VOLUME, where VOLUME is rest or full, "
-     "either with +ML or -ML, or the volume of both lungs measured in a CT, such as 2600mL",
+     "optionally with +ML or -ML, or the volume of both lungs measured in a CT, such as 2600mL",
      FILLS(first), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
-     "state of the second scan, in the same form; a missing volume is taken from the surfaces. "
-     "Either scan may be the fuller one",
+     "state of the second scan, in the same form; either scan may be the fuller one. If it has no "
+     "volume, the volume is taken from the surfaces",
      FILLS(second), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
-     "deep (default), of which only the size is fitted; or paper, the law of Santhanam 2008, of "
-     "which c1 to c9 are fitted. Kriging interpolates the residual of either law",
+     "deep (default): only the size of the displacement is fitted; paper, the law of Santhanam "
+     "2008: c1 to c9 are fitted. Kriging interpolates the residual of either law",
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
     {"name", 0, "TEXT",
      "name of the person; default: the name of the file of landmarks, or of the second surface",
      FILLS(name), .more = true},
     {"state", 0, "STATE:FILE",
-     "further state with its surface, or with landmarks (.csv) that lead to it from the first "
-     "scan; may be repeated, up to 8 times. A state in a posture other than those of the scans "
-     "determines the part of the force that depends on gravity (the gain); for other states only "
-     "the size of the displacement is fitted. All other constants come from the two scans",
+     "further state, with its surface or with landmarks (.csv) from the first scan to this state; "
+     "may be repeated, up to 8 times. If its posture differs from those of the two scans, it "
+     "determines the part of the force that depends on gravity (the gain); otherwise only the size "
+     "of its displacement is fitted. All other constants come from the two scans",
      .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
     {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
@@ -109,7 +109,7 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* Print the model; as text, without the lists of kriging centres and regions. */
+/* Print the model. The text leaves out the lists of kriging centres and regions. */
 static supine_status print(const supine_patient_record *record, const char *made_by, bool json,
                            supine_error *error) {
   json_t *root = supine_patient_encode(record, made_by);
@@ -145,9 +145,10 @@ static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs 
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu landmarks",
                              pairs->count)
           : supine_inside_surface_create(lungs->mesh.vertices, lungs->mesh.triangle_count,
-                                         lungs->mesh.triangles, true, &tree, error);
+                                         lungs->mesh.triangles, false, &tree, error);
   for (size_t i = 0; i < pairs->count && status == SUPINE_OK; ++i) {
-    const supine_inside_place place = supine_inside_surface_find(tree, pairs->from + 3 * i, NULL);
+    const supine_inside_place place =
+        supine_inside_surface_nearest(tree, pairs->from + 3 * i, NULL);
     const size_t lung =
         lungs->lung_count == 2 && place.triangle >= lungs->triangle_begin[1] ? 1 : 0;
     pairs->side[i] = lungs->side[lung];
@@ -183,7 +184,7 @@ static supine_status load_scans(const request *wanted, scan_data *data, supine_e
   return status;
 }
 
-/* Compare the named states: return 1 if the second is fuller, -1 if the first is, 0 if unknown. */
+/* Return 1 if the second state is named as the fuller one, -1 if the first is, else 0. */
 static int named_order(const supine_state *first, const supine_state *second) {
   const supine_volume *a = &first->volume;
   const supine_volume *b = &second->volume;
@@ -197,24 +198,25 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Exchange the scans if the volumes of the surfaces, or the landmarks, show the second as fuller.
+/* Put the fuller scan first: by the named states, else by the volumes of the surfaces or the growth
+ * of the landmarks.
  * */
 static supine_status order_states(const request *wanted, scan_data *data, supine_error *error) {
-  /* Largest relative difference of volumes that does not contradict the named states. */
-  static const double doubt = 0.02;
+  /* Relative error of the volumes; a smaller difference does not contradict the named states. */
+  static const double volume_error = 0.02;
   const double volume[2] = {volume_of(&data->lungs[0]), volume_of(&data->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
                         : data->pairs.count > 0 ? supine_patient_pairs_growth(&data->pairs)
                                                 : 1.0;
   const int named = named_order(&wanted->first, &wanted->second);
-  if ((named > 0 && growth < 1.0 - doubt) || (named < 0 && growth > 1.0 + doubt)) {
+  if ((named > 0 && growth < 1.0 - volume_error) || (named < 0 && growth > 1.0 + volume_error)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
                             "the state named as the fuller one has %.0f %% of the volume of the "
                             "other: exchange --rest and --other, or give --reverse",
                             100.0 * (named > 0 ? growth : 1.0 / growth));
   }
-  data->swapped = named > 0 || (named == 0 && growth > 1.0);
-  if (data->swapped) {
+  data->second_is_fuller = named > 0 || (named == 0 && growth > 1.0);
+  if (data->second_is_fuller) {
     const supine_lungs lungs = data->lungs[0];
     data->lungs[0] = data->lungs[1];
     data->lungs[1] = lungs;
@@ -242,14 +244,14 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
-/* Fit a further state. Its landmarks start in the first scan; if that is the emptier one, they are
- * moved to the fuller state. */
+/* Fit a further state. Its landmarks start in the first scan; if the first scan is the emptier one,
+ * they are moved to the fuller scan. */
 static supine_status fit_further(const request *wanted, const scan_data *data, size_t which,
                                  const supine_lungs *from, supine_patient_record *record,
                                  supine_error *error) {
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   const char *path = wanted->further_path[which];
-  const bool landmarks = supine_text_ends_in(path, ".csv");
+  const bool landmarks = supine_text_ends_in_any_case(path, ".csv");
   supine_patient_pairs pairs = {0};
   supine_lungs lungs = {0};
   supine_patient_further *further = &record->further[record->further_count++];
@@ -257,7 +259,7 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   supine_status status =
       landmarks ? load_pairs(wanted, path, &pairs, error)
                 : supine_command_load_lungs(name, path, &wanted->source, &lungs, error);
-  if (status == SUPINE_OK && landmarks && data->swapped) {
+  if (status == SUPINE_OK && landmarks && data->second_is_fuller) {
     supine_patient_points_to_fuller(&record->patient, pairs.count, pairs.from);
   }
   if (status == SUPINE_OK) {
@@ -269,7 +271,7 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   return status;
 }
 
-/* Fit the further states, and set the part of the force that depends on gravity from them. */
+/* Fit the further states, and compute from them the part of the force that depends on gravity. */
 static supine_status find_gain(const request *wanted, scan_data *data,
                                supine_patient_record *record, supine_error *error) {
   supine_lungs *from = &data->lungs[0];
@@ -286,8 +288,8 @@ static supine_status find_gain(const request *wanted, scan_data *data,
   return status;
 }
 
-/* If state k has no volume, use that of its surface: relative to the other state if that is rest or
- * full, else absolute. */
+/* If state k was given without a volume, take the volume of its surface: relative to rest or full
+ * if the volume of the other state is relative to it, else absolute. */
 static void complete_state(supine_patient_record *record, size_t k) {
   supine_volume *of = &record->state[k].volume;
   const supine_state *other = &record->state[1 - k];
@@ -306,8 +308,8 @@ static void complete_state(supine_patient_record *record, size_t k) {
 static void set_states(const request *wanted, const scan_data *data,
                        supine_patient_record *record) {
   record->from_surface = wanted->second_path != NULL;
-  record->state[data->swapped ? 1 : 0] = wanted->first;
-  record->state[data->swapped ? 0 : 1] = wanted->second;
+  record->state[data->second_is_fuller ? 1 : 0] = wanted->first;
+  record->state[data->second_is_fuller ? 0 : 1] = wanted->second;
   for (size_t k = 0; k < 2; ++k) {
     const supine_volume *volume = &record->state[k].volume;
     record->volume[k] = volume_of(&data->lungs[k]);
@@ -328,28 +330,25 @@ static void set_states(const request *wanted, const scan_data *data,
   }
 }
 
-/* Warn if the volume at rest in the two scans differs from that of healthy people. */
+/* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  /* Smallest reported difference, a share of full inflation; in healthy people the SD is 0.04. */
-  static const double apart_least = 0.07;
+  /* Smallest reported difference / full inflation; the SD among healthy people is 0.04. */
+  static const double reported_from = 0.07;
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
   supine_resting shown = usual;
-  supine_findings findings = {""};
   supine_patient_resting(record, &shown);
   const double share[2] = {supine_reference_resting_total(&usual, g),
                            supine_reference_resting_total(&shown, g)};
-  if (fabs(share[1] - share[0]) > apart_least) {
-    supine_findings_add(&findings,
-                        "warning: at rest the lungs hold %.0f %% of full inflation in the two "
-                        "scans, but %.0f %% in healthy people: check --rest. 'supine precompute "
-                        "--patient' uses the volume in the scans",
-                        100.0 * share[1], 100.0 * share[0]);
-    supine_options_say_findings(name, &findings);
+  if (fabs(share[1] - share[0]) > reported_from) {
+    supine_options_say(name,
+                       "warning: at rest the lungs hold %.0f %% of full inflation in the two "
+                       "scans, but %.0f %% in healthy people: check --rest. 'supine precompute "
+                       "--patient' uses the volume in the scans",
+                       100.0 * share[1], 100.0 * share[0]);
   }
 }
 
-/* Set the name, and the force with the gain of the deep law. */
 static void set_name_and_force(const request *wanted, supine_patient_record *record) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   const char *path = wanted->landmarks.path != NULL ? wanted->landmarks.path : wanted->second_path;
@@ -402,11 +401,12 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
   wanted->first_path = given->count > 0 ? given->operand[0] : NULL;
   wanted->second_path = given->count > 1 ? given->operand[1] : NULL;
   for (size_t k = 0; k < wanted->further_count; ++k) {
-    further_surfaces = further_surfaces || !supine_text_ends_in(wanted->further_path[k], ".csv");
+    further_surfaces =
+        further_surfaces || !supine_text_ends_in_any_case(wanted->further_path[k], ".csv");
   }
   const char *wrong =
       wanted->landmarks.path == NULL && wanted->second_path == NULL
-          ? "nothing to fit to: give --landmarks, the surfaces of both scans, or all three"
+          ? "nothing to fit to: give --landmarks, the surfaces of both scans, or both"
       : further_surfaces && wanted->first_path == NULL
           ? "--state names a surface: name the surface of the first scan too"
       : wanted->expandability && wanted->second_path == NULL

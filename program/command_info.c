@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine info: describe a basis file and its accuracy. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,7 +10,7 @@
 
 #include "program/options/basis_input.h"
 
-/* Compute the share of each band in the squared displacement; 0 if the surface has no area. */
+/* Compute the share of each band in the squared displacement; all 0 if the surface has no area. */
 static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
   supine_compare *compare = NULL;
   const supine_status status = supine_compare_create(basis, &compare, error);
@@ -31,7 +30,7 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
   return SUPINE_OK;
 }
 
-/* Keys of the metadata that are printed unchanged. */
+/* Keys of metadata that are printed under the same key. */
 static const char *const facts[] = {"content",        "assumed",
                                     "patient",        "scanned",
                                     "resting_shares", "law",
@@ -41,12 +40,12 @@ static const char *const facts[] = {"content",        "assumed",
                                     "lung_share",     "lesions",
                                     "reach_mm",       "made_by",
                                     "error_method",   "turned_over_percent"};
-/* Keys of the metadata that are printed in the object "error", without the prefix "error_". */
+/* Keys of metadata that are printed in the object "error", without the prefix "error_". */
 static const char *const errors[] = {"error_directions",  "error_rms_percent", "error_p95_percent",
                                      "error_max_percent", "error_volume_ml",   "error_rest_part",
                                      "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
 
-/* Add an entry of the metadata, if the basis has it; as a number if the text is a number. */
+/* Add an entry of the metadata if the basis has it; if its text is a number, add it as a number. */
 static void add_fact(json_t *object, const char *name, const supine_basis *basis, const char *key) {
   const char *text = supine_basis_metadata(basis, key);
   double value;
@@ -82,8 +81,8 @@ static void add_content(json_t *root, const supine_basis *basis) {
   (void)json_object_set_new(root, "embedded", counts);
 }
 
-/* Add the expected errors of displacements from the scan to the default volume, supine and prone,
- * if they are known. Return SUPINE_OK or SUPINE_ERROR_MEMORY. */
+/* Add the expected errors, if known, of the displacements from the scan to supine and to prone at
+ * the default volume. Return SUPINE_OK or SUPINE_ERROR_MEMORY. */
 static supine_status add_expected(json_t *root, const supine_basis *basis, supine_error *error) {
   const supine_state scan = supine_basis_scan(basis);
   json_t *rows = json_array();

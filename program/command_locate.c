@@ -3,13 +3,13 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include <supine/locate.h>
 #include <supine/posture.h>
 
 #include "sh/base/csv.h"
 #include "sh/base/output.h"
+#include "sh/base/text.h"
 
 #include "program/inside.h"
 #include "program/options/basis_input.h"
@@ -20,7 +20,7 @@ static const char name[] = "locate";
 typedef struct request {
   const char *output, *points;
   supine_orientation orientation;
-  supine_state state; /* a volume of kind SUPINE_VOLUME_DEFAULT is fitted */
+  supine_state state; /* its volume is fitted if it is of kind SUPINE_VOLUME_DEFAULT */
   double noise;
   bool rigid, json;
 } request;
@@ -36,7 +36,7 @@ static const supine_option table[] = {
     {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP "; default: fitted to the points",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"rigid", 0, NULL,
-     "also fit a rotation, from three points or more; default: a translation alone",
+     "also fit a rotation, which needs at least three points; default: fit a translation only",
      SUPINE_FILLS(request, rigid)},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
      .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
@@ -67,7 +67,7 @@ static supine_status find_vertex(const supine_csv *csv, const supine_command_nam
   if (found > 1) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s:%zu: '%s' has %zu vertices, so it is not a point: give names of points", csv->path,
+        "%s:%zu: '%s' has %zu vertices, so it is not a point: give the name of a point", csv->path,
         csv->line, text, found);
   }
   const char *nearest =
@@ -104,7 +104,6 @@ static supine_status read_rows(supine_csv *csv, const supine_command_names *name
   }
 }
 
-/* Read a CSV file with the columns name, x, y, z. */
 static supine_status load_observed(const char *path, const supine_command_names *names,
                                    double noise, observations *observed, supine_error *error) {
   static const char *const columns[] = {"name", "x", "y", "z"};
@@ -133,20 +132,19 @@ static const double negligible = 0.01; /* probability below which a posture is i
 static const double determined = 0.95; /* probability from which a posture counts as determined */
 
 typedef struct lungs_found {
-  size_t count;                       /* number of postures tried */
-  supine_location location[POSTURES]; /* result for each posture */
-  double share[POSTURES];             /* probability of each posture, given the points */
-  const supine_location *best;        /* result for the most probable posture */
-  supine_locate_residual *residuals;  /* [points] residuals in the best posture */
-  float *xyz;                         /* [N, 3] positions in the best posture, mm */
-  float *sigma;                       /* [N] expected errors, over all postures, mm */
-  void *space;                        /* workspaces of supine_locate */
+  size_t count; /* number of postures tried */
+  supine_location location[POSTURES];
+  double probability[POSTURES];
+  const supine_location *best;       /* element of `location` for the most probable posture */
+  supine_locate_residual *residuals; /* [POSTURES, points] */
+  float *xyz;                        /* [N, 3] positions in the best posture, mm */
+  float *sigma;                      /* [N] expected errors, weighted over all postures, mm */
+  void *space;                       /* workspaces of supine_locate */
 } lungs_found;
 
-/* Fit the given posture, or all postures. The share of a posture that cannot be fitted is 0. */
+/* Fit the given posture, or all postures; one that cannot be fitted gets probability 0. */
 static supine_status try_postures(const supine_locate_task *task, bool posture_given,
-                                  supine_locate_residual *residuals, lungs_found *located,
-                                  supine_error *error) {
+                                  lungs_found *located, supine_error *error) {
   const size_t n = task->count;
   const size_t space = supine_locate_space(n);
   supine_status status = SUPINE_OK;
@@ -159,43 +157,42 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
       (void)supine_posture_gravity(postures[k], one.state.gravity);
     }
     const supine_status tried =
-        supine_locate(&one, residuals + k * n, (double *)located->space + k * space,
+        supine_locate(&one, located->residuals + k * n, (double *)located->space + k * space,
                       &located->location[k], status == SUPINE_OK ? error : NULL);
     status = tried == SUPINE_OK ? status : tried;
-    located->share[k] = tried == SUPINE_OK ? located->location[k].log_evidence : -INFINITY;
-    if (located->share[k] > highest) {
-      highest = located->share[k];
+    located->probability[k] = tried == SUPINE_OK ? located->location[k].log_evidence : -INFINITY;
+    if (located->probability[k] > highest) {
+      highest = located->probability[k];
       located->best = &located->location[k];
-      memcpy(located->residuals, residuals + k * n, n * sizeof *residuals);
     }
   }
   if (located->best == NULL) {
     return status;
   }
   for (size_t k = 0; k < located->count; ++k) {
-    located->share[k] = exp(located->share[k] - highest);
-    sum += located->share[k];
+    located->probability[k] = exp(located->probability[k] - highest);
+    sum += located->probability[k];
   }
   for (size_t k = 0; k < located->count; ++k) {
-    located->share[k] /= sum;
+    located->probability[k] /= sum;
   }
   return SUPINE_OK;
 }
 
-/* Compute the positions x in the best posture, and the expected errors of the mixture of all
- * postures k: sigma^2 = sum over k of share_k (sigma_k^2 + |x_k - x|^2).
- * @param xyz, sigma  [N, 3] and [N], work space */
+/* Compute the positions x in the best posture, and the expected errors, weighted over all postures
+ * k: sigma^2 = sum over k of p_k (sigma_k^2 + |x_k - x|^2), where p_k is the probability of k.
+ * @param xyz, sigma  [N, 3] and [N], workspace */
 static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
                                     lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
   supine_status status =
       supine_locate_positions(located->best, shown, located->xyz, located->sigma, error);
-  double sum = located->share[located->best - located->location];
+  double sum = located->probability[located->best - located->location];
   for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
     located->sigma[i] *= located->sigma[i] * (float)sum;
   }
   for (size_t k = 0; k < located->count && status == SUPINE_OK; ++k) {
-    const double share = located->share[k];
+    const double share = located->probability[k];
     if (&located->location[k] == located->best || share < negligible) {
       continue;
     }
@@ -221,24 +218,22 @@ static supine_status find(const supine_locate_task *task, bool posture_given,
                           const supine_basis *shown, lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
   const size_t tries = POSTURES;
-  supine_locate_residual *residuals = malloc(tries * task->count * sizeof *residuals);
   float *xyz = malloc(3 * n * sizeof *xyz);
   float *sigma = malloc(n * sizeof *sigma);
-  located->residuals = malloc(task->count * sizeof *residuals);
+  located->residuals = malloc(tries * task->count * sizeof *located->residuals);
   located->xyz = malloc(3 * n * sizeof *xyz);
   located->sigma = malloc(n * sizeof *sigma);
   located->space = malloc(tries * supine_locate_space(task->count) * sizeof(double));
   supine_status status = SUPINE_OK;
-  if (residuals == NULL || xyz == NULL || sigma == NULL || located->residuals == NULL ||
-      located->xyz == NULL || located->sigma == NULL || located->space == NULL) {
+  if (xyz == NULL || sigma == NULL || located->residuals == NULL || located->xyz == NULL ||
+      located->sigma == NULL || located->space == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", n);
   } else {
-    status = try_postures(task, posture_given, residuals, located, error);
+    status = try_postures(task, posture_given, located, error);
   }
   if (status == SUPINE_OK) {
     status = find_positions(shown, xyz, sigma, located, error);
   }
-  free(residuals);
   free(xyz);
   free(sigma);
   return status;
@@ -251,7 +246,6 @@ static void free_found(lungs_found *located) {
   free(located->space);
 }
 
-/* Write the lungs' surface, with the expected error of each vertex. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    const lungs_found *located, supine_error *error) {
   const supine_tensor *lung = supine_basis_tensor(basis, "lung");
@@ -299,11 +293,10 @@ static supine_status write_points(const char *path, const supine_basis *inside,
   return supine_output_commit(&output, error);
 }
 
-/* Print the state, the motion and the residuals that were found. */
 static void print(const request *wanted, const supine_command_names *names,
                   const observations *observed, size_t n, const lungs_found *located) {
   const supine_location *best = located->best;
-  const double share = located->share[best - located->location];
+  const double share = located->probability[best - located->location];
   const double *r = best->rotation;
   const double *t = best->translation;
   supine_state posture = best->state;
@@ -326,9 +319,7 @@ static void print(const request *wanted, const supine_command_names *names,
     (void)json_object_update_new(root, json_pack("{s:f, s:b}", "probability_percent", 100.0 * share,
                                                  "determined", (int)(share >= determined)));
   }
-  if (best->volume > 0.0) {
-    (void)json_object_set_new(root, "volume_ml", json_real(best->volume));
-  }
+  (void)json_object_set_new(root, "volume_ml", json_real(best->volume));
   if (best->volume_error > 0.0) {
     (void)json_object_update_new(root, json_pack("{s:f, s:f}", "volume_deviation_ml",
                                                  best->volume_error, "deviation_without_points_ml",
@@ -343,8 +334,10 @@ static void print(const request *wanted, const supine_command_names *names,
   (void)json_object_update_new(root, json_pack("{s:I, s:f}", "observed_points",
                                                (json_int_t)observed->count, "left_rms_mm",
                                                best->residual_rms));
+  const supine_locate_residual *residuals =
+      located->residuals + (size_t)(best - located->location) * observed->count;
   for (size_t j = 0; j < observed->count; ++j) {
-    const supine_locate_residual *residual = &located->residuals[j];
+    const supine_locate_residual *residual = &residuals[j];
     if (residual->outlier) {
       (void)json_array_append_new(
           outliers,
@@ -360,8 +353,7 @@ static void print(const request *wanted, const supine_command_names *names,
 static supine_status locate(const request *wanted, const supine_basis *lungs,
                             const supine_basis *inside, const supine_command_names *names,
                             const observations *observed, supine_error *error) {
-  const size_t length = strlen(wanted->output);
-  const bool csv = strcasecmp(wanted->output + length - 4, ".csv") == 0;
+  const bool csv = supine_text_ends_in_any_case(wanted->output, ".csv");
   const supine_basis *shown = csv ? inside : lungs;
   lungs_found located = {0};
   const supine_locate_task task = {.inside = inside,
@@ -395,7 +387,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     status = supine_options_gravity(&wanted->orientation, wanted->state.gravity, error);
   }
   if (status == SUPINE_OK) {
-    status = supine_basis_open(given->operand[0], &lungs, error);
+    status = supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &lungs, error);
   }
   if (status == SUPINE_OK) {
     status = supine_command_inside_open(lungs, wanted->points, &inside, &names, error);
@@ -417,10 +409,11 @@ const supine_command supine_command_locate = {
     name,
     "find the whole lung from a few observed points",
     .usage = "BASIS OBSERVED.csv --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
-    .about = "Fits the lungs to a few points observed inside them, as a navigation system collects "
-             "them: the volume, the translation between the frames, and the residual of the law "
-             "near the points. OBSERVED.csv has the columns name,x,y,z, in mm, with the names "
-             "given to 'supine embed'. Each position has its expected error.",
+    .about =
+        "Fits the lungs to a few points observed inside them, for example by a navigation system: "
+        "finds the volume, the translation between the frames of the scan and of the observations, "
+        "and the residual of the law near the points. OBSERVED.csv has the columns name,x,y,z, in "
+        "mm, with the names given to 'supine embed'. Each position has its expected error.",
     .options = table,
     .notes =
         "The expected error is the root mean square of the distance in 3-D: half of all points lie "

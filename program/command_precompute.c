@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine precompute: make a basis file of lung surfaces or a label map. */
+/* supine precompute: make a basis file from lung surfaces or a label map. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,14 +38,14 @@ static const supine_option table[] = {
      SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX},
      .more = true},
     {"modes", 0, "K|harmonics",
-     "functions of orientation, each of which costs a multiplication per vertex at run time: the "
-     "best K (or fewer, if fewer describe the displacement), or all (L+1)^2 harmonics up to band L "
-     "(Santhanam 2008 used --band 3 --modes harmonics)",
+     "functions of orientation; each costs a multiplication per vertex at run time. The best K (or "
+     "fewer, if fewer describe the displacement), or 'harmonics', all (L+1)^2 harmonics up to band "
+     "L; Santhanam 2008 used these with --band 3",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
      .wants = "1 to 64 or 'harmonics'", .more = true},
     {"held-out", 0, "N",
-     "number of held-out directions on which the error is measured; default: 1000, or fewer (at "
-     "least 100) for more than 20000 vertices",
+     "number of held-out directions in which the error is measured; default: 1000; fewer for more "
+     "than 20000 vertices, but at least 100",
      SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
      "model of the patient, made by 'supine fit', to use instead of --law and its constants",
@@ -53,9 +53,10 @@ static const supine_option table[] = {
     {.help = "Displacements from another simulator, instead of the built-in physics:",
      .more = true},
     {"fields", 0, "FILE",
-     "safetensors file with the tensors gravity [M,3], M directions, and displacement [M,N,3], the "
-     "displacement of each of N vertices for each direction, in mm. MESH is the reference surface. "
-     "Without --band, cross-validation chooses the band among those that the directions determine",
+     "safetensors file with two tensors: gravity [M,3], M directions; and displacement [M,N,3], "
+     "the displacement of each of N vertices for each direction, in mm. MESH is the reference "
+     "surface. Without --band, cross-validation chooses the band among those that the directions "
+     "determine",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
@@ -206,8 +207,8 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
-/* Refuse options that set constants of the law, as the patient's model has its own. Call before
- * loading, which sets the constants that were not given. */
+/* Refuse options that set constants of the law, as the patient's model has its own. Call this
+ * before supine_command_model_load, which sets the constants that were not given. */
 static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
   const supine_model *model = &choice->model;
   const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||
@@ -230,10 +231,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                             "%s: this is the name of a mesh: give a name that ends in .safetensors",
                             wanted->path);
   }
-  supine_status status =
-      !fields && wanted->patient != NULL ? check_patient(&wanted->model.choice, error) : SUPINE_OK;
-  if (status == SUPINE_OK && wanted->patient != NULL) {
-    status = take_patient(wanted, &record, &text, error);
+  supine_status status = SUPINE_OK;
+  if (wanted->patient != NULL) {
+    status = check_patient(&wanted->model.choice, error);
+    if (status == SUPINE_OK) {
+      status = take_patient(wanted, &record, &text, error);
+    }
   }
   if (status == SUPINE_OK) {
     status = supine_command_model_load(&wanted->model, name, given->operand, given->count, fields,

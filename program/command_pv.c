@@ -65,11 +65,11 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   }
   supine_options_print(json_incref(root), chosen->json);
   supine_output output = {0};
-  if (chosen->output != NULL) { /* opened last, so that a failure leaves no file */
+  if (chosen->output != NULL) { /* last, so that a failure leaves no file */
     status = supine_output_open(chosen->output, &output, error);
   }
   if (status == SUPINE_OK && chosen->output != NULL) {
-    (void)json_dumpf(root, output.file, JSON_INDENT(2)); /* commit reports a failed write */
+    (void)json_dumpf(root, output.file, JSON_INDENT(2)); /* the commit reports a failure */
     status = supine_output_commit(&output, error);
   }
   json_decref(root);
@@ -138,13 +138,15 @@ const supine_command supine_command_pv = {
              "show [FILE] [--step CMH2O]",
     .about = "Fits a lung's pressure-volume relation to samples, for 'supine breathe --pv FILE', "
              "or prints a relation.\n"
-             "\nfit determines the five control parameters of each limb, their confidence "
-             "intervals, and the residual of the samples (RMS, in mL and as a percentage of the "
-             "range of volumes; below 1 % for samples of Venegas' or Salazar-Knowles' curve).\n"
              "\n"
-             "show prints volume and compliance against pressure as CSV; without FILE, those of "
-             "the built-in normal adult lung.\n"
-             "\nSAMPLES.csv has one sample per line, in order of pressure within each limb:\n"
+             "fit determines the five control parameters of each limb, their confidence intervals, "
+             "and the residual of the samples (RMS, in mL and as a percentage of the range of "
+             "volumes; below 1 % for samples of Venegas' or Salazar-Knowles' curve).\n"
+             "\n"
+             "show prints volume and compliance against pressure as CSV; without FILE, it prints "
+             "the built-in relation of a normal adult lung.\n"
+             "\n"
+             "SAMPLES.csv has one sample per line, in order of pressure within each limb:\n"
              "\n"
              "      # static manoeuvre; lines like this one are comments\n"
              "      pressure_cmH2O,volume_mL,limb\n"
@@ -152,16 +154,17 @@ const supine_command supine_command_pv = {
              "      2.5,2390,inhale\n"
              "      ...\n"
              "      30,5980,exhale\n"
-             "\nWithout the column limb all samples are of the inhale limb. A limb needs at least "
-             "8 samples, or 20 where their noise is 1 % of the range of volumes; a limb without "
+             "\n"
+             "Without the column limb, all samples belong to the inhale limb. A limb needs at "
+             "least 8 samples, or 20 if their noise is 1 % of the range of volumes; a limb without "
              "samples takes the curve of the other limb. Volumes may be absolute or relative to "
-             "any reference, as breathing uses only differences.",
+             "any reference, as only their differences are used.",
     .options = table,
     .notes =
-        "Each limb has its own model: V'' = u V', where V is the volume as a function of the "
-        "pressure x, mapped so that the limb's samples span -1 to 1, and u = c1 P0(x) + ... + c5 "
-        "P4(x) with Legendre polynomials P0 to P4. V' is the compliance, and u its relative rate "
-        "of change: c1 < 0 stiffens the lung towards high pressure, c2 < 0 puts the greatest "
+        "Each limb has its own model, V'' = u V'. V is the volume as a function of x, the pressure "
+        "scaled so that the limb's samples span -1 to 1; u = c1 P0(x) + ... + c5 P4(x), with the "
+        "Legendre polynomials P0 to P4. V' is the compliance, and u is its relative rate of "
+        "change: c1 < 0 stiffens the lung towards high pressure, c2 < 0 puts the greatest "
         "compliance in the middle (a sigmoid), c3 skews the sigmoid, c4 and c5 sharpen its knees.\n"
         "\n"
         "Examples:\n"

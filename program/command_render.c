@@ -3,11 +3,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include <supine/compare.h>
 
 #include "sh/base/output.h"
+#include "sh/base/text.h"
 #include "sh/base/vec3.h"
 
 #include "program/inside.h"
@@ -18,17 +18,17 @@
 static const char name[] = "render";
 static const double inside_opacity = 0.35; /* default opacity of the lungs with --inside */
 
-enum { FPS = 15, FRAMES_MAX = 10000, PAUSE_MS = 1000 }; /* pause at the end of a turn */
+enum { FPS = 15, FRAMES_MAX = 10000, LAST_FRAME_MS = 1000 };
 
 typedef struct request {
   const char *output;
   const char *postures;
   supine_volume_options volume;
-  supine_from from;     /* state that colours and displacements are measured from */
-  const char *inside;   /* file of structures inside; NULL: none */
-  double largest;       /* end of the colour bar, mm; 0: automatic */
-  double opacity;       /* opacity of the lungs, 0 to 1; 0: the default */
-  size_t width, height; /* size of the picture, pixels; 0: automatic */
+  supine_from from;     /* state that displacements are measured from */
+  const char *inside;   /* file of structures inside; NULL if not given */
+  double largest;       /* end of the colour bar, mm; 0 if automatic */
+  double opacity;       /* of the lungs, 0 to 1; 0 if not given */
+  size_t width, height; /* of the picture, pixels; 0 if automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
   bool turns;
@@ -50,12 +50,12 @@ typedef struct studio {
   supine_reference_pose from;
   supine_compare *compare;
   supine_renderer *renderer;
-  supine_basis *inside; /* structures inside; NULL: none */
+  supine_basis *inside; /* NULL if there are no structures inside */
   supine_command_names names;
   supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
-  double ends[2]; /* largest 95th percentile, and largest value, of displacement so far, mm */
+  double p95, max; /* statistics of displacement, mm: the largest of the panels so far */
   char label[128];
 } studio;
 
@@ -95,52 +95,50 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
   return status;
 }
 
-/* Fill panel i: compute its pose, the displacements to colour by, the subtitle, and the marks of
- * the structures inside. */
+/* Fill panel i: compute its pose, its displacements and its subtitle. */
 static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   const supine_posture_item *item = &s->postures.item[i];
   drawn *shown = &s->shown[i];
   supine_status status =
       supine_options_pose(s->basis, name, &s->wanted->volume, item->gravity, &shown->pose, error);
-  if (status == SUPINE_OK && s->inside != NULL) {
-    supine_command_marks_free(&shown->marks);
-    status = supine_command_marks_make(s->inside, &s->names, &shown->pose, &s->from.pose,
-                                       &shown->marks, error);
-  }
   if (status != SUPINE_OK) {
     return status;
   }
   supine_distance_statistics statistics;
   supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
   supine_compare_statistics(s->compare, shown->value, &statistics);
-  s->ends[0] = fmax(s->ends[0], statistics.p95);
-  s->ends[1] = fmax(s->ends[1], statistics.max);
-  double held[SUPINE_LUNGS_MAX];
-  double volume = 0.0;
-  supine_basis_volumes(s->basis, &shown->pose, held);
-  for (size_t lung = 0; lung < supine_basis_get_info(s->basis)->lung_count; ++lung) {
-    volume += held[lung];
-  }
-  (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm", volume,
-                 statistics.mean, statistics.max);
+  s->p95 = fmax(s->p95, statistics.p95);
+  s->max = fmax(s->max, statistics.max);
+  (void)snprintf(shown->subtitle, sizeof shown->subtitle, "%.0f mL, mean %.1f, max %.1f mm",
+                 supine_options_basis_volume(s->basis, &shown->pose), statistics.mean,
+                 statistics.max);
   s->panel[i] = (supine_panel){.title = supine_options_posture_label(item->name),
                                .subtitle = shown->subtitle,
                                .pose = &shown->pose,
-                               .value = shown->value,
-                               .marks = s->inside != NULL ? &shown->marks.marks : NULL};
+                               .value = shown->value};
   memcpy(s->panel[i].gravity, item->gravity, sizeof s->panel[i].gravity);
   return SUPINE_OK;
 }
 
-/* Describe the picture of all panels. */
+/* After fill_panel, add the marks of the structures inside, if there are any, to panel i. */
+static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
+  supine_command_marks *marks = &s->shown[i].marks;
+  if (s->inside == NULL) {
+    return SUPINE_OK;
+  }
+  supine_command_marks_free(marks);
+  s->panel[i].marks = &marks->marks;
+  return supine_command_marks_make(s->inside, &s->names, &s->shown[i].pose, &s->from.pose, marks,
+                                   error);
+}
+
 static supine_picture make_picture(studio *s) {
   const request *wanted = s->wanted;
   const size_t count = s->postures.count;
   const double opacity = wanted->opacity > 0.0    ? wanted->opacity
                          : wanted->inside != NULL ? inside_opacity
                                                   : 1.0;
-  const double largest =
-      wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(s->ends[0]);
+  const double largest = wanted->largest > 0.0 ? wanted->largest : supine_render_bar_end(s->p95);
   (void)snprintf(s->label, sizeof s->label, "displacement from %s, mm", s->from.name);
   return (supine_picture){.panel = s->panel,
                           .panel_count = count,
@@ -149,7 +147,7 @@ static supine_picture make_picture(studio *s) {
                           .bar_label = s->label,
                           .colours = SUPINE_COLOURS_DISPLACEMENT,
                           .largest = largest,
-                          .beyond = s->ends[1] > largest,
+                          .beyond = s->max > largest,
                           .transparency = 1.0 - opacity,
                           .width = wanted->width != 0 ? wanted->width : 20 + 440 * count,
                           .height = wanted->height != 0 ? wanted->height
@@ -160,6 +158,7 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < s->postures.count && status == SUPINE_OK; ++i) {
     status = fill_panel(s, i, error);
+    status = status == SUPINE_OK ? mark_panel(s, i, error) : status;
   }
   const supine_picture picture = make_picture(s);
   if (status == SUPINE_OK) {
@@ -185,18 +184,19 @@ static supine_status find_frame(studio *s, size_t frame, size_t count, supine_er
 }
 
 /* Append all frames of a turn to an animation.
- * @param extent  extent of each view over the whole turn, so that the scale stays fixed */
+ * @param extent  extent of each view over the whole turn */
 static supine_status add_frames(studio *s, size_t count, const double (*extent)[4],
                                 supine_animation *animation, supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
   supine_status status = SUPINE_OK;
   for (size_t frame = 0; frame < count && status == SUPINE_OK; ++frame) {
     status = find_frame(s, frame, count, error);
+    status = status == SUPINE_OK ? mark_panel(s, 0, error) : status;
     supine_picture picture = make_picture(s);
     picture.extent = extent;
     if (status == SUPINE_OK) {
       status = supine_render_animation_add(animation, s->renderer, &picture,
-                                           frame + 1 < count ? 1000 / FPS : PAUSE_MS, error);
+                                           frame + 1 < count ? 1000 / FPS : LAST_FRAME_MS, error);
     }
     if (!supine_options_progress_step(&progress, (double)(frame + 1) / (double)count)) {
       status =
@@ -207,8 +207,8 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
   return status;
 }
 
-/* Draw a turn as an animation. A first pass over its frames finds the largest displacement and the
- * extents, so that the colour bar and the scale stay fixed. */
+/* Draw a turn as an animation. A first pass over the frames finds the largest displacement and the
+ * extents, so that the colour bar and the scale are the same in all frames. */
 static supine_status draw_turn(studio *s, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   const char *path = s->wanted->output;
@@ -247,7 +247,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   }
   if (status == SUPINE_OK) {
     status = supine_render_animation_write(animation, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* commit reports a failed write */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* let commit report a failed write */
       status = supine_output_commit(&output, error);
     }
   }
@@ -312,12 +312,12 @@ static supine_status read_views(const char *text, void *field, supine_error *err
 static const supine_option table[] = {
     {"posture", 0, "LIST", "postures to draw, up to 8", SUPINE_FILLS(request, postures)},
     {"turn", 0, "FROM:TO:SECONDS",
-     "draw an animation instead: gravity turns from one posture to another at constant speed, such "
-     "as supine:left:5s, pauses for a second, and starts again",
+     "draw an animation instead, such as supine:left:5s: gravity turns from one posture to another "
+     "at constant speed, pauses for a second, and starts again",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {"output", 'o', "FILE", ".png; with --turn, .webp, which browsers play",
+    {"output", 'o', "FILE", ".png for --posture; .webp for --turn, an animation that browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".png or .webp"},
     {"size", 0, "WxH", "size in pixels; default: 440 x 480 for each posture and view, plus margins",
@@ -328,13 +328,13 @@ static const supine_option table[] = {
      .read = read_views},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
-     "end of the colour bar; default: the 95th percentile over the surface, rounded up; a pointed "
-     "bar marks larger values",
+     "end of the colour bar; default: the 95th percentile over the surface, rounded up. If values "
+     "exceed it, the bar has a pointed end",
      SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
      .more = true},
     {"inside", 0, "FILE",
-     "structures made by 'supine embed' from the same basis, shown through the lungs with their "
-     "names and displacements",
+     "structures made by 'supine embed' from the same basis, shown inside transparent lungs with "
+     "their names and displacements",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"opacity", 0, "SHARE",
      "opacity of the lungs, 0.05 to 1 (opaque); default 1, with --inside 0.35",
@@ -343,10 +343,9 @@ static const supine_option table[] = {
     {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
-/* Check that the options fit each other, then read the postures. */
 static supine_status check(const request *wanted, supine_posture_list *postures,
                            supine_error *error) {
-  const bool animation = strcasecmp(strrchr(wanted->output, '.'), ".webp") == 0;
+  const bool animation = supine_text_ends_in_any_case(wanted->output, ".webp");
   if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             wanted->turns ? "give --posture or --turn, not both"
@@ -395,8 +394,8 @@ const supine_command supine_command_render = {
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
     .about = "Draws the lungs in each posture, side by side; no display is needed. Colours show "
              "the displacement, with contour lines at the ticks of the colour bar. A ball shows "
-             "the body's axes (left, right, anterior, posterior, head, feet) and gravity as an "
-             "arrow (a cross where it points away from you).",
+             "the body's axes (left, right, anterior, posterior, head, feet) and gravity: an "
+             "arrow, or a dot if it points towards you, or a cross if it points away from you.",
     .options = table,
     .notes =
         "Examples:\n"

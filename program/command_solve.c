@@ -2,7 +2,6 @@
 /* supine solve: solve the full physics for one direction of gravity. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "precompute/lungs/disease.h"
 #include "sh/base/output.h"
@@ -17,18 +16,18 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  supine_state state; /* volume: SUPINE_VOLUME_DEFAULT if none was given */
+  supine_state state; /* its volume is of kind SUPINE_VOLUME_DEFAULT if not given */
   bool has_vertex, pitcher_catcher;
   size_t vertex;
 } request;
 
 static const supine_option table[] = {
-    {"output", 'o', "FILE", SUPINE_MESH_ENDINGS "; PLY and VTP carry the displacement",
+    {"output", 'o', "FILE", SUPINE_MESH_ENDINGS "; PLY and VTP files include displacements",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
-     ". Default: rest; if rest is unknown, gain 1: each vertex moves by F d, in mm, where F is the "
-     "force on it after spreading, and d its direction of displacement",
+     ". Default: rest; if rest is unknown, gain 1, which moves each vertex by F d, in mm: F is the "
+     "force on the vertex after spreading, and d is its direction of displacement",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"unit-force", 0, "VERTEX",
      "instead of a posture: write a CSV file of the response of every vertex to a unit force on "
@@ -78,7 +77,7 @@ cleanup:
   return status;
 }
 
-/* Compute the volume of each lung above its reference surface, mL, as if no lung were collapsed. */
+/* Compute each lung's volume minus that of its reference surface, mL, ignoring collapse. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -115,7 +114,7 @@ static void fill(double gains[2][3], double gain) {
   }
 }
 
-/* Find the gains of each lung for the volume given; 1 if there is none and rest is unknown. */
+/* Find the gains of each lung for the volume; all are 1 if it is not given and rest is unknown. */
 static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
@@ -152,10 +151,10 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   return status;
 }
 
-/* Iteration stops when the force on every node is below this share of the largest one. */
+/* Iteration stops when no node has to pass on more than this share of the largest force. */
 static const double pitcher_tolerance = 1e-6;
 
-/* Print progress at each doubling of the number of distributions per vertex. */
+/* Print the progress each time the number of distributions per vertex has doubled. */
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {

@@ -18,17 +18,17 @@
 
 static const char name[] = "stream";
 
-static const double budget = 15e-3; /* time allowed from a received pose to the sent frame, s */
+static const double budget = 15e-3; /* time allowed from receiving a pose to sending its frame, s */
 
 typedef struct request {
   supine_stream_options options;
-  double down[3], body[4]; /* values of --world-down and --body-from-tracker */
-  int space;               /* index in `spaces` */
+  double world_down[3], body_from_tracker[4];
+  int space; /* index in `spaces` */
   supine_state volume;
   bool has_volume;
   const char *pv;
   supine_pv_breath breath;
-  double smooth; /* time constant of smoothing, ms; 0: none */
+  double smooth; /* time constant of smoothing, ms; 0 for no smoothing */
   const char *record, *replay;
   const char *web, *certificate, *key;
   supine_from from;
@@ -41,20 +41,21 @@ static const char *const spaces[] = {"lps", "ras", NULL};
 static const supine_option table[] = {
     {"listen", 0, "[ADDRESS:]PORT",
      "address at which to wait for peers. A port without an address can be reached from this "
-     "machine only; port 0 is any free port. Default: 18944, the port of the protocol, unless "
+     "machine only; port 0 is any free port. Default: 18944, the port of OpenIGTLink, unless "
      "--connect is given",
      SUPINE_FILLS(request, options.listen)},
-    {"connect", 0, "HOST:PORT", "connect to a peer that listens: a tracker server, 3D Slicer",
+    {"connect", 0, "HOST:PORT",
+     "connect to a peer that listens, such as a tracker server or 3D Slicer",
      SUPINE_FILLS(request, options.connect)},
     {"device", 0, "NAME", "device whose poses are followed; default: any",
      SUPINE_FILLS(request, options.device)},
     {.help = "Direction of gravity:"},
     {"world-down", 0, "X,Y,Z", "direction of gravity in the tracker's world",
-     SUPINE_FILLS(request, down), .standard = "0,0,-1", .more = true},
+     SUPINE_FILLS(request, world_down), .standard = "0,0,-1", .more = true},
     {"body-from-tracker", 0, "W,X,Y,Z",
      "rotation from the marker's axes to the body's (left, back, head), as a quaternion; 0,0,0,1 "
      "if the marker's axes are right, front, head",
-     SUPINE_FILLS(request, body), .standard = "1,0,0,0", .more = true},
+     SUPINE_FILLS(request, body_from_tracker), .standard = "1,0,0,0", .more = true},
     {"smooth", 0, "MS",
      "time constant of smoothing, in ms, for a noisy tracker; it delays a turn by this time; "
      "default 0",
@@ -72,8 +73,8 @@ static const supine_option table[] = {
     {.help = "Volume and breathing:"},
     {"volume", 0, "VOLUME",
      "fixed volume, instead of breathing: " SUPINE_VOLUME_HELP
-     ". A message of device VOLUME also fixes it: a STRING like this option, or an NDARRAY of one "
-     "number, mL above rest",
+     ". A message of device VOLUME also fixes it: a STRING with a value of this option, or an "
+     "NDARRAY of one number, in mL above rest",
      SUPINE_FILLS(request, volume), .read = supine_options_read_volume,
      SUPINE_SAYS_GIVEN(request, has_volume)},
     {"tidal", 0, "ML", "tidal volume; default 500", SUPINE_FILLS(request, breath.tidal),
@@ -84,15 +85,14 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
-     "what a peer receives until it asks for something else (by a STRING of device SEND that holds "
-     "one of these words): weights, an NDARRAY of the K weights and the three gains of each lung; "
-     "surface, a POLYDATA of points and triangle strips; points, a "
-     "POLYDATA whose triangles are sent once",
+     "what a peer receives: weights, an NDARRAY of the K weights and the three gains of each lung; "
+     "surface, a POLYDATA of points and triangle strips; or points, a POLYDATA whose triangles are "
+     "sent once. A peer can change this by a STRING of device SEND with one of these words",
      SUPINE_FILLS(request, options.content), .choices = supine_stream_content_names,
      .standard = "weights"},
     {"space", 0, "NAME", "axes of the points: lps (left, back, head), or ras as in 3D Slicer",
      SUPINE_FILLS(request, space), .choices = spaces, .standard = "lps"},
-    {"name", 0, "NAME", "device name of the messages sent", SUPINE_FILLS(request, options.name),
+    {"name", 0, "NAME", "device name in the messages sent", SUPINE_FILLS(request, options.name),
      .standard = "SUPINE", .more = true},
     {"fps", 0, "N", "largest number of frames per second", SUPINE_FILLS(request, options.rate),
      .range = {1.0, 1000.0}, .standard = "200", .more = true},
@@ -105,7 +105,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, web)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"certificate", 0, "PEM",
-     "certificate, with --key, to serve the page encrypted, which browsers require before they "
+     "certificate, with --key, to serve the page encrypted. Without encryption, browsers do not "
      "send a phone's tilt to another machine",
      SUPINE_FILLS(request, certificate), .file = SUPINE_FILE_IN, .more = true},
     {"key", 0, "PEM", "the certificate's private key", SUPINE_FILLS(request, key),
@@ -131,7 +131,6 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
-/* Print what was received and sent, and the latencies. */
 static void report(const supine_stream_server *server, const request *wanted) {
   const supine_stream_counts *n = supine_stream_server_counts(server);
   if (wanted->points != NULL) {
@@ -171,7 +170,7 @@ typedef struct observed_points {
   supine_stream_observed observed;
 } observed_points;
 
-/* Open the file of --points, and list its single points, none of which is observed yet. */
+/* Open the file of --points, and list its parts that are single points. None is observed yet. */
 static supine_status open_points(const supine_basis *basis, const request *wanted,
                                  observed_points *points, supine_error *error) {
   const supine_command_names *names = &points->names;
@@ -228,7 +227,7 @@ static supine_status make_page(const char *path, const export_page *shown, char 
   return status;
 }
 
-/* If --web is given, make the page and serve it. The caller frees *page after the web server. */
+/* If --web is given, make the page and serve it. The caller destroys *web, then frees *page. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
                                char **page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
@@ -348,8 +347,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if ((wanted->certificate == NULL) != (wanted->key == NULL)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --certificate and --key together");
   }
-  if (!supine_stream_rotation(wanted->body, options->setup.body) ||
-      !supine_normalise(wanted->down, options->setup.down)) {
+  if (!supine_stream_rotation(wanted->body_from_tracker, options->setup.body) ||
+      !supine_normalise(wanted->world_down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--world-down or --body-from-tracker is zero: give a direction, such "
                             "as 0,0,-1, and a rotation, such as 1,0,0,0");

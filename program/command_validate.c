@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine validate: compare a basis with other states of the same person. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "sh/base/text.h"
@@ -21,17 +20,17 @@ typedef struct request {
 } request;
 
 /* Read a state, such as "prone", "prone:rest+500", "0.6:0:-0.8" or "0.6:0:-0.8:full". */
-static supine_status read_posture(const char *text, void *field, supine_error *error) {
+static supine_status read_state(const char *text, void *field, supine_error *error) {
   supine_command_state *state = field;
-  if (text[0] == '\0' || strlen(text) >= sizeof state->posture) {
+  if (text[0] == '\0' || strlen(text) >= sizeof state->text) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  (void)snprintf(state->posture, sizeof state->posture, "%s", text);
+  (void)snprintf(state->text, sizeof state->text, "%s", text);
   return supine_state_parse(text, &state->state, error);
 }
 
 /* Append a state, such as "prone.ply" or "prone:rest+500:prone.ply", to the request. */
-static supine_status read_state(const char *text, void *field, supine_error *error) {
+static supine_status append_state(const char *text, void *field, supine_error *error) {
   request *wanted = field;
   supine_command_state *state = &wanted->state[wanted->count];
   const char *colon = strrchr(text, ':');
@@ -49,36 +48,37 @@ static supine_status read_state(const char *text, void *field, supine_error *err
     return SUPINE_ERROR_ARGUMENT;
   }
   (void)snprintf(posture, sizeof posture, "%.*s", (int)length, text);
-  return read_posture(posture, state, error);
+  return read_state(posture, state, error);
 }
 
 #define FILLS(member) SUPINE_FILLS(request, member)
 
 static const supine_option table[] = {
     {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
-     "surface of the same lungs in another state, with any mesh; may be repeated, up to 8 times. "
-     "Several states also show whether the displacement is linear in volume",
-     .read = read_state,
+     "surface of the same lungs in another state; its mesh may differ from that of the basis. May "
+     "be repeated, up to 8 times. Several states also show whether the displacement is linear in "
+     "volume",
+     .read = append_state,
      .wants = "SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE (at most 8 times)"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
      "state that the motion starts from, in which the first landmarks were placed; default: the "
      "scan",
-     FILLS(from), .read = read_posture, .wants = "a state, such as supine:rest"},
+     FILLS(from), .read = read_state, .wants = "a state, such as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
-     "without --state: state of the second landmarks. With --state: posture and volume of states "
-     "that name none; default: supine, and the volume of the surface",
-     FILLS(to), .read = read_posture, .wants = "a state, such as prone:rest+500"},
+     "without --state: state of the second landmarks. With --state: posture and volume of the "
+     "surfaces for which --state gives none; default: supine, and the volume of the surface",
+     FILLS(to), .read = read_state, .wants = "a state, such as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
-     "local errors: .png, a picture of every state; .ply or .vtp, the predicted surface of the "
-     "first state, with its displacement in mm from the nearest points of the scanned surface",
+     "local errors. .png: a picture of every state; .ply or .vtp: the predicted surface of the "
+     "first state, with its displacement from the nearest points of the scanned surface, in mm",
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
 static bool draws(const char *path) {
-  return supine_text_ends_in(path, ".png");
+  return supine_text_ends_in_any_case(path, ".png");
 }
 
 static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]) {
@@ -133,21 +133,27 @@ static void print(const supine_command_subject *s, bool json) {
   supine_options_print(root, json);
 }
 
+static void set_default_posture(supine_state *state, const double gravity[3]) {
+  const double *g = state->gravity;
+  if (g[0] == 0.0 && g[1] == 0.0 && g[2] == 0.0) {
+    memcpy(state->gravity, gravity, sizeof state->gravity);
+  }
+}
+
 /* Set the states to compare. --to is the default for a posture or a volume that was not given. */
 static void set_states(const request *wanted, supine_command_subject *s) {
   static const double supine[3] = {0.0, 1.0, 0.0};
-  const supine_command_state *to = &wanted->to;
+  supine_state to = wanted->to.state;
+  set_default_posture(&to, supine);
   s->from = wanted->from;
+  set_default_posture(&s->from.state, supine);
   s->count = wanted->count > 0 ? wanted->count : 1;
   for (size_t i = 0; i < s->count; ++i) {
-    supine_command_state *state = &s->state[i];
-    *state = wanted->state[i];
-    if (state->posture[0] == '\0') {
-      memcpy(state->state.gravity, to->posture[0] != '\0' ? to->state.gravity : supine,
-             sizeof supine);
-    }
-    if (state->state.volume.kind == SUPINE_VOLUME_DEFAULT) {
-      state->state.volume = to->state.volume;
+    supine_state *state = &s->state[i].state;
+    s->state[i] = wanted->state[i];
+    set_default_posture(state, to.gravity);
+    if (state->volume.kind == SUPINE_VOLUME_DEFAULT) {
+      state->volume = to.volume;
     }
   }
 }
@@ -157,8 +163,8 @@ static supine_status write_errors(const request *wanted, const supine_command_su
   if (draws(wanted->path)) {
     return supine_command_draw_errors(s, wanted->path, error);
   }
-  const supine_mesh shown = {s->rest.vertex_count, s->outcome[0].predicted, s->rest.triangle_count,
-                             s->rest.triangles};
+  const supine_mesh shown = {s->start.vertex_count, s->outcome[0].predicted,
+                             s->start.triangle_count, s->start.triangles};
   const supine_mesh_save_options save = {.from = s->outcome[0].nearest};
   return supine_mesh_save(wanted->path, &shown, &save, error);
 }
@@ -192,7 +198,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   if (wanted->path != NULL && wanted->count == 0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "-o writes the errors of a --state: give one");
+                            "-o writes the errors of a surface: give --state");
   }
   for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
     status = supine_options_check_output(wanted->path, wanted->state[i].path, error);
@@ -200,7 +206,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       return status;
     }
   }
-  if (supine_text_ends_in(path, ".json")) {
+  if (supine_text_ends_in_any_case(path, ".json")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s is a patient model without a surface: make a basis from it first "
                             "with 'supine precompute --patient'",
@@ -231,24 +237,21 @@ const supine_command supine_command_validate = {
              "comparison with no motion, a translation and an affine map. With several states, "
              "reports whether the displacement is linear in volume.",
     .options = table,
-    .notes =
-        "Distances between surfaces are measured in both directions; the largest is the Hausdorff "
-        "distance. The translation and the affine map are fitted to the other state. 'explained' "
-        "is 1 minus the ratio of the squared distances with and without the motion. A small "
-        "distance between surfaces does not prove that the motion inside is right; landmarks "
-        "measure that. Santhanam 2008 reported surfaces 2 mm apart, and constants recovered within "
-        "1 %.\n"
-        "With several states, the displacement is also scaled to come nearest to each surface. For "
-        "states in the same posture as the first state, a straight line through the start of "
-        "motion is fitted to these scales over volume; the largest deviation from the line is "
-        "given in percent of the largest scale.\n"
-        "\n"
-        "Examples:\n"
-        "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
-        "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
-        "      --state supine:full:full.ply --landmarks pairs.csv",
-    .operands_least = 1,
-    .operands_most = 1,
-    .operands_missing = "name one basis file (made by 'supine precompute')",
+    .notes = "Distances between surfaces are measured in both directions; the largest is the "
+             "Hausdorff distance. The translation and the affine map are fitted to the other "
+             "state. 'explained' is 1 minus the ratio of the mean squared distances with and "
+             "without the motion. A small distance between surfaces does not prove that the motion "
+             "inside is right; landmarks measure that. Santhanam 2008 reported surfaces 2 mm "
+             "apart, and constants recovered within 1 %.\n"
+             "With several states, the displacement is also scaled to come nearest to each "
+             "surface. For states in the same posture as the first state, a straight line through "
+             "the start of motion is fitted to these scales as a function of volume; the largest "
+             "deviation from the line is given in percent of the largest scale.\n"
+             "\n"
+             "Examples:\n"
+             "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
+             "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
+             "      --state supine:full:full.ply --landmarks pairs.csv",
+    SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

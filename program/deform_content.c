@@ -2,7 +2,6 @@
 /* Write displacement fields, images moved by a field, and moved points as CSV. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "sh/base/output.h"
 #include "sh/base/text.h"
@@ -13,30 +12,32 @@
 #include "program/field.h"
 #include "program/inside.h"
 
-/* Distance from the lungs over which a field falls to 0, mm: the margin of embedded grids. */
+/* Distance from the lungs over which a field falls to 0, mm. Embedded grids have this margin. */
 static const double fade = 60.0;
 
 const supine_option supine_command_deform_content_options[] = {
-    {.help =
-         "Structures made by 'supine embed': -o FILE.csv writes moved points by name. For a grid:"},
+    {.help = "For structures made by 'supine embed', -o FILE.csv writes the moved points by name. "
+             "For an embedded grid:"},
     {"field-out", 0, "FILE",
-     "displacement field to write, .nrrd, .nii, .nii.gz or .mha: from each node in the scan (or in "
-     "the state of --from) to where its tissue moves, in mm and LPS (even in NIfTI, as ITK and "
-     "ANTs do; for NiftyReg, negate x and y). Outside the lungs it falls to 0 within 60 mm",
+     "displacement field to write (.nrrd, .nii, .nii.gz or .mha): the displacement of the tissue "
+     "that is at each node in the scan, or in the state of --from. It is in mm and LPS, also in "
+     "NIfTI, as ITK and ANTs expect; for NiftyReg, negate x and y. Outside the lungs it falls to 0 "
+     "within 60 mm",
      SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT,
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"inverse", 0, NULL,
-     "write the inverse field to --field-out: from each node in the moved lungs to where its "
-     "tissue was, which resampling of an image needs",
+     "write the inverse field to --field-out: the vector from each node in the moved lungs to "
+     "where its tissue was. Resampling of an image needs the inverse",
      SUPINE_FILLS(supine_deform_content, inverse)},
     {"image", 0, "FILE",
      "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {"density", 0, NULL,
-     "with --image, a CT in Hounsfield units: scale densities inside the lungs by the local change "
-     "of volume, which keeps their mass; the header of the output says so",
+     "with --image, if it is a CT in Hounsfield units: scale densities inside the lungs by the "
+     "local change of volume, so that the mass stays the same; the header of the output says so",
      SUPINE_FILLS(supine_deform_content, density)},
-    {"labels", 0, "FILE", "label map to move and write to -o, with the label of the nearest voxel",
+    {"labels", 0, "FILE",
+     "label map to move and write to -o; each voxel takes the label of the nearest voxel",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN, .rivals = "moved image"},
     {.name = NULL}};
 
@@ -49,10 +50,11 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
                             image ? ".nrrd, .nii, .nii.gz or .mha" : SUPINE_MESH_ENDINGS);
   }
   if (wanted->path != NULL && image != supine_image_supports(wanted->path)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            image ? "%s: --image and --labels write .nrrd, .nii, .nii.gz or .mha"
-                                  : "%s: the image is missing: give --image FILE or --labels FILE",
-                            wanted->path);
+    return supine_error_set(
+        error, SUPINE_ERROR_ARGUMENT,
+        image ? "%s: with --image or --labels, the name must end in .nrrd, .nii, .nii.gz or .mha"
+              : "%s: the image is missing: give --image FILE or --labels FILE",
+        wanted->path);
   }
   if (wanted->inverse && wanted->field == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -66,7 +68,7 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
 
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error) {
-  static const double aerated = -300.0; /* density that every lung has voxels below, HU */
+  static const double aerated = -300.0; /* every lung has voxels below this density, HU */
   const char *path = wanted->image != NULL ? wanted->image : wanted->labels;
   supine_image *image = &wanted->source;
   const supine_status status = path != NULL ? supine_image_read(path, image, error) : SUPINE_OK;
@@ -74,8 +76,8 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
     return status;
   }
   if (!wanted->density) {
-    supine_options_say(command, "densities are not scaled by the change of volume; for a CT, "
-                                "--density keeps the tissue's mass");
+    supine_options_say(command, "densities are not scaled by the change of volume; for a CT, give "
+                                "--density to keep the tissue's mass");
     return SUPINE_OK;
   }
   double least = INFINITY;
@@ -139,7 +141,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
         moved->from.name, axes, unit_name,
         sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
         sigma == NULL ? "" : ",expected_error_mm");
-    for (size_t i = 0; i < n; ++i) { /* rows by name; within a name in the input's order */
+    for (size_t i = 0; i < n; ++i) { /* sorted by name, then in the input's order */
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;
@@ -228,9 +230,8 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   return status;
 }
 
-/* Replace `second`, the field from the scan to a state B, by the field from state A to B,
- * u(x) = v(x) + second(x + v(x)), where v is the inverse of `first`, the field from the scan to A.
- */
+/* Replace `second`, the field from the scan to a state B, by the field u from a state A to B.
+ * `first` is the field from the scan to A, and v is its inverse: u(x) = v(x) + second(x + v(x)). */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};

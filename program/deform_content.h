@@ -11,32 +11,30 @@
 #include "program/options/state_options.h"
 
 typedef struct supine_deform_content {
-  const char *path;   /* file of -o; NULL: none */
-  const char *field;  /* file of --field-out; NULL: none */
-  const char *image;  /* file of --image; NULL: none */
-  const char *labels; /* file of --labels; NULL: none */
+  /* Files of -o, --field-out, --image and --labels; NULL if not given. */
+  const char *path, *field, *image, *labels;
   bool inverse, density;
-  supine_image source; /* image of --image or --labels, once read */
+  supine_image source; /* the image or the label map, once read */
 } supine_deform_content;
 
 extern const supine_option supine_command_deform_content_options[];
 
-/* A state of the lungs, and the state that displacements start from. */
+/* A state of the lungs, and what its outputs need. */
 typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;
   supine_reference_pose from; /* state that displacements start from, and that images show */
-  bool from_given;            /* --from was given; else `from` is the scan */
+  bool from_given;            /* if false, `from` is the scan */
   supine_expected expected;
   supine_mesh_save_options save; /* axes and unit of the output, and its comment */
 } supine_deformation;
 
-/* Check that the options fit each other; else return SUPINE_ERROR_ARGUMENT. */
+/* Return SUPINE_ERROR_ARGUMENT if an option is missing, or does not fit the others. */
 supine_status supine_command_deform_content_check(const supine_deform_content *wanted,
                                                   supine_error *error);
 
-/* Read the image of --image or --labels. With --density, check that it is in Hounsfield units; with
- * --image alone, print that densities are not scaled. */
+/* Read the image of --image or --labels. With --density, check that it is in Hounsfield units;
+ * without it, print that the densities of --image are not scaled. */
 supine_status supine_command_deform_content_read(supine_deform_content *wanted, const char *command,
                                                  supine_error *error);
 

@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "sh/base/vec3.h"
 
@@ -38,7 +37,7 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
       const size_t up = corner >> a & 1U;
       weight[a] = up ? cell->share[a] : 1.0 - cell->share[a];
       at[a] = cell->corner[a] + up;
-      at[a] -= at[a] == image->size[a]; /* with one slice, the upper corner has weight 0 */
+      at[a] -= at[a] == image->size[a]; /* on an axis of one voxel, the upper corner has weight 0 */
     }
     const size_t voxel = at[0] + image->size[0] * (at[1] + image->size[1] * at[2]);
     for (size_t c = 0; c < image->channels; ++c) {
@@ -100,7 +99,7 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
 }
 
 /* Average the displacements of the neighbours of node i that earlier layers have set; return false
- * if there are none. `now` is the mark of the current layer. */
+ * if it has no such neighbours. `now` is the mark of the current layer. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
                            size_t i, float mean[3]) {
   const float *u = nodes->values;
@@ -129,7 +128,8 @@ static bool mean_neighbour(const supine_image *nodes, const unsigned char *known
 }
 
 /* Extend the field outwards in layers of nodes, so that it falls linearly to 0 over `fade` mm.
- * `known` is 1 for a node of the basis, else 0; layers are marked 2 and 3 alternately. */
+ * `known` is 1 for a node of the basis, else 0. The nodes of new layers are marked 2 and 3
+ * alternately. */
 static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   float *u = nodes->values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];

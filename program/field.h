@@ -13,7 +13,7 @@
 typedef struct supine_field {
   supine_image nodes; /**< the displacement u: three F32 channels, mm */
   supine_image depth; /**< depth below the lungs' surface, negative outside: one F32 channel, mm;
-                           values NULL in an inverse */
+                         its values are NULL in an inverse */
 } supine_field;
 
 /** Compute the field from the scan to a pose. Outside the nodes of the basis the field has no
@@ -28,13 +28,13 @@ void supine_field_free(supine_field *field);
 /** Interpolate the field at a point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
-/** Residual of a field followed by its inverse. */
+/** Residual u(x) + v(x + u(x)) of a field u followed by its inverse v. */
 typedef struct supine_field_residual {
-  double rms, largest; /**< RMS and largest |u(x) + v(x + u(x))| at nodes x inside the lungs, mm */
-  size_t lost; /**< number of nodes at which the field folds: the inverse misses by > 0.01 mm */
+  double rms, largest; /**< of the residual's length at the nodes x inside the lungs, mm */
+  size_t lost; /**< nodes at which the inverse errs by more than 0.01 mm, as the field folds */
 } supine_field_residual;
 
-/** Invert a field on the same nodes by Newton's method: v(y) = x - y where x + u(x) = y. A
+/** Invert a field on the same nodes by Newton's method: v(y) = x - y, where x + u(x) = y. A
  * resampled image takes the value of its voxel y from the place y + v(y). Cost: about ten
  * evaluations per node, in parallel.
  * @retval SUPINE_ERROR_MEMORY */
@@ -42,23 +42,22 @@ supine_status supine_field_invert(const supine_field *field, supine_field *inver
                                   supine_field_residual *residual, supine_error *error);
 
 /** Move an image: moved(y) = image(y + v(y)) at the voxels y of the image; places outside the image
- * have the value of the nearest voxel. With a depth, densities (Hounsfield units + 1000) inside the
- * lungs are multiplied by det(dv/dy + 1), the tissue's volume before the motion divided by that
- * after, which keeps the mass.
+ * have the value of the nearest voxel. If `depth` is given, densities (Hounsfield units + 1000)
+ * inside the lungs are multiplied by det(I + dv/dy). This is the tissue's volume before the motion,
+ * divided by its volume after the motion; it keeps the mass.
  * @param inverse  field v, made by supine_field_invert
- * @param depth    depth of the field; NULL: densities are not scaled
- * @param labels   true: take the value of the nearest voxel; false: interpolate
+ * @param depth    depth of the field; NULL to keep densities unscaled
+ * @param labels   whether to take the value of the nearest voxel instead of interpolating
  * @param moved    release with supine_image_free
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_resample(const supine_field *inverse, const supine_image *depth,
                                     bool labels, const supine_image *image, supine_image *moved,
                                     supine_error *error);
 
-/* Cell between eight voxels that contains a point: index of the first corner, and position of the
- * point in the cell, 0 to 1 along each axis. */
+/* The cell between eight voxels that contains a point. */
 typedef struct supine_field_cell {
-  size_t corner[3];
-  double share[3];
+  size_t corner[3]; /* voxel at the lowest corner */
+  double share[3];  /* position of the point in the cell, 0 to 1 along each axis */
 } supine_field_cell;
 
 /* Find the cell that contains a point, mm; a point outside the image is clamped to its border. */
@@ -66,7 +65,7 @@ void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
 
 /* Interpolate all channels of an F32 image and, unless `slope` is NULL, their derivatives with
- * respect to the shares of the cell, [channels, 3]. */
+ * respect to `share`, [channels, 3]. */
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]);
 

@@ -12,8 +12,8 @@
 static const double tolerance = 1e-5;   /* residual at which iteration stops, mm */
 static const double lost_beyond = 0.01; /* residual above which a node counts as lost, mm */
 
-/* Compute the residual x + u(x) - y, mm, and, unless `slope` is NULL, its derivative with respect
- * to x in steps of the grid; return the length of the residual. */
+/* Compute the residual x + u(x) - y, mm, and return its length. Unless `slope` is NULL, compute its
+ * derivative with respect to x, per step of the grid along each axis. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
                      double residual[3], double (*slope)[3]) {
   supine_field_cell cell;
@@ -29,7 +29,7 @@ static double misfit(const supine_field *field, const double x[3], const double 
   return supine_length(residual);
 }
 
-/* Compute the Newton step, in steps of the grid; return false if the derivative is singular. */
+/* Compute the Newton step in units of the grid's steps; return false if `slope` is singular. */
 static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
   supine_image cell = {.origin = {0.0}}; /* supine_image_locate solves the three equations */
   for (size_t k = 0; k < 9; ++k) {
@@ -75,7 +75,7 @@ static double solve(const supine_field *field, const double y[3], double x[3]) {
 typedef struct inversion {
   const supine_field *field;
   supine_field *inverse;
-  unsigned char *lost; /* [nodes] 1: the residual at the node exceeds lost_beyond */
+  unsigned char *lost; /* [nodes] 1 if the residual at the node exceeds lost_beyond */
 } inversion;
 
 static void invert_rows(void *context, size_t begin, size_t end, size_t thread) {

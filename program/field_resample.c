@@ -17,18 +17,17 @@ enum { RUN = 128 };
 
 typedef struct resampling {
   const supine_field *inverse;
-  const supine_image *depth; /* NULL: densities are not scaled and `inside` is empty */
-  supine_image inside;       /* mask of the lungs: 1 or 0 for each voxel of the image */
+  const supine_image *depth; /* NULL if densities are not scaled; `inside` is then empty */
+  supine_image inside;       /* 1 for each voxel of `from` inside the lungs, else 0 */
   const supine_image *from;
   supine_image *to;
   bool labels;
 } resampling;
 
-/* Cells that contain RUN points: index of the value at each cell's first corner, and position of
- * the point in the cell, 0 to 1 along each axis. */
+/* The cells that contain RUN points. */
 typedef struct cells {
-  size_t first[RUN];
-  double share[3][RUN];
+  size_t first[RUN];    /* index of the value at the cell's lowest corner */
+  double share[3][RUN]; /* position of the point in the cell, 0 to 1 along each axis */
 } cells;
 
 /* Find the cells that contain points, mm. The operations and their order are those of
@@ -64,14 +63,14 @@ INLINE void find_cells(const supine_image *image, double (*point)[RUN], cells *f
   }
 }
 
-/* Compute the weights of the corners of each cell, and the offset of each corner's value from that
- * of the first corner. */
+/* Compute the weights of the corners of each cell, and the offset of each corner's value from the
+ * value of the lowest corner. */
 INLINE void weigh_corners(const supine_image *image, const cells *in, double (*weight)[RUN],
                           size_t *offset) {
   for (size_t corner = 0; corner < 8; ++corner) {
     size_t stride = image->channels;
     offset[corner] = 0;
-    for (size_t a = 0; a < 3; ++a) { /* with one slice, the upper corner has weight 0 */
+    for (size_t a = 0; a < 3; ++a) { /* on an axis of one voxel, the upper corner has weight 0 */
       offset[corner] += (corner >> a & 1U) != 0 && image->size[a] > 1 ? stride : 0;
       stride *= image->size[a];
     }
@@ -131,7 +130,7 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
   supine_image_gather(image, 0, in.first, RUN, values);
 }
 
-/* Compute det(dv/dy + 1) of the inverse field v at a voxel y; 0 if the field folds there. */
+/* Compute det(I + dv/dy) of the inverse field v at a voxel y; 0 if the field folds there. */
 static double volume_ratio(const supine_image *nodes, const supine_image *image, size_t index) {
   double point[3];
   double v[3];
@@ -180,7 +179,7 @@ INLINE void interpolate_density(const resampling *work, const cells *in, size_t 
   }
 }
 
-/* Mark the voxels that are inside the lungs, in rows `begin` to `end` - 1. */
+/* Mark the voxels inside the lungs in the rows `begin` to `end` - 1. */
 static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const resampling *work = context;
@@ -196,7 +195,7 @@ static void mark_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Resample RUN voxels of a row from `begin` on; those past the end of the row are not stored. */
+/* Resample RUN voxels of a row from `begin` on; do not store voxels past the end of the row. */
 SUPINE_CLONES static void resample_run(const resampling *work, size_t row, size_t begin) {
   const supine_image *from = work->from;
   const double at[2] = {(double)(row % from->size[1]), (double)(row / from->size[1])};

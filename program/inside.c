@@ -21,8 +21,7 @@ static bool sort_by_name(supine_command_names *names, size_t n) {
   for (size_t name = 0; name < names->count; ++name) {
     begin[name + 2] += begin[name + 1];
   }
-  for (size_t i = 0; i < n;
-       ++i) { /* at the end, begin[name + 1] is past the vertices of the name */
+  for (size_t i = 0; i < n; ++i) { /* moves begin[name + 1] to the end of the name's vertices */
     names->order[begin[names->part[i] + 1]++] = i;
   }
   return true;
@@ -101,11 +100,12 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
   const bool same = b->vector && a->mode_count == b->mode_count && a->band == b->band &&
                     a->lung_count == b->lung_count &&
                     memcmp(a->modes, b->modes, a->mode_count * terms * sizeof *a->modes) == 0;
-  return same ? SUPINE_OK
-              : supine_error_set(
-                    error, SUPINE_ERROR_FORMAT,
-                    "%s: made from another basis: make it with 'supine embed' from this basis",
-                    path);
+  return same
+             ? SUPINE_OK
+             : supine_error_set(
+                   error, SUPINE_ERROR_FORMAT,
+                   "%s: made from another basis: make it again with 'supine embed' from this basis",
+                   path);
 }
 
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,

@@ -6,10 +6,10 @@
 #include "program/render/render.h"
 
 typedef struct supine_command_names {
-  size_t count;         /* number of names */
-  char **text;          /* [count] the names */
-  const uint32_t *part; /* [N] index of each vertex's name in `text` */
-  size_t *order;        /* [N] vertices by name, and by input order within each name */
+  size_t count;
+  char **text;          /* [count] */
+  const uint32_t *part; /* [N] index in `text` of each vertex's name */
+  size_t *order;        /* [N] vertices, sorted by name, then in input order */
   size_t *begin;        /* [count + 1] index in `order` of the first vertex of each name */
   char *space;          /* memory that `text` points into */
 } supine_command_names;
@@ -27,8 +27,8 @@ size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error);
 
-/* Open structures and their names, and check them. Set *inside and *names to zero before; close
- * both afterwards, also after a failure. */
+/* Open structures and their names, and check that they were embedded in `lungs`. *inside and *names
+ * must be initialised to zero; close both, also after a failure. */
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);

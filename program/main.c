@@ -31,10 +31,10 @@ static void print_help(void) {
              "  supine precompute lungs.ply -o lungs.safetensors\n"
              "  supine deform lungs.safetensors --posture prone -o prone.vtp\n"
              "\n"
-             "Lengths are millimetres and volumes millilitres; axes are the DICOM patient axes\n"
-             "(x to the left, y to the back, z to the head).\n"
-             "Exit codes: 0 done, 1 wrong usage, 2 wrong input, 3 not in this build, 4 failed "
-             "output,\n5 numerical failure.");
+             "Lengths are in millimetres, volumes in millilitres; axes are the DICOM patient\n"
+             "axes (x to the left, y to the back, z to the head).\n"
+             "Exit codes: 0 done, 1 wrong usage, 2 wrong input, 3 not in this build,\n"
+             "4 failed output, 5 numerical failure.");
 }
 
 static const supine_command *find_command(const char *name) {
@@ -61,8 +61,8 @@ static int unknown_command(const char *name) {
   return SUPINE_EXIT_USAGE;
 }
 
-/* End the program, without unfinished outputs, if jansson or GSL runs out of memory. Otherwise JSON
- * values would be missing without a message; GSL reports the failure only to its error handler. */
+/* Remove unfinished outputs and end the program, as jansson or GSL is out of memory. jansson would
+ * leave out values without a message; GSL only calls its error handler. */
 static _Noreturn void end_without_memory(void) {
   supine_output_abandon_all();
   (void)fputs("supine: out of memory\n", stderr);
@@ -77,7 +77,7 @@ static void *allocate_json(size_t size) {
   return memory;
 }
 
-/* Handle an error of GSL: end if out of memory. GSL's functions return all other errors. */
+/* Handle an error of GSL: end if out of memory. Functions of GSL return all other errors. */
 static void handle_gsl(const char *reason, const char *file, int line, int code) {
   (void)reason;
   (void)file;
@@ -90,7 +90,7 @@ static void handle_gsl(const char *reason, const char *file, int line, int code)
 int main(int argc, char **argv) {
   (void)gsl_set_error_handler(handle_gsl);
   json_set_alloc_funcs(allocate_json, free);
-  openblas_set_num_threads(1); /* threads of OpenBLAS would busy-wait beside the program's own */
+  openblas_set_num_threads(1); /* its threads would busy-wait beside the program's own threads */
   (void)setenv("OMP_THREAD_LIMIT", "1", 0); /* CHOLMOD's loops are too short for threads */
   supine_options_signals_catch(false);
   if (argc < 2) {

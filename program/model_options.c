@@ -97,10 +97,10 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
   return SUPINE_OK;
 }
 
-/* Names of the values of supine_sex. */
+/* Names of the sexes, indexed by supine_sex. */
 static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
-/* Parts of help texts: the laws, and the constants of each law. */
+/* Parts of help texts: a line for each law, and the defaults of each law. */
 #define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) "; default for " name ": " #base
 #define LAW_GAIN(id, name, base, gain, ...) "; default for " name ": " #gain
@@ -137,23 +137,23 @@ const supine_option supine_command_model_options[] = {
     {.help = "The scan and the law:"},
     {"scanned", 0, "STATE",
      "state of the lungs in the scan: full (TLC, a breath-hold at full inflation; the default), "
-     "POSTURE:rest (FRC, the end of a quiet expiration), either with +ML or -ML for both lungs "
-     "together (supine:rest+300, full-2000), or none (unknown: breaths are added to the scan, and "
-     "a change of posture alone does not deform it). The model starts from full inflation, where "
-     "the shape is the same in every posture; if the scan is in another state, the shape at full "
-     "inflation is computed first",
+     "POSTURE:rest (FRC, the end of a quiet expiration), each optionally with +ML or -ML for both "
+     "lungs together (supine:rest+300, full-2000), or none (unknown: breaths are added to the "
+     "scan, and a change of posture alone does not deform it). The model starts from full "
+     "inflation, where the shape is the same in every posture; if the scan is in another state, "
+     "the shape at full inflation is computed first",
      FILLS(choice), .read = read_scan,
-     .wants = "full, POSTURE:rest, either with +ML or -ML, or none"},
+     .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
     {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
      FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
     {"resting", 0, "LIST",
      "patient's volume at rest (FRC), for one posture or several: POSTURE=2600mL, gas and tissue "
      "of both lungs, as measured in a CT at rest; POSTURE=0.43, a share of the volume at full "
-     "inflation; or POSTURE=0.42/0.44, shares for the left and the right lung. Other postures keep "
-     "their proportion to those named. A lung-function test gives the gas alone, seated: add about "
-     "0.9 L of tissue, and give the sum as upright. Default, from healthy people: supine "
-     "0.418/0.440, prone 0.464/0.475, left 0.413/0.546, right 0.563/0.435, upright 0.481/0.506, "
-     "inverted as supine",
+     "inflation; or POSTURE=0.42/0.44, shares for the left and the right lung. The volumes of "
+     "other postures keep the default proportions to these. A lung-function test gives the gas "
+     "alone, seated: add about 0.9 L of tissue, and give the sum as upright. Default, from healthy "
+     "people: supine 0.418/0.440, prone 0.464/0.475, left 0.413/0.546, right 0.563/0.435, upright "
+     "0.481/0.506, inverted as supine",
      FILLS(choice), .read = read_resting, .wants = "POSTURE=2600mL or POSTURE=SHARE,..."},
     {"height", 0, "CM",
      "height of the person. With --sex it gives the volume expected at TLC (ECSC 1993, less 10 % "
@@ -180,14 +180,16 @@ const supine_option supine_command_model_options[] = {
                         "(DIR-Lab), as the original ones are lost; the constants for deep are "
                         "fitted to landmarks in ten full breaths (DIR-Lab COPDgene)",
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
-    {.help = "Tissue. Expandability a is the inverse of stiffness, E = 1/a. Only ratios between "
-             "the parts of the lungs count: doubling every a changes nothing."},
+    {.help = "Tissue. Its expandability a is the inverse of its stiffness E. Only the ratios "
+             "between parts of the lungs count: doubling a everywhere changes nothing."},
     {"expandability", 0, "WHAT",
-     "uniform (default)\nlinear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a changes from FROM to TO linearly "
-     "or exponentially along AXIS: x from the midline outwards, y from back to front, z from apex "
-     "to base; linear:z:0.5:1.5 expands most at the base\nFILE: CSV with a for every vertex: a "
-     "column expandability, in the vertex order of 'supine solve' (left lung first), or columns "
-     "vertex,expandability, with vertices numbered from 0",
+     "uniform (default)\n"
+     "linear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a changes from FROM to TO linearly or exponentially "
+     "along AXIS: x from the midline outwards, y from back to front, z from apex to base; "
+     "linear:z:0.5:1.5 expands most at the base\n"
+     "FILE: CSV with the expandability of every vertex: a column expandability, in the vertex "
+     "order of 'supine solve' (left lung first); or the columns vertex,expandability, with "
+     "vertices numbered from 0",
      FILLS(choice), .read = read_expandability, .file = SUPINE_FILE_IN,
      .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
               "above 0, or a file",
@@ -200,12 +202,12 @@ const supine_option supine_command_model_options[] = {
      .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",
      "collapsed lung (pneumothorax), left or right: its volume at rest and its share of a breath "
-     "are multiplied by SHARE (0 to 1); the other lung takes the rest of the breath's volume",
+     "are multiplied by SHARE (0 to 1); the other lung takes the remainder of the breath",
      FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {"reach", 0, "MM",
      "length over which a force spreads along the surface: at distance r it is about exp(-r/MM); "
-     "default 10. The paper law spreads it over a few links of the mesh instead, which is shorter "
-     "on finer meshes and may tear them",
+     "default 10. The paper law spreads it over a few links of the mesh instead: a finer mesh has "
+     "shorter links, and its surface may tear",
      FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.name = NULL}};
 
@@ -237,7 +239,7 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Copy a patient's law and force into the choice, and the state of the scan if none was given. */
+/* Copy a patient's law and force into the choice; set the state of the scan if none was given. */
 static supine_status take_patient(supine_model_options *options, supine_error *error) {
   const supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;

@@ -17,24 +17,24 @@ extern const supine_option supine_command_model_options[];
 typedef struct supine_model_options {
   supine_source_options source;
   supine_model_choice choice;
-  const supine_patient_record *patient; /* patient model, owned by the caller; NULL: none */
+  const supine_patient_record *patient; /* owned by the caller; NULL if there is no patient model */
   double *patient_arrays;               /* [4, N] memory that supine_patient_model fills */
-  supine_source made_from;  /* lungs as loaded, with the axes and units of their files */
-  supine_prepared prepared; /* model of the lungs */
-  char assumed[800];        /* assumptions about the scan and the model, in words */
-  supine_findings findings; /* findings about the files and the model */
+  supine_source made_from; /* lungs as loaded, with the axes and units of their files */
+  supine_prepared prepared;
+  char assumed[800]; /* assumptions about the scan and the model, in words */
+  supine_findings findings;
 } supine_model_options;
 
-/* Set the defaults of options that are initialised to zero. */
+/* Set the defaults. `options` must be initialised to zero. */
 void supine_command_model_options_begin(supine_model_options *options);
 
 /* Load the files, print the findings and prepare the model.
- * @param keep  true: ignore --scanned and take the surface as the reference */
+ * @param keep  whether to ignore --scanned, and to take the surface as the reference */
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
                                         char **paths, size_t count, bool keep, supine_error *error);
 
 /* Load one or two surfaces, such as "left.ply,right.ply", or a label map; print the findings.
- * @param lungs  initialised to zero */
+ * @param lungs  must be initialised to zero */
 supine_status supine_command_load_lungs(const char *command, const char *operand,
                                         const supine_source_options *options, supine_lungs *lungs,
                                         supine_error *error);

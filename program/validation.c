@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Predict states of a person and compare them with scans. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,16 +11,15 @@
 #include "precompute/inside/surface.h"
 #include "program/options/basis_input.h"
 
-/* Largest number of vertices whose distance is measured, and number of golden-section steps. */
-enum { SEARCHED_MAX = 1500, SEARCH_STEPS = 24 };
+enum { MEASURED_VERTICES_MAX = 1500, GOLDEN_SECTION_STEPS = 24 };
 
-static const double search_span = 0.5;           /* half-width of the search / max(1, |scale|) */
+static const double search_span = 0.5; /* half-width of the search, in units of max(1, |scale|) */
 static const double golden = 0.6180339887498949; /* (sqrt(5) - 1) / 2 */
-static const double same_posture = 1e-9;         /* difference of components that counts as equal */
+static const double same_posture = 1e-9;         /* largest difference of equal components */
 
 void supine_command_subject_free(supine_command_subject *subject) {
   supine_basis_close(subject->basis);
-  supine_mesh_free(&subject->rest);
+  supine_mesh_free(&subject->start);
   for (size_t i = 0; i < SUPINE_COMMAND_STATES_MAX; ++i) {
     free(subject->outcome[i].predicted);
     free(subject->outcome[i].nearest);
@@ -46,17 +44,6 @@ static supine_status deform(const supine_basis *basis, const supine_pose *pose, 
                                 supine_basis_get_info(basis)->vertex_count);
 }
 
-/* Return the volume of all lungs in a pose, mL. */
-static double held(const supine_basis *basis, const supine_pose *pose) {
-  double volumes[SUPINE_LUNGS_MAX];
-  double sum = 0.0;
-  supine_basis_volumes(basis, pose, volumes);
-  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    sum += volumes[lung];
-  }
-  return sum;
-}
-
 supine_status supine_command_subject_open(const char *path, supine_command_subject *subject,
                                           supine_error *error) {
   supine_command_subject *s = subject;
@@ -65,7 +52,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   if (status != SUPINE_OK) {
     return status;
   }
-  if (s->from.posture[0] == '\0') {
+  if (s->from.text[0] == '\0') {
     s->from.state = supine_basis_scan(s->basis);
   }
   /* If rest is unknown, a posture without a volume gets the volume of the scan. */
@@ -75,18 +62,18 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   }
   status = supine_basis_pose(s->basis, &s->from.state, &pose, error);
   if (status == SUPINE_OK) {
-    s->from_millilitres = held(s->basis, &pose);
+    s->from_millilitres = supine_options_basis_volume(s->basis, &pose);
     s->from_scale = pose.gains[0][0];
-    status = supine_options_basis_mesh(s->basis, &s->rest);
+    status = supine_options_basis_mesh(s->basis, &s->start);
   }
   if (status == SUPINE_OK) {
-    free(s->rest.vertices);
-    status = deform(s->basis, &pose, &s->rest.vertices, error);
+    free(s->start.vertices);
+    status = deform(s->basis, &pose, &s->start.vertices, error);
   }
   return status;
 }
 
-/* Compute the gains for a state's volume or, if none was given, for its surface's volume. */
+/* Compute the gains for a state's volume or, if none was given, for the volume of its surface. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
@@ -102,7 +89,8 @@ static supine_status find_gains(const supine_command_subject *s, const supine_co
   const supine_status status = supine_basis_gains(s->basis, &asked, &outcome->pose, error);
   if (status == SUPINE_OK) {
     outcome->scale = outcome->pose.gains[0][0];
-    outcome->millilitres = held(s->basis, &outcome->pose) - s->from_millilitres;
+    outcome->millilitres =
+        supine_options_basis_volume(s->basis, &outcome->pose) - s->from_millilitres;
   }
   return status;
 }
@@ -110,7 +98,7 @@ static supine_status find_gains(const supine_command_subject *s, const supine_co
 static supine_status predict_surface(const supine_command_subject *s,
                                      const supine_command_state *state, const supine_mesh *mesh,
                                      supine_command_outcome *outcome, supine_error *error) {
-  const size_t n = s->rest.vertex_count;
+  const size_t n = s->start.vertex_count;
   outcome->nearest = malloc(3 * n * sizeof(double));
   supine_status status =
       outcome->nearest != NULL
@@ -127,12 +115,12 @@ static supine_status predict_surface(const supine_command_subject *s,
 
 typedef struct search {
   const supine_inside_surface *tree;
-  size_t vertices, count; /* number of vertices, and number of those measured */
-  double *distance;       /* [count] distance of each measured vertex from the surface, mm */
+  size_t vertex_count, measured_count;
+  double *distance; /* [measured_count] from the surface, mm */
 } search;
 
-/* Compute the RMS distance, mm, from the vertices to the surface if all gains are changed in
- * proportion, so that the first is `scale`. */
+/* Multiply all gains by one factor, so that the first becomes `scale`; compute the RMS distance of
+ * the vertices from the surface, mm. */
 static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale,
                                  const search *look, double *rms, supine_error *error) {
@@ -149,13 +137,14 @@ static supine_status distance_at(const supine_command_subject *s,
   if (status != SUPINE_OK) {
     return status;
   }
-  for (size_t i = 0; i < look->count; ++i) {
-    memmove(positions + 3 * i, positions + 3 * (i * look->vertices / look->count),
+  for (size_t i = 0; i < look->measured_count; ++i) {
+    memmove(positions + 3 * i, positions + 3 * (i * look->vertex_count / look->measured_count),
             3 * sizeof(double));
   }
-  supine_inside_surface_distances(look->tree, look->count, positions, look->distance, NULL);
-  for (size_t i = 0; i < look->count; ++i) {
-    sum += look->distance[i] * look->distance[i] / (double)look->count;
+  supine_inside_surface_distances(look->tree, look->measured_count, positions, look->distance,
+                                  NULL);
+  for (size_t i = 0; i < look->measured_count; ++i) {
+    sum += look->distance[i] * look->distance[i] / (double)look->measured_count;
   }
   *rms = sqrt(sum);
   free(positions);
@@ -165,9 +154,10 @@ static supine_status distance_at(const supine_command_subject *s,
 /* Find the scale with the least distance to the surface, by golden-section search. */
 static supine_status find_best(const supine_command_subject *s, const supine_mesh *mesh,
                                supine_command_outcome *outcome, supine_error *error) {
-  const size_t n = s->rest.vertex_count;
-  search look = {.vertices = n, .count = n < SEARCHED_MAX ? n : SEARCHED_MAX};
-  look.distance = malloc(look.count * sizeof(double));
+  const size_t n = s->start.vertex_count;
+  search look = {.vertex_count = n,
+                 .measured_count = n < MEASURED_VERTICES_MAX ? n : MEASURED_VERTICES_MAX};
+  look.distance = malloc(look.measured_count * sizeof(double));
   supine_inside_surface *tree = NULL;
   supine_status status =
       look.distance == NULL
@@ -178,7 +168,7 @@ static supine_status find_best(const supine_command_subject *s, const supine_mes
   double low = outcome->scale - span;
   double high = outcome->scale + span;
   look.tree = tree;
-  for (int i = 0; i < SEARCH_STEPS && status == SUPINE_OK; ++i) {
+  for (int i = 0; i < GOLDEN_SECTION_STEPS && status == SUPINE_OK; ++i) {
     const double a = high - golden * (high - low);
     const double b = low + golden * (high - low);
     double left[2] = {0};
@@ -232,18 +222,18 @@ static supine_status predict_points(const supine_command_subject *s, size_t whic
                                     supine_error *error) {
   enum { CENTRES = 1500 };
   const supine_command_outcome *outcome = &s->outcome[which];
-  const size_t n = s->rest.vertex_count;
+  const size_t n = s->start.vertex_count;
   supine_inside_biharmonic fit = {0};
   double *displacement = malloc(3 * n * sizeof *displacement);
   supine_status status = displacement == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY,
                                                                  "no memory for %zu vertices", n)
                                               : SUPINE_OK;
   for (size_t i = 0; i < 3 * n && status == SUPINE_OK; ++i) {
-    displacement[i] = outcome->predicted[i] - s->rest.vertices[i];
+    displacement[i] = outcome->predicted[i] - s->start.vertices[i];
   }
   if (status == SUPINE_OK) {
     status =
-        supine_inside_biharmonic_fit(n, s->rest.vertices, 3, displacement, CENTRES, &fit, error);
+        supine_inside_biharmonic_fit(n, s->start.vertices, 3, displacement, CENTRES, &fit, error);
   }
   if (status == SUPINE_OK) {
     supine_inside_biharmonic_evaluate(&fit, pairs->count, pairs->from, predicted);
@@ -261,7 +251,7 @@ static supine_status check_points(const supine_command_subject *s,
   double low[3];
   double high[3];
   size_t outside = 0;
-  supine_mesh_box(&s->rest, low, high);
+  supine_mesh_box(&s->start, low, high);
   for (size_t i = 0; i < pairs->count; ++i) {
     const double *p = pairs->from + 3 * i;
     outside += p[0] < low[0] || p[0] > high[0] || p[1] < low[1] || p[1] > high[1] ||
@@ -319,8 +309,8 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   if (status == SUPINE_OK && landmarks != NULL) {
     status = validate_points(s, i, landmarks, reverse, error);
   }
-  if (status == SUPINE_OK && state->path != NULL) { /* also changes outcome->predicted */
-    status = supine_command_compare_surfaces(&s->rest, s->moved, outcome->predicted, &lungs.mesh,
+  if (status == SUPINE_OK && state->path != NULL) { /* last, as it changes outcome->predicted */
+    status = supine_command_compare_surfaces(&s->start, s->moved, outcome->predicted, &lungs.mesh,
                                              outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;
   }

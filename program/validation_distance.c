@@ -38,7 +38,7 @@ static void explain(supine_patient_scan_motion moved,
   }
 }
 
-/* Choose the map to fit. To the prediction, fit the motion between the scans. */
+/* Choose the map to fit; for the prediction, the motion between the scans. */
 static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID
@@ -77,17 +77,17 @@ supine_status supine_command_compare_points(
   return SUPINE_OK;
 }
 
-/* Summarise the distances in both directions, from the vertices of each surface to the other. */
-static supine_status surface_distance(const supine_mesh *rest, const double *moved,
+/* Summarise the distances of the vertices of each surface from the other surface. */
+static supine_status surface_distance(const supine_mesh *start, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
                                       supine_command_distance *of, supine_error *error) {
-  const size_t n = rest->vertex_count;
+  const size_t n = start->vertex_count;
   supine_inside_surface *tree = NULL;
   double *space = malloc((n + state->vertex_count) * sizeof *space);
   supine_status status =
       space == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for distances")
-                    : supine_inside_surface_create(moved, rest->triangle_count, rest->triangles,
+                    : supine_inside_surface_create(moved, start->triangle_count, start->triangles,
                                                    false, &tree, error);
   if (status == SUPINE_OK) {
     supine_inside_surface_distances(state_tree, n, moved, space, nearest);
@@ -129,18 +129,18 @@ static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
 }
 
 supine_status
-supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_scan_motion moved,
+supine_command_compare_surfaces(const supine_mesh *start, supine_patient_scan_motion moved,
                                 double *predicted, const supine_mesh *state, double *nearest,
                                 supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT],
                                 supine_error *error) {
   supine_inside_surface *tree = NULL;
   double *space = malloc(10 * (size_t)FITTED_MAX * sizeof *space);
-  const size_t n = rest->vertex_count;
+  const size_t n = start->vertex_count;
   double *at = malloc(3 * n * sizeof *at);
-  supine_status status = supine_patient_check_boxes(rest, state, error);
+  supine_status status = supine_patient_check_boxes(start, state, error);
   if (status == SUPINE_OK && (space == NULL || at == NULL)) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices",
-                              rest->vertex_count);
+                              start->vertex_count);
   }
   if (status == SUPINE_OK) {
     status = supine_inside_surface_create(state->vertices, state->triangle_count, state->triangles,
@@ -149,8 +149,8 @@ supine_command_compare_surfaces(const supine_mesh *rest, supine_patient_scan_mot
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT && status == SUPINE_OK; ++k) {
     const bool own = k == SUPINE_PATIENT_MAP_PREDICTED;
     status =
-        fit_map(map_of(k, moved), n, own ? predicted : rest->vertices, tree, space, at)
-            ? surface_distance(rest, at, state, tree, own ? nearest : NULL, &distance[k], error)
+        fit_map(map_of(k, moved), n, own ? predicted : start->vertices, tree, space, at)
+            ? surface_distance(start, at, state, tree, own ? nearest : NULL, &distance[k], error)
             : undetermined(error);
     if (own && status == SUPINE_OK) {
       memcpy(predicted, at, 3 * n * sizeof *at);

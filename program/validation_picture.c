@@ -7,19 +7,17 @@
 #include "program/validation.h"
 
 #include "program/render/render.h"
+#include "sh/base/vec3.h"
 
-/* Smallest upper end of the colour scale, mm. */
+/* Smallest end of the colour bar, mm. */
 static const double end_least = 1.0;
 
-/* Compute the distance of each predicted vertex from the scanned surface, mm. Update *largest, the
- * largest distance, and *end, the largest 95th percentile, over the states so far. */
+/* Compute the distance of each predicted vertex from the scanned surface, mm. Update the maxima
+ * over all states: *largest of the distances, *end of the 95th percentiles. */
 static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
                         float *value, double *largest, double *end) {
-  for (size_t i = 0; i < s->rest.vertex_count; ++i) {
-    const double *at = outcome->predicted + 3 * i;
-    const double *to = outcome->nearest + 3 * i;
-    const double off =
-        sqrt(pow(at[0] - to[0], 2.0) + pow(at[1] - to[1], 2.0) + pow(at[2] - to[2], 2.0));
+  for (size_t i = 0; i < s->start.vertex_count; ++i) {
+    const double off = supine_distance(outcome->predicted + 3 * i, outcome->nearest + 3 * i);
     value[i] = (float)off;
     *largest = fmax(*largest, off);
   }
@@ -30,7 +28,7 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
                                          supine_error *error) {
   static const supine_view views[2] = {SUPINE_VIEW_ANTERIOR, SUPINE_VIEW_POSTERIOR};
   const supine_command_subject *s = subject;
-  const size_t n = s->rest.vertex_count;
+  const size_t n = s->start.vertex_count;
   supine_panel panel[SUPINE_COMMAND_STATES_MAX] = {{0}};
   char subtitle[SUPINE_COMMAND_STATES_MAX][96];
   supine_renderer *renderer = NULL;
@@ -50,11 +48,11 @@ supine_status supine_command_draw_errors(const supine_command_subject *subject, 
     const supine_command_distance *off = &outcome->surface[SUPINE_PATIENT_MAP_PREDICTED];
     (void)snprintf(subtitle[count], sizeof subtitle[count], "%+.0f mL, RMS %.1f, Hausdorff %.1f mm",
                    outcome->millilitres, off->rms, off->largest);
-    panel[count] = (supine_panel){.title = s->state[i].posture[0] != '\0' ? s->state[i].posture
-                                                                          : s->state[i].path,
-                                  .subtitle = subtitle[count],
-                                  .pose = &outcome->pose,
-                                  .value = values + count * n};
+    panel[count] =
+        (supine_panel){.title = s->state[i].text[0] != '\0' ? s->state[i].text : s->state[i].path,
+                       .subtitle = subtitle[count],
+                       .pose = &outcome->pose,
+                       .value = values + count * n};
     memcpy(panel[count].gravity, s->state[i].state.gravity, sizeof panel[count].gravity);
     ++count;
   }

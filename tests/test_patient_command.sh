@@ -57,6 +57,7 @@ pairs p_supine_rest p_supine_full full
 pairs p_supine_full p_supine_rest empty
 pairs p_supine_rest p_prone_rest prone
 pairs p_supine_full p_prone_rest down
+mv prone.csv prone.CSV
 
 # The gain of 0.70 is recovered for either order of the two states, and the basis of the scan at rest reaches
 # the true prone surface.
@@ -78,7 +79,7 @@ turns forwards p_supine_rest.ply p_supine_full.ply --other supine:full \
   --state prone:rest:p_prone_rest.ply
 turns backwards p_supine_full.ply p_supine_rest.ply --rest supine:full --other supine:rest \
   --state prone:rest:p_prone_rest.ply
-turns points --landmarks full.csv --other supine:full --state prone:rest:prone.csv
+turns points --landmarks full.csv --other supine:full --state prone:rest:prone.CSV
 turns reversed --landmarks empty.csv --rest supine:full --other supine:rest \
   --state prone:rest:down.csv
 grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat fit.txt)"
@@ -183,11 +184,11 @@ done
 "$supine" deform scanned.safetensors --posture prone --volume rest -o prone.ply >/dev/null ||
   fail "deform prone"
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
-  --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest -o errors.png --json >valid.json
+  --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest -o errors.PNG --json >valid.json
 code=$?
 [ $code -eq 0 ] || [ $code -eq 3 ] || fail "validate several: $code" # 3: drawing is not available
 if [ $code -eq 0 ]; then
-  [ "$(head -c 8 errors.png | od -An -tx1 | tr -d ' ')" = 89504e470d0a1a0a ] || fail "no PNG"
+  [ "$(head -c 8 errors.PNG | od -An -tx1 | tr -d ' ')" = 89504e470d0a1a0a ] || fail "no PNG"
 fi
 "$supine" validate scanned.safetensors --state supine:rest+400.ply --state supine:rest+900.ply \
   --state supine:rest+1500:rest+1500.ply --state prone:rest:prone.ply --from supine:rest --json >valid.json ||

@@ -44,6 +44,16 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
   return SUPINE_OK;
 }
 
+double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose) {
+  double volumes[SUPINE_LUNGS_MAX];
+  double sum = 0.0;
+  supine_basis_volumes(basis, pose, volumes);
+  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    sum += volumes[lung];
+  }
+  return sum;
+}
+
 /* Return positions [N, 3] as doubles, or NULL if out of memory. */
 static double *to_doubles(const supine_basis *basis, const float *xyz) {
   const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;

@@ -32,6 +32,9 @@ supine_status supine_options_basis_closed(const supine_basis *basis, const char 
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
 
+/* Return the volume of all lungs together in a pose, mL. */
+double supine_options_basis_volume(const supine_basis *basis, const supine_pose *pose);
+
 /* Return the positions [N, 3] of a pose, or NULL if out of memory. The caller frees them. */
 double *supine_options_basis_positions(const supine_basis *basis, const supine_pose *pose);
 

@@ -15,7 +15,7 @@ struct supine_animation {
   WebPAnimEncoder *encoder;
   WebPConfig config;
   size_t width, height;
-  int time; /* total duration of the pictures so far, ms */
+  int duration_ms; /* of the pictures so far */
   uint32_t *pixels;
 };
 
@@ -65,8 +65,9 @@ supine_status supine_render_animation_add(supine_animation *animation, supine_re
         frame.argb[i / animation->width * (size_t)frame.argb_stride + i % animation->width] =
             0xff000000U | animation->pixels[i];
       }
-      if (WebPAnimEncoderAdd(animation->encoder, &frame, animation->time, &animation->config)) {
-        animation->time += milliseconds;
+      if (WebPAnimEncoderAdd(animation->encoder, &frame, animation->duration_ms,
+                             &animation->config)) {
+        animation->duration_ms += milliseconds;
         status = SUPINE_OK;
       }
     }
@@ -80,7 +81,7 @@ supine_status supine_render_animation_write(supine_animation *animation, FILE *f
   WebPData data;
   WebPDataInit(&data);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (WebPAnimEncoderAdd(animation->encoder, NULL, animation->time, NULL) &&
+  if (WebPAnimEncoderAdd(animation->encoder, NULL, animation->duration_ms, NULL) &&
       WebPAnimEncoderAssemble(animation->encoder, &data)) {
     status = fwrite(data.bytes, 1, data.size, file) == data.size ? SUPINE_OK : SUPINE_ERROR_WRITE;
   }

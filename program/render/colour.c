@@ -4,7 +4,6 @@
  * [Ottosson2020] B. Ottosson, "A perceptual color space for image processing". */
 #include <math.h>
 #include <pthread.h>
-#include <string.h>
 
 #include "sh/base/vec3.h"
 

@@ -33,7 +33,7 @@ void supine_render_view_axes(supine_view view, double axes[3][3]) {
   memcpy(axes, views[view].axes, sizeof views[view].axes);
 }
 
-/* Each pixel is the mean of 2 x 2 samples. */
+/* Each pixel is the mean of OVERSAMPLE x OVERSAMPLE samples. */
 enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GRAIN = 16 };
 
 static const double distance_in_radii = 5.0; /* distance from the viewer to the lungs' centre */
@@ -43,7 +43,7 @@ static const float gamma_exponent = 2.2F;
 
 typedef struct corner {
   float x, y;      /* position, samples from the left and upper edges of the picture */
-  float nearness;  /* reciprocal of the distance along the view, 1/mm; 0: too near to be drawn */
+  float nearness;  /* reciprocal of the distance along the view, 1/mm; 0 if too near to be drawn */
   float normal[3]; /* unit normal in the viewer's axes: right, up, towards the viewer */
   float eye[3];    /* vector from the vertex to the viewer, mm, in the viewer's axes */
   float value;
@@ -53,7 +53,7 @@ struct supine_renderer {
   const supine_basis *basis;
   const supine_basis_info *info;
   float *scratch;  /* [2, N, 3] positions, mm, then unit normals */
-  corner *corners; /* [N] vertices */
+  corner *corners; /* [N] */
 };
 
 supine_status supine_render_create(const supine_basis *basis, supine_renderer **renderer,
@@ -81,11 +81,11 @@ void supine_render_destroy(supine_renderer *renderer) {
   }
 }
 
-/* A viewer who looks at the centre of the reference surface: the same for every state. */
+/* A viewer, who looks at the centre of the reference surface in every state. */
 typedef struct camera {
   double axes[3][3];
   double centre[3];
-  double radius; /* half diagonal of the box of the reference surface, mm */
+  double radius; /* half the diagonal of the bounding box of the reference surface, mm */
   double away;   /* distance from the viewer to the centre, mm */
 } camera;
 
@@ -135,8 +135,8 @@ void supine_render_extent(supine_renderer *r, const supine_scene *scene, double 
   }
 }
 
-/* Fit the extent into the picture: set `frame` to x and y of its centre, mm, then to the scales of
- * x and y, in half widths and half heights of the picture per mm. */
+/* Fit the extent into the picture. Set frame[0] and frame[1] to the centre of the extent, mm, and
+ * frame[2] and frame[3] to the scales, in half widths and half heights of the picture per mm. */
 static void find_frame(supine_renderer *r, const supine_scene *scene, double frame[4]) {
   double extent[4] = SUPINE_EXTENT_NONE;
   if (scene->extent != NULL) {
@@ -185,7 +185,7 @@ typedef struct canvas {
   uint32_t *nearest;                /* [height, width] triangle nearest to the viewer, or NOTHING */
   float *nearness;                  /* [height, width] nearness of that triangle, 1/mm */
   float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
-  unsigned char encode[SHADES + 1]; /* encoded value, 0 to 255, of linear light i / SHADES */
+  unsigned char encode[SHADES + 1]; /* [i] byte that encodes the linear light i / SHADES */
   uint32_t *pixels;
 } canvas;
 
@@ -220,7 +220,7 @@ static void find_corners(const canvas *c) {
 
 typedef struct face {
   const corner *at[3];
-  float area; /* twice the area, samples^2, negative if seen from inside the lung */
+  float area; /* twice the area, samples^2; negative if seen from inside the lung */
 } face;
 
 static face face_of(const canvas *c, size_t triangle) {
@@ -232,7 +232,7 @@ static face face_of(const canvas *c, size_t triangle) {
   return f;
 }
 
-/* Compute the barycentric coordinates in a triangle of the position (x, y), samples. */
+/* Compute the barycentric coordinates of the position (x, y), in samples, in a triangle. */
 static void shares_at(const face *f, float x, float y, float share[3]) {
   for (int k = 0; k < 3; ++k) {
     const corner *a = f->at[(k + 1) % 3];
@@ -246,7 +246,7 @@ static float nearness_at(const face *f, const float share[3]) {
          share[2] * f->at[2]->nearness;
 }
 
-/* Record a triangle at the samples where it is nearest, in rows `begin` to `end` - 1. */
+/* Record a triangle at the samples where it is nearest, in the rows `begin` to `end` - 1. */
 static void draw_face(const canvas *c, size_t triangle, size_t begin, size_t end) {
   const face f = face_of(c, triangle);
   const float left = fminf(f.at[0]->x, fminf(f.at[1]->x, f.at[2]->x));

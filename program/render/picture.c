@@ -28,12 +28,12 @@
   EACH(cairo_, text_extents) EACH(cairo_, text_path)
 /* clang-format on */
 
-/* Functions of cairo. They are loaded at the first use: cairo needs the X11 libraries. */
+/* Functions of cairo. They are loaded at the first use, as cairo needs the X11 libraries. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
-/* Colours: the ends of the background's gradient, cells and their edges, text. */
+/* Colours of the ends of the background's gradient, of cells and their edges, and of text. */
 static const double ground_top[3] = {0.985, 0.988, 0.992};
 static const double ground_bottom[3] = {0.925, 0.941, 0.957};
 static const double card[3] = {1, 1, 1};
@@ -47,8 +47,8 @@ typedef struct layout {
   double font;
   double margin;
   double cell_width, cell_height;
-  double strip; /* height of a cell's heading, above the lungs */
-  double bar;   /* height of the lowest part of the picture, with the colour bar */
+  double strip; /* height of a cell's heading */
+  double bar;   /* height of the part below the cells, with the colour bar */
 } layout;
 
 typedef struct bar_scale {
@@ -107,8 +107,8 @@ static void ground(cairo_t *cr, const supine_picture *picture) {
   cairo.pattern_destroy(fade);
 }
 
-/* Draw gravity, a unit vector `seen` in the viewer's axes, on the ball: an arrow, or a circle with
- * a dot if it points towards the viewer, or with a cross if it points away. */
+/* Draw gravity on the ball: an arrow, a circle with a dot if it points towards the viewer, or a
+ * circle with a cross if it points away. `seen` is its unit vector in the viewer's axes. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
   cairo.new_path(cr);
@@ -487,7 +487,7 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
   }
   if (status == SUPINE_OK) {
     status = write_png(surface, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* commit reports write errors */
+    if (status == SUPINE_OK || ferror(output.file) != 0) { /* let commit report a failed write */
       status = supine_output_commit(&output, error);
     }
   }

@@ -26,7 +26,7 @@ typedef enum supine_view {
   SUPINE_VIEW_COUNT
 } supine_view;
 
-/** Return the name of a view; NULL for SUPINE_VIEW_COUNT and above. */
+/** Return the name of a view; NULL if `view` is SUPINE_VIEW_COUNT or above. */
 const char *supine_render_view_name(supine_view view);
 
 /** Compute the rotation from the body's axes (LPS) to the viewer's axes: right, up, towards the
@@ -35,8 +35,8 @@ void supine_render_view_axes(supine_view view, double axes[3][3]);
 
 /** Colour maps: for the displacement in one state, and for the difference between two. */
 typedef enum supine_colours {
-  SUPINE_COLOURS_DISPLACEMENT = 0, /**< violet over teal to yellow */
-  SUPINE_COLOURS_DIFFERENCE,       /**< blue over red to cream */
+  SUPINE_COLOURS_DISPLACEMENT = 0, /**< from violet through teal to yellow */
+  SUPINE_COLOURS_DIFFERENCE,       /**< from blue through red to cream */
   SUPINE_COLOURS_COUNT
 } supine_colours;
 
@@ -59,23 +59,23 @@ void supine_render_destroy(supine_renderer *renderer);
 /** One drawing: the lungs in one state from one side. */
 typedef struct supine_scene {
   const supine_pose *pose;
-  const float *value; /**< [N] values that the colours of vertices show, mm */
-  double largest;     /**< value that the last colour shows, mm, > 0 */
-  double line_step;   /**< difference of the value between contour lines, mm; 0: no lines */
+  const float *value; /**< [N] value that the colour of each vertex shows, mm */
+  double largest;     /**< value that the last colour shows, mm; above 0 */
+  double line_step;   /**< difference of the value between contour lines, mm; 0 for no lines */
   supine_colours colours;
   supine_view view;
-  bool shell;           /**< draw a grey, transparent shell with an outline instead of colours */
+  bool shell; /**< whether to draw a grey, transparent shell with an outline, not colours */
   size_t width, height; /**< size of the drawing, pixels */
-  const double *extent; /**< [4] extent to show, by supine_render_extent; NULL: the scene's own */
+  const double *extent; /**< [4] made by supine_render_extent; NULL for the extent of this scene */
 } supine_scene;
 
 /** Empty extent, to be enlarged by supine_render_extent. */
 #define SUPINE_EXTENT_NONE                                                                         \
   { INFINITY, -INFINITY, INFINITY, -INFINITY }
 
-/** Enlarge an extent to contain a scene, so that several states can be drawn at one scale. The
- * extent is the smallest and the largest x, then y, on the plane through the lungs' centre that the
- * viewer faces, mm. All scenes must have the same view. */
+/** Enlarge an extent to contain a scene, so that several states can be drawn at one scale. An
+ * extent is the smallest x, the largest x, the smallest y and the largest y, mm, on the plane
+ * through the lungs' centre that the viewer faces. All scenes must have the same view. */
 void supine_render_extent(supine_renderer *renderer, const supine_scene *scene, double extent[4]);
 
 /** Draw a scene on a transparent background, using all cores.
@@ -95,8 +95,8 @@ supine_status supine_render_png(supine_renderer *renderer, const supine_scene *s
 typedef struct supine_mark {
   float xyz[3];      /**< position, mm */
   float value;       /**< value that the colour shows, mm */
-  bool point;        /**< true: a point, drawn as a disc; false: a vertex, drawn as a dot */
-  const char *label; /**< name written beside the mark, or NULL */
+  bool point;        /**< a point, drawn as a disc; if false, a vertex, drawn as a dot */
+  const char *label; /**< text written beside the mark, or NULL */
 } supine_mark;
 
 typedef struct supine_marks {
@@ -128,12 +128,12 @@ typedef struct supine_picture {
   const supine_view *view;
   size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
-  double largest;            /**< value that the last colour shows, mm */
-  double transparency;       /**< 0: coloured lungs; up to 1: grey shells, which fade above 0.5 */
-  const double (*extent)[4]; /**< [view_count] extents to show, by supine_render_picture_extent;
-                                  NULL: those of this picture */
+  double largest;      /**< value that the last colour shows, mm */
+  double transparency; /**< 0 for coloured lungs, else grey shells, which fade from 0.5 to 1 */
+  const double (*extent)[4]; /**< [view_count] made by supine_render_picture_extent; NULL for the
+                                extents of this picture */
   supine_colours colours;
-  bool beyond;          /**< values exceed `largest`: draw the colour bar with a pointed end */
+  bool beyond; /**< whether values exceed `largest`; the colour bar then has a pointed end */
   size_t width, height; /**< size of the picture, pixels */
 } supine_picture;
 

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "program/options/basis_input.h"
 #include "program/stream/tracked_patient.h"
 
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
@@ -220,16 +221,6 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
-static double total_volume(const supine_basis *basis, const supine_pose *pose) {
-  double volumes[SUPINE_LUNGS_MAX];
-  double sum = 0.0;
-  supine_basis_volumes(basis, pose, volumes);
-  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    sum += volumes[lung];
-  }
-  return sum;
-}
-
 /* Compute the gains for the current volume, or keep the last gains if that is out of reach. Then
  * compute the resulting volumes. */
 static void find_gains(supine_stream_patient *patient, double now,
@@ -240,7 +231,7 @@ static void find_gains(supine_stream_patient *patient, double now,
   const supine_state rest = supine_breath_state(basis, snapshot->gravity, 0.0);
   supine_error error;
   if (supine_basis_gains(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
-    snapshot->above = -total_volume(basis, &snapshot->pose);
+    snapshot->above = -supine_options_basis_volume(basis, &snapshot->pose);
   }
   if (supine_basis_gains(basis, &state, &snapshot->pose, &error) == SUPINE_OK) {
     memcpy(patient->gains, snapshot->pose.gains, sizeof patient->gains);
@@ -252,7 +243,7 @@ static void find_gains(supine_stream_patient *patient, double now,
                                error.message);
   }
   memcpy(snapshot->pose.gains, patient->gains, sizeof patient->gains);
-  snapshot->volume = total_volume(basis, &snapshot->pose);
+  snapshot->volume = supine_options_basis_volume(basis, &snapshot->pose);
   snapshot->above += snapshot->volume;
 }
 
