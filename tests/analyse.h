@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Tell clang-tidy that supine_error_set returns its `status` argument. Otherwise it assumes that a
- * failure may return SUPINE_OK. tests/analyse.sh includes this file before each source. */
+ * failing function may return SUPINE_OK. tests/analyse.sh includes this file before each source. */
 #include <supine/status.h>
 #define supine_error_set(error, status, ...)                                                       \
   ((void)(supine_error_set)((error), (status), __VA_ARGS__), (status))

@@ -8,7 +8,7 @@
 
 #define EXPORT_RUN(text, ...) COMMAND_RUN(&supine_command_export, KEPT_BOTH, text, __VA_ARGS__)
 
-/* Write a synthetic basis as `folder`/`name`, and its path into `path`. */
+/* Write a synthetic basis to `folder`/`name`, and set `path` to its path. */
 static inline void export_basis_make(const char *folder, const char *name, size_t modes,
                                      size_t band, bool vector, bool closed, char path[256]) {
   fixture *f = fixture_create(40, modes, band, 2, vector, closed, 5, 4711 + modes);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A temporary folder for the tests of a program. */
+/* A temporary folder for the tests of one program. */
 #ifndef SUPINE_TEST_FOLDER_H
 #define SUPINE_TEST_FOLDER_H
 
@@ -21,7 +21,7 @@ static inline int folder_remove(void **state) {
   return system(command); /* NOLINT(cert-env33-c) */
 }
 
-/* Return the path of a file in the folder; the next seven calls do not overwrite it. */
+/* Return the path of a file in the folder. It stays valid during the next seven calls. */
 static inline const char *in_folder(const char *name) {
   static char path[8][128];
   static size_t next;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Build the matrix I - A over all nodes (masses and springs), entry by entry from definitions (3)
- * and (8) of [Santhanam2008], as an independent reference for the solver. */
+/* The matrix I - A over all nodes (masses and springs), built entry by entry from equations (3) and
+ * (8) of [Santhanam2008]. It is an independent reference for the solver. */
 #ifndef SUPINE_FULL_OPERATOR_H
 #define SUPINE_FULL_OPERATOR_H
 
@@ -12,14 +12,14 @@
 #include "mesh/mesh.h"
 
 typedef struct full_operator {
-  size_t node_count;  /* masses come first, then springs */
-  size_t entry_count; /* number of entries off the diagonal */
+  size_t node_count;  /* masses have the lower indices, springs the higher */
+  size_t entry_count; /* entries off the diagonal */
   size_t *row, *column;
-  double *value; /* [entries] transfer Te[column->row] */
-  double *own;   /* [nodes] share Te[j->j] that a node keeps */
+  double *value; /* [entries] transfer Te from node `column` to node `row` */
+  double *own;   /* [nodes] share Te[j->j] of the force on node j that it keeps */
 } full_operator;
 
-/* Compute Te of every pair of linked nodes for stiffness E [N], used as given. */
+/* Compute Te for every pair of linked nodes from the stiffness e [N], without scaling it. */
 static inline full_operator full_operator_create(const supine_mesh *mesh,
                                                  const supine_topology *topology, const double *e) {
   const size_t n = mesh->vertex_count;
@@ -117,7 +117,7 @@ static inline direct_solver direct_solver_create(const full_operator *op) {
   return d;
 }
 
-/* Solve for the catch of the masses, `caught` [masses], under an applied force [masses]. */
+/* Set caught [masses] to the catch of each mass under an applied force [masses]. */
 static inline void direct_solver_solve(direct_solver *d, const full_operator *op, size_t masses,
                                        const double *force, double *caught) {
   for (size_t j = 0; j < op->node_count; ++j) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Synthetic bases of two irregular lungs whose displacements are known in closed form. */
+/* Synthetic bases of one or two irregular lungs, with displacements known in closed form. */
 #ifndef SUPINE_INSIDE_HELPERS_H
 #define SUPINE_INSIDE_HELPERS_H
 
@@ -14,14 +14,14 @@
 
 enum { HELPER_MODES = 3 };
 
-/* Compute the displacement u, mm, of a mode at a point: affine (0), quadratic (1), or a wave of 60
- * mm (2). */
+/* Compute the displacement u, mm, of a mode at a point. Mode 0 is affine, mode 1 is quadratic, and
+ * mode 2 is a wave with a wavelength of about 60 mm. */
 static inline void helper_motion(int mode, const double p[3], double u[3]) {
   if (mode == 0) {
     u[0] = 0.11 * p[0] - 0.07 * p[1] + 0.013 * p[2] + 2.7;
     u[1] = -0.05 * p[0] - 0.09 * p[1] + 0.021 * p[2] - 1.3;
     u[2] = 0.02 * p[0] + 0.12 * p[1] + 0.15 * p[2] + 5.9;
-  } else if (mode == 1) { /* at most about 20 mm in a lung */
+  } else if (mode == 1) { /* displacements of at most about 20 mm in a lung */
     u[0] = 6e-4 * p[0] * p[1] + 3e-4 * p[2] * p[2];
     u[1] = -5e-4 * p[1] * p[1] + 2e-4 * p[0] * p[2];
     u[2] = 8e-4 * p[2] * p[2] - 4e-4 * p[0] * p[1];
@@ -32,9 +32,9 @@ static inline void helper_motion(int mode, const double p[3], double u[3]) {
   }
 }
 
-/* Write a basis whose scan was taken at a direction of gravity and a volume in mL beyond the
- * reference, both as text (NULL: the scan is the reference). The weight of mode k has the
- * coefficients 0.5 + 0.1 k and 0.3 of the first two harmonics, so that all modes are active in
+/* Write a basis whose scan has the given direction of gravity and the given volume in mL beyond the
+ * reference, both as text. If they are NULL, the scan is the reference. The weight of mode k has
+ * the coefficients 0.5 + 0.1 k and 0.3 for the first two harmonics, so that all modes are active in
  * almost every direction. */
 static inline void helper_write_scanned_basis(const char *path, size_t frequency, size_t lungs,
                                               const char *scan_gravity, const char *scan_volume) {
@@ -56,7 +56,7 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
     for (int mode = 0; mode < HELPER_MODES; ++mode) {
       double u[3];
       helper_motion(mode, p, u);
-      /* The second lung has -0.7 times the displacement of the first. */
+      /* The displacement of the second lung is multiplied by -0.7. */
       for (size_t k = 0; k < 3; ++k) {
         coefficients[(3 * i + k) * HELPER_MODES + (size_t)mode] =
             (float)(side == 0 ? u[k] : -0.7 * u[k]);
@@ -73,7 +73,7 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
     modes[4 * k] = 0.5 + 0.1 * (double)k;
     modes[4 * k + 1] = 0.3;
   }
-  /* Arbitrary linear volume forms, which content must share with the surface. */
+  /* Arbitrary linear volume forms, which the file of embedded content must repeat. */
   double linear[2 * HELPER_MODES];
   double quadratic[2 * HELPER_MODES * HELPER_MODES] = {0};
   double cubic[2 * HELPER_MODES * HELPER_MODES * HELPER_MODES] = {0};
@@ -115,7 +115,7 @@ static inline void helper_write_basis(const char *path, size_t frequency, size_t
   helper_write_scanned_basis(path, frequency, lungs, NULL, NULL);
 }
 
-/* Open a basis in exact storage, with the values of the file unchanged. */
+/* Open a basis in exact storage, which leaves the values of the file unchanged. */
 static inline supine_basis *helper_open(const char *path) {
   const supine_basis_options exact = {.size = sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;

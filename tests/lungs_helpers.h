@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Synthetic and real lungs, and comparisons of numbers, shared by tests. */
+/* Synthetic and real lungs, random numbers, and comparisons of arrays. */
 #ifndef SUPINE_LUNGS_HELPERS_H
 #define SUPINE_LUNGS_HELPERS_H
 
@@ -21,8 +21,8 @@ static inline double helper_random(uint64_t *seed) {
   return 0.5 + 0.5 * random_signed(seed);
 }
 
-/* Return a closed surface without symmetry of 10 frequency^2 + 2 vertices, about 250 mm high,
- * centred at `x` mm from the midline. */
+/* Return a closed, asymmetric surface, about 250 mm high and centred `x` mm from the midline. It
+ * has 10 frequency^2 + 2 vertices. */
 static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed) {
   supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
                       .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
@@ -40,7 +40,7 @@ static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed)
   return mesh;
 }
 
-/* Load real surfaces (tests/README.md) as one model; return false if a file is missing. */
+/* Load real surfaces (tests/README.md) as one supine_lungs. Return false if a file is missing. */
 static inline bool helper_real_lungs(const char *const *names, size_t count, supine_axes axes,
                                      supine_lungs *lungs) {
   supine_mesh meshes[2] = {0};
@@ -69,8 +69,8 @@ static inline bool helper_real_lungs(const char *const *names, size_t count, sup
   return loaded;
 }
 
-/* Load a real left lung at 5,000 and at 20,000 vertices, each as a model; return false, with both
- * empty, if a file is missing. */
+/* Load a real left lung with 5,000 vertices into `coarse` and with 20,000 vertices into `fine`. If
+ * a file is missing, leave both empty and return false. */
 static inline bool helper_real_left_lung(supine_lungs *coarse, supine_lungs *fine) {
   static const char *const name[2] = {"lungs/chaste_left_5k.obj", "lungs/chaste_left.ply"};
   const bool loaded = helper_real_lungs(&name[0], 1, SUPINE_AXES_LPS, coarse) &&

@@ -23,15 +23,16 @@ static inline supine_mesh sample_make(size_t vertex_count, const double *vertice
   return mesh;
 }
 
-/* Return the tetrahedron of the origin and the points at 120 mm on each axis: volume 120^3 / 6 =
- * 288000 mm^3. */
+/* Return the tetrahedron with corners at the origin and at 120 mm on each axis. Its volume is 120^3
+ * / 6 = 288000 mm^3. */
 static inline supine_mesh sample_tetrahedron(void) {
   static const double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
   static const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
   return sample_make(4, vertices, 4, triangles);
 }
 
-/* Return the box from (-30, 10, -50) with sides 100, 110, 130 mm: volume 1430000 mm^3. */
+/* Return a box with its lowest corner at (-30, 10, -50) and sides of 100, 110 and 130 mm. Its
+ * volume is 1430000 mm^3. */
 static inline supine_mesh sample_box(void) {
   static const double vertices[] = {-30, 10, -50, 70, 10, -50, 70, 120, -50, -30, 120, -50,
                                     -30, 10, 80,  70, 10, 80,  70, 120, 80,  -30, 120, 80};
@@ -47,7 +48,7 @@ static inline supine_mesh sample_box(void) {
   "\nproperty float x\nproperty float y\nproperty float z\nelement face " #faces                   \
   "\nproperty list uint int vertex_indices\nend_header\n"
 
-/* Set `path` to the path of a file in the folder, and return it. */
+/* Set `path` to the path of a file in the folder of the group, and return it. */
 static inline const char *sample_path(void **state, const char *name, char path[256]) {
   (void)snprintf(path, 256, "%s/%s", (const char *)*state, name);
   return path;
@@ -67,7 +68,7 @@ static inline const char *sample_text(void **state, const char *name, const char
   return sample_write(state, name, text, strlen(text), path);
 }
 
-/* Make and remove the folder of a group; removal fails if a test has left a file in it. */
+/* Make the folder of a group of tests. Removing it fails if a test has left a file in it. */
 static inline int sample_folder_create(void **state) {
   static char folder[] = "/tmp/supine-mesh-XXXXXX";
   *state = mkdtemp(folder);

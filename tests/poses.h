@@ -8,9 +8,10 @@
 #include <supine/runtime.h>
 #include <supine/volume.h>
 
-/* Make a pose of weights [K] and one gain for each lung [G]. It lives as long as the caller's
- * block. */
-#define POSED(of, by, at) posed(of, by, at, &(supine_pose){.weights = {0}})
+/* Make a pose from weights [K] and one gain for each lung [G]. The pose is valid within the
+ * caller's block. */
+#define POSED(basis_, weights_, scales_)                                                           \
+  posed(basis_, weights_, scales_, &(supine_pose){.weights = {0}})
 
 static inline supine_pose *posed(const supine_basis *basis, const double *weights,
                                  const double *scales, supine_pose *pose) {
@@ -22,8 +23,8 @@ static inline supine_pose *posed(const supine_basis *basis, const double *weight
   return pose;
 }
 
-/* Return `count` poses, at most 512, of weights [count, K] and scales [count, G]. Valid until the
- * next call by the same thread. */
+/* Return `count` poses (at most 512) from weights [count, K] and scales [count, G]. They are valid
+ * until the next call by the same thread. */
 static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
                                        const double *weights, const double *scales) {
   static _Thread_local supine_pose poses[512];
@@ -34,8 +35,8 @@ static inline supine_pose *posed_batch(const supine_basis *basis, size_t count,
   return poses;
 }
 
-/* Add to cubic [3] the coefficients of s, s^2 and s^3 in the volume that a lung gains beyond the
- * reference at scale s, mL. */
+/* At scale s, a lung gains c1 s + c2 s^2 + c3 s^3 mL beyond the reference. Add c1, c2 and c3 to
+ * cubic [3]. */
 static inline void posed_cubic(const supine_basis *basis, size_t lung, const double *weights,
                                double cubic[3]) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -78,8 +79,8 @@ static inline supine_status posed_scale(const supine_basis *basis, const double 
   return supine_volume_scale(cubic, volume, scale, error);
 }
 
-/* Compute the volume that the lungs together gain beyond the reference in a state, mL; return the
- * status of its pose. */
+/* Compute the volume, mL, that all lungs together gain beyond the reference in a state. Return the
+ * status of supine_basis_pose. */
 static inline supine_status posed_volume(const supine_basis *basis, const double gravity[3],
                                          supine_volume volume, double *beyond) {
   supine_pose pose;
@@ -99,14 +100,6 @@ static inline supine_status posed_volume(const supine_basis *basis, const double
 static inline supine_status posed_rest(const supine_basis *basis, const double gravity[3],
                                        double *beyond) {
   return posed_volume(basis, gravity, (supine_volume){SUPINE_VOLUME_REST, 0.0}, beyond);
-}
-
-/* Return the volume that the lungs together gain beyond the reference in the scan, mL. */
-static inline double posed_scan(const supine_basis *basis) {
-  const supine_state scan = supine_basis_scan(basis);
-  double beyond;
-  (void)posed_volume(basis, scan.gravity, scan.volume, &beyond);
-  return beyond;
 }
 
 #endif

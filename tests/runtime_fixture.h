@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Synthetic bases of any size: bipyramids with random fields, and their evaluation in double
+/* Synthetic bases of any size: bipyramids with random displacement fields, evaluated in double
  * precision. */
 #ifndef SUPINE_TEST_RUNTIME_FIXTURE_H
 #define SUPINE_TEST_RUNTIME_FIXTURE_H
@@ -9,33 +9,33 @@
 #include <stdint.h>
 
 typedef struct fixture {
-  size_t vertices, triangles, modes, band, lungs;
+  size_t vertices, triangles, modes, band, lungs; /* N, M, K, L, G */
   bool vector, volume;
   size_t lung_begin[17];
   float *vertex;       /* [N, 3], mm */
   uint32_t *triangle;  /* [M, 3] */
   float *direction;    /* [N, 3] */
   float *coefficient;  /* [N, K] or [N, 3, K] */
-  double *mode;        /* [K, (L+1)^2] coefficients of the weight of each mode, L the band */
+  double *mode;        /* [K, (L + 1)^2] harmonic coefficients of the weights */
   unsigned char *lung; /* [N] */
   double *linear, *quadratic, *cubic;
-  /* [9] coefficients of the rest volume, owned by the caller; NULL if it is unknown */
+  /* [9] coefficients of the volume at rest, owned by the caller; NULL if it is unknown */
   const double *resting;
-  bool fields;           /* whether the metadata says that the fields are from another simulator */
-  size_t normals;        /* number Q of modes of normals; 0 unless set by fixture_add_normals */
+  bool fields;           /* whether the metadata names another simulator as the source */
+  size_t normals;        /* Q, set by fixture_add_normals */
   int16_t *normal;       /* [N, 3, Q] */
   double *normal_weight; /* [G, Q, (K + 1)(K + 2) / 2] */
 } fixture;
 
-/* Return zeroed memory; abort if there is none. */
+/* Return zeroed memory. Abort if the allocation fails. */
 __attribute__((returns_nonnull)) void *fixture_allocate(size_t count, size_t size);
 
 /* Return a pseudo-random number in [-1, 1); the caller keeps the state. */
 double fixture_random(uint64_t *state);
 
-/* Create lungs of about 10 cm radius with `vertices` / `lungs` vertices each, which are closed if
- * there are at least 5. Their fields are random, of about `amplitude` mm; `volume` adds volume
- * forms. */
+/* Create lungs of about 10 cm radius with `vertices` / `lungs` vertices each. A lung of at least 5
+ * vertices is closed. The displacement fields are random, of about `amplitude` mm. If `volume`, add
+ * volume forms. */
 fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs, bool vector,
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);
@@ -46,7 +46,7 @@ fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed);
 /* Add volume forms to a fixture created without them. */
 void fixture_add_forms(fixture *f);
 
-/* Add random modes of normals, which are not normals of the surface but test their evaluation. */
+/* Add random modes of normals, unrelated to the surface, to test the evaluation of modes. */
 void fixture_add_normals(fixture *f, size_t modes, uint64_t seed);
 
 /* Write the basis file, and assert that this succeeds. */
@@ -61,8 +61,8 @@ void fixture_deform(const fixture *f, const double *weights, const double *scale
 /* Return the volume of a lung at given positions, mL. */
 double fixture_volume(const fixture *f, size_t lung, const double *xyz);
 
-/* Make a temporary folder and return its path (malloc); remove the folder with its files and free
- * the path. */
+/* Make a temporary folder and return its path (malloc). fixture_folder_remove deletes the folder
+ * with its files, and frees the path. */
 char *fixture_folder(void);
 void fixture_folder_remove(char *folder);
 

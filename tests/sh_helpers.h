@@ -15,8 +15,7 @@ static inline double random_signed(uint64_t *seed) {
   return (double)(*seed >> 11) * 0x1p-52 - 1;
 }
 
-/* Draw a direction that is uniform on the sphere: its z and its longitude are uniform
- * (Archimedes). */
+/* Draw a direction uniformly from the sphere: z and longitude are uniform (Archimedes). */
 static inline void random_direction(uint64_t *seed, double direction[3]) {
   const double z = random_signed(seed);
   const double longitude = M_PI * random_signed(seed);

@@ -34,7 +34,7 @@
 void test_add(const char *name, CMUnitTestFunction test);
 void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
 
-/* Assert |value - expected| <= tolerance. On failure print both in double precision, where
+/* Assert |value - expected| <= tolerance. On failure print both in double precision;
  * assert_float_equal of cmocka 1.1.5 prints floats. */
 #define assert_close(value, expected, tolerance)                                                   \
   do {                                                                                             \
@@ -46,6 +46,16 @@ void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
     }                                                                                              \
   } while (0)
 
+/* Assert that the text contains the words. On failure print the words and the start of the text. */
+#define assert_says(text, words)                                                                   \
+  do {                                                                                             \
+    const char *text_ = (text);                                                                    \
+    const char *words_ = (words);                                                                  \
+    if (strstr(text_, words_) == NULL) {                                                           \
+      fail_msg("no \"%s\" in: %.4000s", words_, text_);                                            \
+    }                                                                                              \
+  } while (0)
+
 /* Write a text into a file. */
 static inline void test_write(const char *path, const char *text) {
   FILE *file = fopen(path, "wb");
@@ -54,7 +64,7 @@ static inline void test_write(const char *path, const char *text) {
   assert_int_equal(fclose(file), 0);
 }
 
-/* Return the content of a file with a NUL appended (malloc), and set its size without the NUL. */
+/* Return the content of a file (malloc) with a NUL appended. Set `size` to the size of the file. */
 static inline void *test_read(const char *path, size_t *size) {
   FILE *file = fopen(path, "rb");
   assert_non_null(file);

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Status strings, output files, threads and the comparison of endings. */
+/* Status strings, output files, threads, and endings of file names. */
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 
 #include "sh/base/output.h"
 #include "sh/base/parallel.h"
@@ -23,13 +22,13 @@ TEST(test_status_string_every_code_distinct) {
   }
 }
 
-TEST(test_status_string_outside_enumeration_not_null) {
+TEST(test_status_string_outside_enumeration_unknown) {
   assert_string_equal(supine_status_string(SUPINE_STATUS_COUNT), "unknown status");
   assert_string_equal(supine_status_string((supine_status)-1), "unknown status");
   assert_string_equal(supine_status_string((supine_status)1000), "unknown status");
 }
 
-TEST(test_error_set_long_message_cut) {
+TEST(test_error_set_long_message_truncated) {
   char text[2 * sizeof(((supine_error *)0)->message)];
   memset(text, 'x', sizeof text - 1);
   text[sizeof text - 1] = '\0';
@@ -40,7 +39,7 @@ TEST(test_error_set_long_message_cut) {
   assert_int_equal(supine_error_set(NULL, SUPINE_ERROR_READ, "none"), SUPINE_ERROR_READ);
 }
 
-TEST(test_text_ends_in_needs_text_before_ending) {
+TEST(test_text_ends_in_ending_alone_false) {
   assert_true(supine_text_ends_in("pairs.csv", ".csv"));
   assert_false(supine_text_ends_in("pairs.CSV", ".csv"));
   assert_false(supine_text_ends_in("pairs.csv.gz", ".csv"));
@@ -58,7 +57,7 @@ static void read_text(const char *path, char *text, size_t size) {
   (void)fclose(file);
 }
 
-TEST(test_output_commit_replaces_abandon_keeps) {
+TEST(test_output_commit_replaces_file_abandon_keeps_it) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   assert_non_null(mkdtemp(folder));
   char path[64];
@@ -81,21 +80,21 @@ TEST(test_output_commit_replaces_abandon_keeps) {
   assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left */
 }
 
-TEST(test_output_full_or_missing_target_reports_write_error) {
+TEST(test_output_full_disk_or_missing_folder_write_error) {
   supine_output output;
   supine_error error;
   assert_int_equal(supine_output_open("/nonexistent-folder/x", &output, &error),
                    SUPINE_ERROR_WRITE);
-  assert_non_null(strstr(error.message, "/nonexistent-folder/x"));
+  assert_says(error.message, "/nonexistent-folder/x");
   assert_int_equal(supine_output_open("/tmp", &output, &error), SUPINE_ERROR_WRITE);
   assert_int_equal(supine_output_open("/dev/full", &output, &error), SUPINE_OK);
   (void)fputs("lost", output.file);
   assert_int_equal(supine_output_commit(&output, &error), SUPINE_ERROR_WRITE);
-  assert_non_null(strstr(error.message, "/dev/full"));
+  assert_says(error.message, "/dev/full");
 }
 
-/* Whether open fails for unnamed files, as on file systems without O_TMPFILE. */
-static bool nameless_missing;
+/* If true, open fails for O_TMPFILE, which some file systems do not support. */
+static bool tmpfile_unsupported;
 
 int __real_open(const char *path, int flags, ...);
 int __wrap_open(const char *path, int flags, ...);
@@ -104,7 +103,7 @@ int __wrap_open(const char *path, int flags, ...) {
   va_start(list, flags);
   const unsigned mode = (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(list, unsigned) : 0;
   va_end(list);
-  if (nameless_missing && (flags & O_TMPFILE) == O_TMPFILE) {
+  if (tmpfile_unsupported && (flags & O_TMPFILE) == O_TMPFILE) {
     errno = EOPNOTSUPP;
     return -1;
   }
@@ -145,7 +144,7 @@ static void check_modes(void) {
   supine_output output;
   supine_error error;
   assert_int_equal(supine_output_open(path, &output, &error), SUPINE_ERROR_WRITE);
-  assert_non_null(strstr(error.message, "Permission denied"));
+  assert_says(error.message, "Permission denied");
   assert_int_equal(unlink(path), 0);
   assert_int_equal(rmdir(folder), 0);
 }
@@ -174,8 +173,8 @@ static void check_links(void) {
   assert_int_equal(rmdir(folder), 0);
 }
 
-/* Write several buffers to a small disk: the failure of any write is reported, and no file is
- * left. */
+/* Limit the size of files, to emulate a full disk. Whichever write fails, the failure is reported,
+ * the old file stays, and no temporary file is left. */
 static void check_full_disk(void) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   char path[64];
@@ -200,7 +199,7 @@ static void check_full_disk(void) {
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
     if (room < sizeof much) {
       assert_int_equal(status, SUPINE_ERROR_WRITE);
-      assert_non_null(strstr(error.message, "File too large"));
+      assert_says(error.message, "File too large");
       read_text(path, text, sizeof text);
       assert_string_equal(text, "old");
     } else {
@@ -211,26 +210,26 @@ static void check_full_disk(void) {
   assert_int_equal(rmdir(folder), 0);
 }
 
-TEST(test_output_keeps_modes_links_and_old_files) {
+TEST(test_output_any_file_system_keeps_modes_links_and_old_files) {
   for (int i = 0; i < 2; ++i) {
-    nameless_missing = i == 1;
+    tmpfile_unsupported = i == 1;
     check_modes();
     check_links();
     check_full_disk();
-    test_output_commit_replaces_abandon_keeps(state);
+    test_output_commit_replaces_file_abandon_keeps_it(state);
   }
-  nameless_missing = false;
+  tmpfile_unsupported = false;
 }
 
-TEST(test_output_abandon_all_removes_temporary_names) {
+TEST(test_output_abandon_all_removes_temporary_files) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   char path[64];
   assert_non_null(mkdtemp(folder));
   (void)snprintf(path, sizeof path, "%s/out", folder);
   supine_output output;
-  nameless_missing = true;
+  tmpfile_unsupported = true;
   assert_int_equal(supine_output_open(path, &output, NULL), SUPINE_OK);
-  nameless_missing = false;
+  tmpfile_unsupported = false;
   assert_int_equal(access(output.temporary, F_OK), 0);
   supine_output_abandon_all();
   assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left */
@@ -238,12 +237,12 @@ TEST(test_output_abandon_all_removes_temporary_names) {
   assert_int_equal(supine_output_try("/nonexistent-folder/x", NULL), SUPINE_ERROR_WRITE);
 }
 
-TEST(test_thread_count_bounded_and_nonsense_ignored) {
+TEST(test_thread_count_invalid_variable_ignored) {
   assert_int_equal(unsetenv("SUPINE_THREADS"), 0);
   const size_t own = supine_thread_count();
   static const struct {
     const char *text;
-    size_t count; /* expected number of threads; 0: the value is ignored */
+    size_t count; /* expected number of threads; 0 if the value is ignored */
   } cases[] = {{"1", 1},   {"7", 7},          {"255", 255}, {"256", 256}, {"257", 0},
                {"0", 0},   {"-1", 0},         {"2 x", 0},   {"", 0},      {"many", 0},
                {"1e2", 0}, {"4294967297", 0}, {"3.", 0},    {"0x10", 0}};

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Verify the checksums of basis files by an implementation from the description in supine/safetensors.h.
+"""Verify the checksums of basis files by an independent implementation of supine/safetensors.h.
 
     python3 test_checksum.py BASIS...
 
-XXH64 is implemented here from its specification, so that no package is needed."""
+XXH64 is implemented from its specification, so that no package is needed."""
 import json
 import struct
 import sys
@@ -68,7 +68,7 @@ def checksum(path):
     return f"xxh64:{total & MASK:016x}", metadata["checksum"]
 
 
-# Published values.
+# Published test values.
 assert xxh64(b"") == 0xEF46DB3751D8E999
 assert xxh64(b"a") == 0xD24EC4F1A98C6E5B
 assert xxh64(b"Nobody inspects the spammish repetition") == 0xFBCEA83C8A378BF1

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Run the cohort workflow on forty synthetic subjects, three of them with corrupt files:
 #
-#     test_cohort.sh PROGRAM COHORT [SNAKEMAKE'S OPTIONS]     --cores 2 by default; --slurm --jobs 2
+#     test_cohort.sh PROGRAM COHORT [OPTIONS OF SNAKEMAKE]
+#
+# The options are --cores 2 if none are given; on a cluster, give --slurm --jobs 2.
 set -u
 supine=$1
 cohort=$2

@@ -4,9 +4,9 @@
 #
 # Each FOLDER/*.txt is a session: lines "$ COMMAND", each followed by the output on both streams and by the
 # exit code if it is not 0. Sessions run in a folder with lungs.ply, a phantom of about 500 vertices, and
-# lungs.safetensors, its basis. In the sessions, the filter `rounded` cuts numbers that depend on the
-# processor (same_output.py lets their last digit differ by one), and sed masks times and residuals. To
-# accept the current output:
+# lungs.safetensors, its basis. In the sessions, the filter `rounded` rounds numbers that depend on the
+# processor, and sed masks times and residuals. same_output.py accepts a difference of one in the last digit
+# of a rounded number. To accept the current output:
 #
 #   SUPINE_GOLDEN_UPDATE=1 ctest --preset release -R command_output
 set -u
@@ -18,7 +18,7 @@ mkdir "$work/bin"
 ln -s "$program" "$work/bin/supine"
 cat >"$work/bin/rounded" <<'END'
 #!/bin/sh
-# rounded [DIGITS] [FILE]: round decimal numbers to DIGITS digits (default 4), and rounding errors to 0. Give fewer
+# rounded [DIGITS] [FILE]: round decimal numbers to DIGITS digits (default 4), and numbers below 1e-7 to 0. Give fewer
 # DIGITS if a number is halfway between two numbers of four digits.
 digits=4
 case ${1-} in [1-9]) digits=$1; shift ;; esac

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Comparison of orientations: distances by Gram matrices against sums over all vertices, and slabs
- * of height. */
-#include <float.h>
+/* Comparison of orientations: distances computed from Gram matrices equal sums over all vertices;
+ * slabs by height. */
 
 #include "test.h"
 
@@ -98,8 +97,7 @@ static pair random_pair(const made *m, uint64_t *state) {
   return p;
 }
 
-/* Return the distance of each vertex between two deformed surfaces in double precision, mm
- * (malloc). */
+/* Compute in double precision the distance of each vertex between two poses, mm (malloc). */
 static double *direct_distances(const made *m, const pair *p) {
   const size_t n = m->f->vertices;
   double *a = malloc(3 * n * sizeof *a);
@@ -141,17 +139,17 @@ static void check_rms(bool vector, size_t modes, size_t lungs) {
   unmake(&m);
 }
 
-TEST(test_rms_scalar_basis_equals_every_vertex) {
+TEST(test_compare_rms_scalar_basis_equals_sum_over_vertices) {
   check_rms(false, 16, 2);
   check_rms(false, 5, 3);
   check_rms(false, 1, 1);
 }
 
-TEST(test_rms_vector_basis_equals_every_vertex) {
+TEST(test_compare_rms_vector_basis_equals_sum_over_vertices) {
   check_rms(true, 9, 2);
 }
 
-TEST(test_rms_to_rest_equals_gain_zero) {
+TEST(test_compare_rms_without_second_pose_equals_gain_zero) {
   made m = make(501, 7, 3, 2, false, false);
   uint64_t random = 5;
   pair p = random_pair(&m, &random);
@@ -172,7 +170,7 @@ static int by_distance(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-TEST(test_statistics_random_pairs_equal_sorting) {
+TEST(test_compare_statistics_random_pairs_equal_sorted_distances) {
   made m = make(3001, 11, 3, 2, false, false);
   double *share = area_shares(m.f);
   float *distance = malloc(m.f->vertices * sizeof *distance);
@@ -219,7 +217,7 @@ TEST(test_statistics_random_pairs_equal_sorting) {
   unmake(&m);
 }
 
-TEST(test_energy_sums_to_mean_square_over_sphere) {
+TEST(test_compare_energy_all_bands_sum_to_mean_square) {
   enum { LATITUDES = 12, LONGITUDES = 25, BAND = 4 };
   made m = make(301, 6, BAND, 2, true, false);
   double energy[BAND + 1];
@@ -229,8 +227,8 @@ TEST(test_energy_sums_to_mean_square_over_sphere) {
     assert_true(energy[l] >= 0);
     total += energy[l];
   }
-  /* Quadrature on a grid of directions: equispaced longitudes, exact to band 2 BAND, and Fejer's
-   * first rule in latitude, exact to degree LATITUDES - 1 >= 2 BAND in z. */
+  /* Average over a grid of directions. Equispaced longitudes are exact to band 2 BAND. Fejer's
+   * first rule in latitude is exact to degree LATITUDES - 1 >= 2 BAND in z. */
   double mean = 0;
   for (int j = 0; j < LATITUDES; ++j) {
     const double turn = 3.14159265358979323846 * (2 * j + 1) / (2.0 * LATITUDES);
@@ -253,7 +251,7 @@ TEST(test_energy_sums_to_mean_square_over_sphere) {
   unmake(&m);
 }
 
-TEST(test_create_surface_without_area_refused) {
+TEST(test_compare_create_surface_without_area_refused) {
   fixture *f = fixture_create(50, 3, 2, 1, false, false, 3, 9);
   memset(f->vertex, 0, 3 * f->vertices * sizeof *f->vertex);
   size_t size = 0;
@@ -270,7 +268,7 @@ TEST(test_create_surface_without_area_refused) {
   fixture_destroy(f);
 }
 
-/* Return x + M x + shift for each vertex x (malloc). */
+/* Return x + matrix x + shift for each vertex x (malloc). */
 static float *moved(const fixture *f, const double matrix[3][3], const double shift[3]) {
   float *xyz = malloc(3 * f->vertices * sizeof *xyz);
   assert_non_null(xyz);
@@ -287,12 +285,12 @@ static float *moved(const fixture *f, const double matrix[3][3], const double sh
 
 enum { SLABS = 10 };
 
-TEST(test_slabs_reference_sum_to_volume_of_lung) {
+TEST(test_slabs_reference_volumes_sum_to_lung_volume) {
   made m = make(902, 4, 2, 2, false, true);
-  double *rest = malloc(3 * m.f->vertices * sizeof *rest);
-  assert_non_null(rest);
+  double *reference = malloc(3 * m.f->vertices * sizeof *reference);
+  assert_non_null(reference);
   for (size_t i = 0; i < 3 * m.f->vertices; ++i) {
-    rest[i] = (double)m.f->vertex[i];
+    reference[i] = (double)m.f->vertex[i];
   }
   uint64_t random = 12;
   for (int repeat = 0; repeat < 20; ++repeat) {
@@ -308,17 +306,17 @@ TEST(test_slabs_reference_sum_to_volume_of_lung) {
         assert_true(slabs[lung * SLABS + s].volume >= -1e-9);
         volume += slabs[lung * SLABS + s].volume;
       }
-      const double whole = fixture_volume(m.f, lung, rest);
+      const double whole = fixture_volume(m.f, lung, reference);
       assert_close(volume, whole, 1e-9 * whole);
     }
   }
-  free(rest);
+  free(reference);
   unmake(&m);
 }
 
-/* Slabs across the axis of a bipyramid of half height h: the part within z of a tip has (z/h)^3 of
- * half the volume, if all corners of the ring are at one height. */
-TEST(test_slabs_bipyramid_follow_cube_of_height) {
+/* Slabs across the axis of a bipyramid with a level ring of corners. The part within a distance z
+ * of a tip has (z / h)^3 of the volume of one pyramid, whose height is h. */
+TEST(test_slabs_bipyramid_volumes_grow_with_cube_of_height) {
   fixture *f = fixture_create(602, 3, 2, 1, false, true, 2, 8);
   for (size_t i = 0; i < 600; ++i) {
     f->vertex[3 * i + 2] = 0;
@@ -346,8 +344,8 @@ TEST(test_slabs_bipyramid_follow_cube_of_height) {
   fixture_destroy(f);
 }
 
-/* The displacement x -> x + M x + shift multiplies the volume of every slab by det(1 + M). */
-TEST(test_slabs_linear_displacement_gains_its_determinant) {
+/* The displacement x -> x + M x + shift multiplies the volume of every slab by det(I + M). */
+TEST(test_slabs_affine_displacement_gains_equal_determinant) {
   static const double matrices[][3][3] = {
       {{0}},                                        /* only the shift */
       {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* an expansion */
@@ -370,7 +368,7 @@ TEST(test_slabs_linear_displacement_gains_its_determinant) {
       double g[3];
       random_direction(&random, g);
       assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
-      /* The tolerance, mL, is that of float positions; a slab has about 100 mL. */
+      /* The tolerance, mL, covers the rounding of float positions; a slab has about 100 mL. */
       for (size_t s = 0; s < 2 * SLABS; ++s) {
         assert_close(slabs[s].gain, (determinant - 1) * slabs[s].volume, 1e-3);
       }
@@ -380,7 +378,7 @@ TEST(test_slabs_linear_displacement_gains_its_determinant) {
   unmake(&m);
 }
 
-TEST(test_slabs_any_state_sum_to_exact_volume) {
+TEST(test_slabs_random_gravity_gains_sum_to_exact_volume) {
   made m = make(1203, 7, 3, 2, false, true);
   float *xyz = malloc(3 * m.f->vertices * sizeof *xyz);
   assert_non_null(xyz);
@@ -400,7 +398,7 @@ TEST(test_slabs_any_state_sum_to_exact_volume) {
         gain += slabs[lung * SLABS + s].gain;
       }
       assert_close(gain, posed_lung_volume(m.basis, lung, weights, scales[lung]),
-                   1e-3); /* mL, from float positions */
+                   1e-3); /* tolerance in mL, for float positions */
     }
   }
   free(xyz);

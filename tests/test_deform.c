@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The evaluator in every storage and on every code path, against double precision. */
+/* Compare positions, for every storage and instruction set, with double precision. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -52,8 +52,8 @@ static void random_frame(const supine_basis *basis, uint64_t *random, double *we
   }
 }
 
-/* Return the largest distance between float positions and exact positions of vertices begin <= i <
- * end, mm. */
+/* Return the largest distance, mm, between positions in xyz and in `exact` of the vertices begin <=
+ * i < end. The first vertex in xyz is `begin`. */
 static double farthest(const float *xyz, const double *exact, size_t begin, size_t end) {
   double top = 0;
   for (size_t i = begin; i < end; ++i) {
@@ -68,7 +68,7 @@ static double farthest(const float *xyz, const double *exact, size_t begin, size
   return sqrt(top);
 }
 
-/* Assert that the error of every storage and code path is within its stated bound. */
+/* Assert for every storage and instruction set that the error is within its stated bound. */
 static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool vector,
                             uint64_t seed) {
   opened o = made(fixture_create(vertices, modes, 3, lungs, vector, false, 11, seed));
@@ -124,7 +124,7 @@ TEST(test_deform_every_mode_count_within_stated_error) {
 }
 
 /* The stated bound is at most 30 times the largest error of many frames. */
-TEST(test_basis_error_many_frames_bound_nearly_reached) {
+TEST(test_basis_error_many_frames_bound_at_most_30_times_error) {
   opened o = made(fixture_create(3000, 16, 3, 2, false, false, 11, 5));
   double *exact = fixture_allocate(3 * 3000, sizeof *exact);
   float *xyz = fixture_allocate(3 * 3000, sizeof *xyz);
@@ -151,7 +151,7 @@ TEST(test_basis_error_many_frames_bound_nearly_reached) {
   drop(&o);
 }
 
-/* The stated error does not depend on the axis that the weight of a mode follows. */
+/* The stated error does not depend on which coordinate of gravity sets the weight of a mode. */
 TEST(test_storage_error_mode_along_any_axis_same) {
   double error[3];
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -172,7 +172,7 @@ TEST(test_storage_error_mode_along_any_axis_same) {
   assert_true(fabs(error[2] - error[0]) <= 1e-9 * error[0]);
 }
 
-TEST(test_storage_error_orders_storages) {
+TEST(test_storage_error_exact_below_int16_below_mixed) {
   opened o = made(fixture_create(500, 16, 3, 2, false, true, 11, 5));
   double error[SUPINE_STORAGE_COUNT] = {0};
   double bytes[SUPINE_STORAGE_COUNT] = {0};
@@ -187,18 +187,19 @@ TEST(test_storage_error_orders_storages) {
     supine_basis_close(basis);
   }
   assert_true(error[SUPINE_STORAGE_EXACT] < error[SUPINE_STORAGE_INT16]);
-  /* Bytes per vertex of 16 coefficients, the position and the direction. */
+  /* 4 bytes for each of 16 coefficients, 12 for the position and 12 for the direction */
   assert_true(bytes[SUPINE_STORAGE_EXACT] == 88);
   /* 2 bytes for each coefficient, 8 for the position and 8 for the direction */
   assert_true(bytes[SUPINE_STORAGE_INT16] == 48);
   assert_true(error[SUPINE_STORAGE_INT16] < error[SUPINE_STORAGE_MIXED]);
-  /* Seven 4-byte words: five of two coefficients, two of three. Then 8 + 8 bytes. */
+  /* seven 4-byte words (five with two coefficients, two with three), 8 bytes for the position and 8
+   * for the direction */
   assert_true(bytes[SUPINE_STORAGE_MIXED] == 44);
   drop(&o);
 }
 
-/* The mixed storage is chosen if the last modes have small amplitudes, as those of lungs have. */
-TEST(test_storage_auto_mixed_if_precise_enough) {
+/* The mixed storage is chosen if the last modes have small amplitudes, like those of real lungs. */
+TEST(test_storage_auto_small_last_modes_chooses_mixed) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < (size_t)500 * 16; ++i) {
     f->coefficient[i] *= i % 16 < 10 ? 1 : 0.02F;
@@ -212,7 +213,7 @@ TEST(test_storage_auto_mixed_if_precise_enough) {
 }
 
 /* Numbers just below 2^30 give finite bounds; a file with 2^30 is refused. */
-TEST(test_storage_largest_numbers_have_finite_bounds) {
+TEST(test_storage_error_largest_numbers_finite) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < 3; ++i) {
     f->direction[i] = 0x1.fffffep29F;
@@ -232,7 +233,7 @@ TEST(test_storage_largest_numbers_have_finite_bounds) {
   drop(&o);
 }
 
-/* Assert that the automatic choice states the same error as its storage chosen by hand. */
+/* Assert that an explicit request for the storage chosen automatically states the same error. */
 static void check_stated_error(const opened *o, const supine_basis *chosen) {
   const supine_basis_info *info = supine_basis_get_info(chosen);
   supine_basis *basis = open_as(o, info->storage, SUPINE_SIMD_AUTO);
@@ -240,7 +241,7 @@ static void check_stated_error(const opened *o, const supine_basis *chosen) {
   supine_basis_close(basis);
 }
 
-TEST(test_storage_auto_exact_if_int16_imprecise) {
+TEST(test_storage_auto_distant_vertex_chooses_exact) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   opened o = made(f);
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
@@ -249,7 +250,7 @@ TEST(test_storage_auto_exact_if_int16_imprecise) {
   check_stated_error(&o, basis);
   supine_basis_close(basis);
   free(o.bytes);
-  f->vertex[0] = 1e6F; /* a vertex 1 km away makes rest positions coarse */
+  f->vertex[0] = 1e6F; /* a vertex 1 km away makes stored positions coarse */
   o = made(f);
   basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_EXACT);
@@ -273,8 +274,8 @@ TEST(test_open_bad_options_refused) {
   drop(&o);
 }
 
-/* Assert that ranges at any alignment get the bits of the whole, and that nothing else is
- * written. */
+/* Assert that any range of vertices, stored at any alignment, has the same bits as in one call for
+ * all vertices, and that nothing beyond the range is written. */
 static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_simd simd,
                          int trials) {
   opened o = made(fixture_create(vertices, modes, 1, lungs, false, false, 11, 8));
@@ -324,7 +325,7 @@ TEST(test_deform_range_any_part_same_bits) {
   }
 }
 
-TEST(test_deform_range_past_cache_same_bits) {
+TEST(test_deform_range_larger_than_cache_same_bits) {
   for (int simd = 1; simd < SUPINE_SIMD_COUNT; ++simd) {
     check_ranges(300007, 16, 2, (supine_simd)simd, 18);
   }
@@ -357,7 +358,7 @@ TEST(test_displace_range_added_to_reference_equals_deform) {
   }
 }
 
-TEST(test_step_many_steps_reach_volume) {
+TEST(test_step_many_steps_reach_final_positions) {
   opened o = made(fixture_create(100, 7, 2, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   uint64_t random = 5;
@@ -376,7 +377,7 @@ TEST(test_step_many_steps_reach_volume) {
     supine_step(100, step, xyz);
   }
   fixture_deform(o.f, weights, scales, exact);
-  /* Half a unit of rounding per step, along three axes. */
+  /* Each step rounds each coordinate by at most 2^-24 of 512 mm; 1.8 is more than sqrt(3). */
   const double drift = STEPS * 0x1p-24 * 512 * 1.8;
   assert_true(farthest(xyz, exact, 0, 100) <=
               supine_basis_error(basis, POSED(basis, weights, scales)) + drift);
@@ -428,8 +429,8 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
 TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 64, 0, 700);
   check_batch(700, 16, false, 1, 3, 691);
-  check_batch(24000, 16, false, 64, 0, 24000); /* larger than the cache, in whole cache lines */
-  check_batch(23999, 16, false, 64, 1, 23998); /* with shared cache lines at the ends */
+  check_batch(24000, 16, false, 64, 0, 24000); /* output exceeds the cache; whole cache lines */
+  check_batch(23999, 16, false, 64, 1, 23998); /* orientations share cache lines */
   check_batch(90, 16, false, 300, 0, 90);
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);
@@ -438,9 +439,8 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(90, 256, true, 3, 1, 90);
 }
 
-/* Unused slots of the last vec4 of weights become 0, whatever they held: five modes need two
- * vec4s. */
-TEST(test_gl_pack_unused_slots_zero) {
+/* Five modes need two vec4s of weights. Their three unused slots become 0, whatever they held. */
+TEST(test_gl_weights_unused_slots_zero) {
   enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
   supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO);

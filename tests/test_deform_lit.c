@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Normals by modes, against their formula in double precision. */
+/* Normals computed from modes equal their formula in double precision. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -10,11 +10,11 @@
 
 enum { VERTICES = 211, MODES = 5, BATCH = 3 };
 
-/* Bound of rounding errors of a sum of up to 66 products and a root. */
+/* Bound on the rounding error of a sum of up to 66 products and of a square root. */
 static const double rounding = 66 * 0x1p-23;
 
-/* Return the packing error of a mode, in counts of the file: half a step of 13, 10 or 9 bits in the
- * first, second or last third of the modes. */
+/* Return the error from packing the numbers of a mode, in counts of the file. It is half a step.
+ * The first third of the modes is packed in 13 bits, the second in 10 and the last in 9. */
 static double packed_error(size_t mode, size_t modes) {
   static const double bits[] = {13, 10, 9};
   const double limit = 256.0 / 255 * INT16_MAX;
@@ -35,7 +35,7 @@ static opened open_lit(size_t normals, supine_simd simd) {
   uint64_t random = 17;
   if (normals > 0) {
     fixture_add_normals(o.f, normals, 5);
-    /* Vertex 40 has no triangles, so its normal is 0. */
+    /* Vertex 40 has the normal 0, like a vertex without triangles. */
     memset(o.f->normal + 3 * normals * 40, 0, 3 * normals * sizeof *o.f->normal);
   }
   o.bytes = fixture_bytes(o.f, &size);
@@ -58,8 +58,8 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Compute the weights v [Q] of the modes of normals of a lung: quadratic forms of the weights w and
- * the gain s. */
+/* Compute the weights v [Q] of a lung's modes of normals. They are quadratic forms of s w: the gain
+ * s times the weights w of the modes of displacement. */
 static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
   const size_t terms = (MODES + 1) * (MODES + 2) / 2;
   for (size_t j = 0; j < f->normals; ++j) {
@@ -78,7 +78,7 @@ static void expected_weights(const fixture *f, size_t lung, const double *w, dou
   }
 }
 
-/* Compute the normal n of vertex i; return the bound of its error along each axis. */
+/* Compute the normal n of vertex i. Return a bound on its error along each axis. */
 static double expected_normal(const fixture *f, size_t i, const double *w, const double *s,
                               double *n) {
   double off = 0;
@@ -97,7 +97,7 @@ static double expected_normal(const fixture *f, size_t i, const double *w, const
   for (size_t axis = 0; axis < 3; ++axis) {
     n[axis] = length > 0 ? n[axis] / length : 0;
   }
-  /* because |a / |a| - b / |b|| <= 2 |a - b| / |a| */
+  /* The unit vectors along a and b differ by at most 2 |a - b| / |a|. */
   return length > 0 ? 2 * sqrt(3.0) * off / length + rounding : 0;
 }
 
@@ -132,7 +132,7 @@ static void check_formula(size_t normals, supine_simd simd) {
   drop(&o);
 }
 
-TEST(test_lit_every_code_path_equals_formula) {
+TEST(test_deform_lit_every_instruction_set_equals_formula) {
   static const size_t numbers[] = {1, 2, 3, 6, 8, 9, 12, 20, 64};
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
@@ -141,7 +141,7 @@ TEST(test_lit_every_code_path_equals_formula) {
   }
 }
 
-TEST(test_lit_range_same_bits_as_whole) {
+TEST(test_deform_lit_range_same_bits_as_whole) {
   for (int simd = SUPINE_SIMD_AUTO; simd < SUPINE_SIMD_COUNT; ++simd) {
     opened o = open_lit(8, (supine_simd)simd);
     float whole[3 * VERTICES];
@@ -162,7 +162,7 @@ TEST(test_lit_range_same_bits_as_whole) {
   }
 }
 
-TEST(test_lit_without_normals_refused) {
+TEST(test_deform_lit_without_normals_refused) {
   float xyz[3 * VERTICES];
   opened o = open_lit(0, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_deform_lit(o.basis, POSED(o.basis, o.weights, o.scales), xyz, xyz),
@@ -178,7 +178,7 @@ TEST(test_lit_without_normals_refused) {
   assert_int_equal(supine_deform_lit(basis, POSED(basis, o.weights, o.scales), xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
   supine_basis_close(basis);
-  /* A program built before this option existed passes a smaller size, and no bytes beyond it are
+  /* A program built before this option existed passes a smaller size. No bytes beyond that size are
    * read. */
   options.size = offsetof(supine_basis_options, without_normals);
   assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);

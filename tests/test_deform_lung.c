@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A real lung with 16 harmonics, in every storage and instruction set, against double precision. */
+/* The positions of a real lung with 16 harmonics are within the stated error, in every storage and
+ * instruction set. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -8,7 +9,7 @@
 
 #include "lungs_helpers.h"
 
-/* Compute the positions of a pose in double precision from the numbers of the file. */
+/* Compute the positions of a pose in double precision from the numbers in the file. */
 static void deform_exactly(const supine_basis_info *info, const supine_pose *pose, double *xyz) {
   for (size_t i = 0; i < info->vertex_count; ++i) {
     double amount = 0.0;
@@ -66,7 +67,7 @@ TEST(test_deform_real_lung_every_path_within_stated_error) {
         top = fmax(top, sqrt(x * x + y * y + z * z));
       }
       assert_true(top <= supine_basis_error(bases[b], &pose));
-      assert_true(b > 0 || top <= 0.005); /* the default storage */
+      assert_true(b > 0 || top <= 0.005); /* bases[0] has the default storage */
     }
   }
   assert_int_equal(chosen->storage, SUPINE_STORAGE_INT16);

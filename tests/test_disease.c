@@ -4,8 +4,6 @@
 
 #include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
-#include "precompute/physics/volume_forms.h"
-#include "precompute/precompute.h"
 #include "test.h"
 #include <supine/volume.h>
 
@@ -16,7 +14,8 @@ static const double supine[3] = {0.0, 1.0, 0.0};
 
 static supine_model model; /* model of the current test */
 
-/* Return factors of 1 for lesions to multiply (malloc), and make the model use them. */
+/* Return a factor of 1 for each vertex (malloc), and make the model use these factors. Lesions
+ * added later multiply them. */
 static double *no_lesions(const supine_lungs *lungs) {
   double *factors = malloc(lungs->mesh.vertex_count * sizeof *factors);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -57,7 +56,7 @@ static const double *side_of(const supine_lungs *lungs) {
   return lungs->mesh.vertices + 3 * found;
 }
 
-/* Least and greatest ratio of the displacement with a lesion to that without. */
+/* Smallest and largest ratio of the displacement with a lesion to the displacement without it. */
 typedef struct change {
   double inside[2]; /* within half the radius of the lesion */
   double far[2];    /* more than 50 mm from the edge of the lesion */
@@ -68,8 +67,8 @@ static void widen(double range[2], double value) {
   range[1] = fmax(range[1], value);
 }
 
-/* Compare a breath with the lesion to one without. Both breaths have `volume` mL;
- * if `volume` is 0, both have a scale of 1. */
+/* Compare a breath with the lesion to a breath without it. Both have `volume` mL; if `volume` is 0,
+ * both have a scale of 1. */
 static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
   double *factors = no_lesions(lungs);
@@ -108,16 +107,17 @@ static void check_lesions(const supine_lungs *lungs) {
       const supine_lesion lesion = {{side[0] - 8.0, side[1], side[2]}, 25.0, factors[f]};
       const change scaled = change_by(lungs, &lesion, 0.0);
       const change breathed = change_by(lungs, &lesion, 500.0);
-      printf("reach %2g mm, factor %2g: displacement with the lesion over that without: inside "
-             "%.3f to %.3f; 50 mm away %.6f to %.6f at one scale, "
-             "%.6f to %.6f at 500 mL\n",
-             model.reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0],
-             scaled.far[1], breathed.far[0], breathed.far[1]);
+      printf(
+          "reach %2g mm, factor %2g: displacement with the lesion divided by displacement without "
+          "it: inside %.3f to %.3f; 50 mm away %.6f to %.6f at the same scale, "
+          "%.6f to %.6f at 500 mL\n",
+          model.reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0], scaled.far[1],
+          breathed.far[0], breathed.far[1]);
       assert_true(scaled.inside[1] < 0.9);
       assert_true(breathed.inside[1] < 0.9);
       assert_true(scaled.far[0] > 0.99 && scaled.far[1] < 1.01);
-      /* At a given volume, all other regions move more by one common factor, which replaces the
-       * volume that the lesion does not gain. */
+      /* At a given volume, all tissue far from the lesion moves more, by one factor, to make up for
+       * the volume that the lesion does not gain. */
       assert_close(breathed.far[1] / breathed.far[0], scaled.far[1] / scaled.far[0], 1e-9);
       const supine_lesion small = {{side[0] - 8.0, side[1], side[2]}, 18.0, factors[f]};
       const change by_small = change_by(lungs, &small, 500.0);
@@ -132,7 +132,7 @@ static void check_lesions(const supine_lungs *lungs) {
   model.reach = 0.0;
 }
 
-TEST(test_lesion_real_lungs_changes_only_its_region) {
+TEST(test_lesion_in_real_lungs_changes_only_its_region) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = {0};
   if (!helper_real_lungs(real_names, 2, SUPINE_AXES_AUTO, &lungs)) {
@@ -142,8 +142,8 @@ TEST(test_lesion_real_lungs_changes_only_its_region) {
   supine_lungs_free(&lungs);
 }
 
-/* A large lesion does not change the other lung, because E is scaled to geometric mean 1 without
- * it. */
+/* A large lesion does not change the other lung, because the scaling of the stiffness E to
+ * geometric mean 1 ignores lesions. */
 TEST(test_lesion_large_other_lung_unchanged) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
@@ -164,7 +164,7 @@ TEST(test_lesion_large_other_lung_unchanged) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lesion_factor_one_same_bits) {
+TEST(test_lesion_factor_one_changes_nothing) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
@@ -181,7 +181,7 @@ TEST(test_lesion_factor_one_same_bits) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lesion_any_distance_has_documented_profile) {
+TEST(test_lesion_factors_any_distance_follow_documented_profile) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   const double *centre = side_of(&lungs);
@@ -189,7 +189,7 @@ TEST(test_lesion_any_distance_has_documented_profile) {
   double *factors = no_lesions(&lungs);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL),
-                   SUPINE_OK); /* the factors of lesions are multiplied */
+                   SUPINE_OK); /* a second lesion multiplies the factors */
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
@@ -211,7 +211,7 @@ TEST(test_lesion_any_distance_has_documented_profile) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lesion_outside_changes_nothing) {
+TEST(test_lesion_outside_lungs_changes_nothing) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   supine_solution healthy = solve(&lungs, supine);
@@ -240,7 +240,7 @@ TEST(test_lesion_bad_numbers_refused) {
     double *factors = NULL; /* bad numbers are refused before the factors are read */
     assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "lesion at"));
+    assert_says(error.message, "lesion at");
   }
   supine_lungs_free(&lungs);
 }
@@ -253,28 +253,28 @@ static double volume_of(const supine_lungs *lungs, size_t lung, double *vertices
   return 1e-3 * supine_mesh_volume(&part);
 }
 
-TEST(test_collapse_any_direction_rest_and_breath_scaled) {
+TEST(test_collapse_any_direction_volume_and_breath_scaled) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   static const double directions[][3] = {{0, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0.48, -0.6, 0.64}};
   const double share = 0.3;
   const double scale = 1.7;
   supine_lungs lungs = lumps();
   const size_t n = lungs.mesh.vertex_count;
-  double *rest = malloc(3 * n * sizeof *rest);
+  double *collapsed = malloc(3 * n * sizeof *collapsed);
   double *moved = malloc(3 * n * sizeof *moved);
   for (size_t d = 0; d < 4; ++d) {
-    double rests[2][2];
+    double volumes[2][2];
     double gains[2][2];
     double cubic[2];
     for (int ill = 0; ill < 2; ++ill) {
       model.share[0] = ill == 1 ? share : 1.0;
       supine_solution solution = solve(&lungs, directions[d]);
-      supine_tissue_collapse(&lungs, model.share, rest);
-      const supine_mesh shape = {n, rest, 0, NULL};
+      supine_tissue_collapse(&lungs, model.share, collapsed);
+      const supine_mesh shape = {n, collapsed, 0, NULL};
       supine_physics_solution_apply(&solution, &shape, scale, moved);
       for (size_t lung = 0; lung < 2; ++lung) {
-        rests[ill][lung] = volume_of(&lungs, lung, rest);
-        gains[ill][lung] = volume_of(&lungs, lung, moved) - rests[ill][lung];
+        volumes[ill][lung] = volume_of(&lungs, lung, collapsed);
+        gains[ill][lung] = volume_of(&lungs, lung, moved) - volumes[ill][lung];
       }
       cubic[ill] =
           scale * (solution.cubic[0] + scale * (solution.cubic[1] + scale * solution.cubic[2]));
@@ -282,39 +282,39 @@ TEST(test_collapse_any_direction_rest_and_breath_scaled) {
     }
     for (size_t lung = 0; lung < 2; ++lung) {
       const double wanted = lung == 0 ? share : 1.0;
-      assert_true(fabs(rests[1][lung] - wanted * rests[0][lung]) < 1e-12 * rests[0][lung]);
-      assert_true(fabs(gains[1][lung] - wanted * gains[0][lung]) < 1e-10 * rests[0][lung]);
+      assert_true(fabs(volumes[1][lung] - wanted * volumes[0][lung]) < 1e-12 * volumes[0][lung]);
+      assert_true(fabs(gains[1][lung] - wanted * gains[0][lung]) < 1e-10 * volumes[0][lung]);
     }
     assert_true(gains[0][0] > 1.0);
-    assert_true(fabs(cubic[1] - gains[1][0] - gains[1][1]) < 1e-9 * rests[0][0]);
+    assert_true(fabs(cubic[1] - gains[1][0] - gains[1][1]) < 1e-9 * volumes[0][0]);
   }
-  free(rest);
+  free(collapsed);
   free(moved);
   supine_lungs_free(&lungs);
 }
 
-/* The fixed point of a collapse is the mean of the vertices in the quarter of the lung's width
- * nearest the midline. */
+/* A collapsed lung has shrunk towards a fixed point: the mean of its vertices in the quarter of its
+ * width nearest the midline. */
 TEST(test_collapse_fixed_point_at_hilum) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
   const size_t n = lungs.mesh.vertex_count;
   const double *p = lungs.mesh.vertices;
   const double share[2] = {0.3, 0.6};
-  double *rest = malloc(3 * n * sizeof *rest);
-  supine_tissue_collapse(&lungs, share, rest);
+  double *collapsed = malloc(3 * n * sizeof *collapsed);
+  supine_tissue_collapse(&lungs, share, collapsed);
   for (size_t lung = 0; lung < 2; ++lung) {
-    const double sign = lung == 0 ? 1.0 : -1.0; /* sign of x towards the outside */
+    const double outwards = lung == 0 ? 1.0 : -1.0;
     double inner = INFINITY;
     double outer = -INFINITY;
     for (size_t i = lungs.lung_begin[lung]; i < lungs.lung_begin[lung + 1]; ++i) {
-      inner = fmin(inner, sign * p[3 * i]);
-      outer = fmax(outer, sign * p[3 * i]);
+      inner = fmin(inner, outwards * p[3 * i]);
+      outer = fmax(outer, outwards * p[3 * i]);
     }
     double mean[3] = {0.0, 0.0, 0.0};
     double count = 0.0;
     for (size_t i = lungs.lung_begin[lung]; i < lungs.lung_begin[lung + 1]; ++i) {
-      if (sign * p[3 * i] <= inner + 0.25 * (outer - inner)) {
+      if (outwards * p[3 * i] <= inner + 0.25 * (outer - inner)) {
         count += 1.0;
         for (size_t k = 0; k < 3; ++k) {
           mean[k] += p[3 * i + k];
@@ -325,11 +325,11 @@ TEST(test_collapse_fixed_point_at_hilum) {
     const size_t any = lungs.lung_begin[lung] + 5;
     assert_true(count > 20.0);
     for (size_t k = 0; k < 3; ++k) {
-      const double fixed = (rest[3 * any + k] - length * p[3 * any + k]) / (1.0 - length);
+      const double fixed = (collapsed[3 * any + k] - length * p[3 * any + k]) / (1.0 - length);
       assert_close(fixed, mean[k] / count, 1e-9);
     }
   }
-  free(rest);
+  free(collapsed);
   supine_lungs_free(&lungs);
 }
 
@@ -340,20 +340,21 @@ TEST(test_collapse_real_lung_shrinks_towards_midline) {
     skip();
   }
   model.share[1] = 0.25;
-  double *rest = malloc(3 * lungs.mesh.vertex_count * sizeof *rest);
-  supine_tissue_collapse(&lungs, model.share, rest);
+  double *collapsed = malloc(3 * lungs.mesh.vertex_count * sizeof *collapsed);
+  supine_tissue_collapse(&lungs, model.share, collapsed);
   double outer[2] = {0.0, 0.0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     for (size_t k = 0; k < 3; ++k) {
       if (i < lungs.lung_begin[1]) {
-        assert_true(rest[3 * i + k] == lungs.mesh.vertices[3 * i + k]);
+        assert_true(collapsed[3 * i + k] == lungs.mesh.vertices[3 * i + k]);
       }
-      assert_true(rest[3 * i + k] >= lungs.minimum[k] && rest[3 * i + k] <= lungs.maximum[k]);
+      assert_true(collapsed[3 * i + k] >= lungs.minimum[k] &&
+                  collapsed[3 * i + k] <= lungs.maximum[k]);
     }
     outer[0] = fmin(outer[0], lungs.mesh.vertices[3 * i]);
-    outer[1] = fmin(outer[1], rest[3 * i]);
+    outer[1] = fmin(outer[1], collapsed[3 * i]);
   }
   assert_true(outer[1] > outer[0] + 20.0); /* mm, from the chest wall to the collapsed lung */
-  free(rest);
+  free(collapsed);
   supine_lungs_free(&lungs);
 }

@@ -7,13 +7,10 @@
 #include <supine/sh.h>
 
 #include <export.h>
-#include <targets.h>
 
 #include "export_helpers.h"
 #include "program/export/targets.h"
 #include "sh/base/vec3.h"
-
-#include "tests/poses.h"
 
 enum { TARGETS = 8 };
 
@@ -47,8 +44,8 @@ static uint32_t word(const unsigned char *at) {
   return value;
 }
 
-/* Read a GLB file: return its JSON, and set `bytes` to the file (malloc) and `numbers` to its
- * binary chunk. */
+/* Read the GLB file `out` and return its JSON. Set `bytes` to the file (malloc) and `numbers` to
+ * its binary chunk. */
 static json_t *read_glb(unsigned char **bytes, const unsigned char **numbers) {
   size_t size = 0;
   *bytes = test_read(out, &size);
@@ -74,8 +71,8 @@ static size_t number(const json_t *object, const char *key) {
   return (size_t)json_integer_value(json_object_get(object, key));
 }
 
-/* Return component `axis` of element i of an accessor; assert that it is within the accessor's
- * bounds. */
+/* Return coordinate `axis` of element i of an accessor. Assert that it is within the accessor's
+ * stated range. */
 static double component(const json_t *root, const unsigned char *numbers, size_t accessor, size_t i,
                         size_t axis) {
   const json_t *a = json_array_get(json_object_get(root, "accessors"), accessor);
@@ -102,8 +99,8 @@ static double real(const json_t *object, const char *key, size_t index) {
   return json_number_value(child(object, key, index));
 }
 
-/* Assert that morphing with weights from the extras gives the positions of the library. Each lung
- * has a gain s and a gain t along the bend. */
+/* Assert that morphing with the weights that `extras` describe gives the positions of the library.
+ * Each lung has a gain s, and a gain t for the targets of the bend. */
 static void check_pose(const supine_pose *given, const double s[2], const double t[2]) {
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -143,8 +140,8 @@ static void check_pose(const supine_pose *given, const double s[2], const double
   free(xyz);
 }
 
-/* Targets for the bend and gains for each lung give the positions of the library. */
-TEST(test_glb_bent_basis_targets_give_positions_of_library) {
+/* With targets for the bend and gains for each lung, morphing gives the library's positions. */
+TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain"), 0);
   export_source source = {0};
   supine_pose pose;
@@ -164,9 +161,9 @@ TEST(test_glb_bent_basis_targets_give_positions_of_library) {
   supine_export_source_close(&source);
 }
 
-/* Weights are between 0 and 1 in any direction. They may exceed the extremes of the sampled
- * directions, so a fiftieth of the range is left free at either end. */
-TEST(test_glb_weights_any_direction_within_range) {
+/* Weights are between 0 and 1 for any direction of gravity. Their range is that of sampled
+ * directions, widened at each end by a fiftieth, because other directions may exceed it. */
+TEST(test_glb_weights_any_direction_between_0_and_1) {
   enum { TRIED = 4096 };
   export_source source = {0};
   export_targets *targets = fixture_allocate(1, sizeof *targets);
@@ -199,8 +196,8 @@ TEST(test_glb_weights_any_direction_within_range) {
   supine_export_source_close(&source);
 }
 
-/* Compressed arrays fill the file without gaps, and state the size to which they decode. */
-TEST(test_glb_compressed_views_fill_file) {
+/* Compressed arrays fill the file without gaps, and state their decoded size. */
+TEST(test_glb_compressed_views_fill_file_without_gaps) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -227,7 +224,7 @@ TEST(test_glb_compressed_views_fill_file) {
 
 TEST(test_glb_postures_one_animation_each) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--animate"), 0);
-  assert_non_null(strstr(text, "and animations"));
+  assert_says(text, "and animations");
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
   json_t *root = read_glb(&bytes, &numbers);
@@ -252,7 +249,7 @@ TEST(test_glb_without_triangles_refused) {
   fixture_write(f, path);
   fixture_destroy(f);
   assert_int_equal(EXPORT_RUN(text, path, "-o", out), 2);
-  assert_non_null(strstr(text, "no triangles"));
+  assert_says(text, "no triangles");
 }
 
 TEST_GROUP(setup, teardown)

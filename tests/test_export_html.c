@@ -30,7 +30,7 @@ static int teardown(void **state) {
 }
 
 /* Test vectors of RFC 4648, section 10. */
-TEST(test_base64_known_texts_literal) {
+TEST(test_base64_write_rfc_4648_vectors_equal) {
   static const char *const pairs[][2] = {{"", ""},
                                          {"f", "Zg=="},
                                          {"fo", "Zm8="},
@@ -50,10 +50,7 @@ TEST(test_base64_known_texts_literal) {
 
 /* Return the page as a string (malloc). */
 static char *read_page(void) {
-  size_t size = 0;
-  char *page = test_read(out, &size);
-  page[size] = '\0';
-  return page;
+  return test_read(out, &(size_t){0});
 }
 
 static int digit(char c) {
@@ -95,7 +92,7 @@ static void check_tensor(const char *page, const char *name, const void *bytes, 
   free(found);
 }
 
-/* Return the decompressed rows of a tensor of 16-bit counts (malloc). */
+/* Decompress a tensor of 16-bit integers [rows, columns] (malloc). */
 static int16_t *take_rows(const char *page, const char *name, size_t rows, size_t columns) {
   size_t size = 0;
   unsigned char *packed = take_bytes(page, name, &size);
@@ -107,7 +104,7 @@ static int16_t *take_rows(const char *page, const char *name, size_t rows, size_
   return counts;
 }
 
-/* Return a number from the description of the basis in the page. */
+/* Return a number, or the first number of a list, from the page's description of the basis. */
 static double number_of(const char *page, const char *name) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "&quot;%s&quot;:", name);
@@ -117,8 +114,9 @@ static double number_of(const char *page, const char *name) {
   return strtod(at + (*at == '['), NULL);
 }
 
-/* Assert that positions and coefficients, for directions of unit length, equal those of the basis
- * to half a count. */
+/* Assert that the page's positions and coefficients equal those of the basis to half a count. The
+ * page has directions of unit length, and coefficients multiplied by the length of the basis's
+ * directions. */
 static void check_motion(const char *page, const export_source *s, const uint32_t *order) {
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->mode_count;
@@ -149,7 +147,7 @@ static void check_motion(const char *page, const export_source *s, const uint32_
   free(counts);
 }
 
-/* Assert that every triangle is in the page, beginning with any of its corners. */
+/* Assert that the page has every triangle once. A triangle may start at any of its corners. */
 static void check_corners(const char *page, const uint32_t *corners, size_t count) {
   size_t size = 0;
   unsigned char *packed = take_bytes(page, "triangles", &size);
@@ -186,7 +184,7 @@ TEST(test_page_tensors_equal_basis) {
   assert_null(strstr(page, "{{"));
   assert_null(strstr(page, "src="));
   assert_null(strstr(page, "@import"));
-  assert_non_null(strstr(page, "default-src 'none'"));
+  assert_says(page, "default-src 'none'");
   supine_export_source_close(&s);
   free(page);
 }
@@ -194,16 +192,16 @@ TEST(test_page_tensors_equal_basis) {
 TEST(test_page_title_with_markup_escaped) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--title", "</script><b>&"), 0);
   char *page = read_page();
-  assert_non_null(strstr(page, "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>"));
+  assert_says(page, "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>");
   assert_null(strstr(page, "</script><b>"));
   free(page);
 }
 
 TEST(test_page_too_many_modes_or_vectors_refused) {
   assert_int_equal(EXPORT_RUN(text, many, "-o", out), 3);
-  assert_non_null(strstr(text, "--modes 16"));
+  assert_says(text, "--modes 16");
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 3);
-  assert_non_null(strstr(text, "a vector basis"));
+  assert_says(text, "a vector basis");
 }
 
 TEST_GROUP(setup, teardown)

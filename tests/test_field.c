@@ -14,7 +14,8 @@
 static supine_basis *surface;
 static supine_basis *grid;
 
-/* Weights of the affine and the quadratic motion: displacements of up to about 20 mm. */
+/* Weights of the affine, the quadratic and the wave mode. They displace points by up to about 20
+ * mm. */
 static const double weights[HELPER_MODES] = {0.5, 0.4, 0.0};
 static const double scales[2] = {1.0, 1.0};
 
@@ -63,7 +64,7 @@ static supine_field made_field(void) {
   return field;
 }
 
-/* Return the inverse field. It is computed only at the first call, which takes some seconds. */
+/* Return the inverse field. Only the first call computes it, which takes some seconds. */
 static const supine_field *made_inverse(void) {
   if (inverse_kept.nodes.values == NULL) {
     supine_field field = made_field();
@@ -78,9 +79,9 @@ static double size_of(const double v[3]) {
   return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-/* At grid nodes the field equals the displacement of the basis, far outside the lungs it is 0, and
- * between nodes it is trilinear. */
-TEST(test_field_nodes_cells_and_border_interpolated) {
+/* At grid nodes the field equals the displacement of the basis. Far outside the lungs it is 0.
+ * Between nodes it is trilinear. */
+TEST(test_field_at_nodes_and_cells_interpolates_basis) {
   supine_field field = made_field();
   const supine_basis_info *info = supine_basis_get_info(grid);
   float *moved = malloc(3 * info->vertex_count * sizeof *moved);
@@ -92,7 +93,8 @@ TEST(test_field_nodes_cells_and_border_interpolated) {
       p[k] = (double)info->vertices[3 * i + k];
     }
     supine_field_at(&field, p, u);
-    for (size_t k = 0; k < 3; ++k) { /* mm: positions are float32, rounded by up to 1e-5 */
+    for (size_t k = 0; k < 3; ++k) {
+      /* The tolerance, mm, covers positions rounded by up to 1e-5. */
       assert_close(u[k], (double)moved[3 * i + k], 2e-5);
     }
   }
@@ -117,9 +119,9 @@ TEST(test_field_nodes_cells_and_border_interpolated) {
   supine_field_free(&field);
 }
 
-/* For a scan below full inflation, the field is measured from the scan: it is 0 in the state of the
- * scan, and in another state it equals the displacement of an embedded point. */
-TEST(test_field_scan_below_full_counts_from_scan) {
+/* If the scan is below full inflation, the field is measured from the scan. It is 0 in the state of
+ * the scan. In another state it equals the displacement of an embedded point. */
+TEST(test_field_scan_below_full_measured_from_scan) {
   supine_inside_shells below;
   supine_inside_report report;
   supine_inside_content points = {.count = 1, .part_count = 1};
@@ -137,11 +139,11 @@ TEST(test_field_scan_below_full_counts_from_scan) {
   }
   assert_int_equal(supine_field_create(grid, &below.scan, 60.0, &field, &error), SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
-  for (size_t i = 0; i < 3 * count; ++i) { /* 0 up to the rounding of float32 positions */
+  for (size_t i = 0; i < 3 * count; ++i) { /* 0 except for rounding of float32 positions */
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_field_free(&field);
-  /* Embed a node that is inside the lungs as a point. */
+  /* Embed, as a point, a node that is inside the lungs. */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
@@ -179,16 +181,16 @@ TEST(test_field_scan_below_full_counts_from_scan) {
   grid = grid_kept;
 }
 
-TEST(test_field_inverse_composed_within_a_tenth_of_a_mm) {
+TEST(test_field_invert_residual_within_a_tenth_of_a_mm) {
   supine_field field = made_field();
   supine_field inverse;
   supine_field_residual residual;
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
-  print_message("forward after inverse displacement: off by %.4f mm RMS, %.4f mm at most\n",
+  print_message("residual of forward and inverse displacement: %.4f mm RMS, %.4f mm at most\n",
                 residual.rms, residual.largest);
   assert_true(residual.largest <= 0.1);
   assert_true(residual.rms > 0.0 && residual.rms < residual.largest);
-  /* The stated residual also holds between the nodes, up to a factor of 1.5. */
+  /* Between the nodes, the residual is at most 1.5 times the stated residual. */
   const supine_basis_info *info = supine_basis_get_info(surface);
   uint64_t seed = 3;
   double largest = 0.0;
@@ -241,7 +243,7 @@ static supine_image ball_image(supine_image_voxel voxel) {
                          image.origin[2] + 2.0 * (double)(i / 11000)};
     for (int l = 0; l < LANDMARKS; ++l) {
       const double d[3] = {p[0] - landmarks[l][0], p[1] - landmarks[l][1], p[2] - landmarks[l][2]};
-      if (supine_dot(d, d) < 81.0) { /* 8-bit: labels 1 to 5; else a brightness for each landmark */
+      if (supine_dot(d, d) < 81.0) { /* labels 1 to 5, or a brightness */
         supine_image_put(&image, i, 1, &(double){voxel == SUPINE_VOXEL_U8 ? l + 1.0 : 1000.0});
       }
     }
@@ -249,8 +251,8 @@ static supine_image ball_image(supine_image_voxel voxel) {
   return image;
 }
 
-/* Compute the centroid c of the voxels with `label` within 14 mm of a point, or, if `label` is 0,
- * of all voxels there, weighted by brightness. */
+/* Compute the centroid c of the voxels within 14 mm of a point. If `label` is not 0, use only
+ * voxels with this label; otherwise weight all by their brightness. */
 static void centroid(const supine_image *image, const double about[3], int label, double c[3]) {
   double sum = 0.0;
   c[0] = c[1] = c[2] = 0.0;
@@ -278,7 +280,7 @@ static void centroid(const supine_image *image, const double about[3], int label
   }
 }
 
-/* Compute the positions of the landmarks in the deformed lungs by embedding them. */
+/* Embed the landmarks, and compute their positions in the deformed lungs. */
 static void moved_landmarks(double out[LANDMARKS][3]) {
   static bool known;
   static double kept[LANDMARKS][3];
@@ -312,7 +314,7 @@ static void moved_landmarks(double out[LANDMARKS][3]) {
   supine_inside_shells_free(&shells);
 }
 
-/* Assert that landmarks in a warped image are within a voxel, 2 mm, of the embedded points. */
+/* Assert that landmarks in a warped image are within 2 mm (a voxel) of the embedded points. */
 static void check_landmarks(const supine_image *image, bool labels) {
   double moved[LANDMARKS][3];
   double largest = 0.0;
@@ -325,7 +327,7 @@ static void check_landmarks(const supine_image *image, bool labels) {
       way[k] = moved[l][k] - landmarks[l][k];
       c[k] -= moved[l][k];
     }
-    assert_true(size_of(way) > 4.0); /* the landmarks moved */
+    assert_true(size_of(way) > 4.0); /* every landmark moves */
     largest = fmax(largest, size_of(c));
   }
   print_message("landmarks off by %.2f mm at most\n", largest);
@@ -367,10 +369,10 @@ static double mass_of(const supine_image *image, const supine_image *mask, doubl
   return 1e-6 * sum * pow(image->step[0][0], 3.0);
 }
 
-/* Scaling of the density keeps the mass within the warped mask of a lung to 1 %. Without scaling,
- * the mass of lungs in air changes by more than 5 %. The lungs have about -850 to -550 HU, and are
- * surrounded by air or by a chest wall of 40 HU. */
-TEST(test_resample_density_mass_kept) {
+/* Scaling the density keeps the mass within the warped mask of a lung constant to 1 %. Without
+ * scaling, the mass of lungs in air changes by more than 5 %. The lungs have about -850 to -550 HU,
+ * and are surrounded by air or by a chest wall of 40 HU. */
+TEST(test_resample_scaled_density_keeps_mass) {
   supine_field field;
   supine_field inverse;
   supine_field_residual residual;
@@ -382,7 +384,7 @@ TEST(test_resample_density_mass_kept) {
     for (int wall = 0; wall < 2; ++wall) {
       supine_image image = field.depth;
       supine_image mask = field.depth;
-      for (size_t a = 0; a < 3; ++a) { /* voxels of 2.5 mm whose centres are between the nodes */
+      for (size_t a = 0; a < 3; ++a) { /* 2.5 mm voxels with centres between grid nodes */
         image.size[a] = (size_t)((double)field.depth.size[a] * 4.0 / 2.5) - 2;
         image.step[a][a] = 2.5;
         image.origin[a] += 1.1;
@@ -415,12 +417,12 @@ TEST(test_resample_density_mass_kept) {
       const double after = mass_of(&scaled, &moved, lung + 1.0) / before - 1.0;
       const double unscaled = mass_of(&plain, &moved, lung + 1.0) / before - 1.0;
       print_message("%s lung, %s: %.0f g, change %+.2f %% with scaled density, %+.1f %% without\n",
-                    lung ? "right" : "left", wall ? "in a wall" : "alone", before, 100.0 * after,
-                    100.0 * unscaled);
+                    lung ? "right" : "left", wall ? "in the chest wall" : "in air", before,
+                    100.0 * after, 100.0 * unscaled);
       assert_true(fabs(after) < 0.01);
       assert_true(wall || fabs(unscaled) > 0.05);
       size_t changed = 0;
-      /* Outside the mask, density is unchanged except at its edge. */
+      /* Outside the mask, density is unchanged except at the mask's edge. */
       for (size_t i = 0; i < count && wall; ++i) {
         changed += supine_image_get(&moved, i) == 0.0 && supine_image_get(&scaled, i) != 40.0;
       }
@@ -436,13 +438,14 @@ TEST(test_resample_density_mass_kept) {
   supine_field_free(&inverse);
 }
 
-/* Warp the image balls.nrrd by the field v.nrrd into warped.nrrd with another program, and check
- * the landmarks. Skip the test if the program is missing. */
-static void check_warped_by(const char *asked, const char *command) {
+/* Run `command`, with which another program warps the image balls.nrrd with the field v.nrrd into
+ * warped.nrrd, and check the landmarks. Skip the test if `probe` fails, because the program is
+ * missing. */
+static void check_warped_by(const char *probe, const char *command) {
   char text[512];
-  (void)snprintf(text, sizeof text, "%s >/dev/null 2>&1", asked);
+  (void)snprintf(text, sizeof text, "%s >/dev/null 2>&1", probe);
   if (system(text) != 0) { /* NOLINT(cert-env33-c) */
-    print_message("skipped: '%s' fails\n", asked);
+    print_message("skipped: '%s' fails\n", probe);
     skip();
   }
   supine_image image = ball_image(SUPINE_VOXEL_I16);
@@ -492,13 +495,13 @@ TEST(test_elastix_inverse_field_warps_landmarks) {
                   "mv result.nrrd warped.nrrd");
 }
 
-TEST(test_field_impossible_grid_refused) {
+TEST(test_field_create_without_grid_refused) {
   supine_field field;
   supine_error error;
   assert_int_equal(
       supine_field_create(surface, POSED(surface, weights, scales), 60.0, &field, &error),
       SUPINE_ERROR_FORMAT);
-  assert_non_null(strstr(error.message, "supine embed"));
+  assert_says(error.message, "supine embed");
 }
 
 /* A grid is refused if any of its tensors is invalid. */
@@ -534,7 +537,7 @@ TEST(test_field_malformed_grids_refused) {
     supine_error error;
     assert_int_equal(supine_field_create(bad, POSED(bad, weights, scales), 60.0, &field, &error),
                      SUPINE_ERROR_FORMAT);
-    assert_non_null(strstr(error.message, "malformed"));
+    assert_says(error.message, "malformed");
     supine_basis_close(bad);
   }
   free(part);

@@ -59,7 +59,7 @@ static void force_along(const supine_lungs *lungs, const supine_force_law *law, 
   supine_physics_force(lungs, law, &gravity, lungs->mesh.vertex_count, NULL, force);
 }
 
-TEST(test_force_paper_law_is_height_zero_to_one) {
+TEST(test_force_paper_law_equals_height_from_0_to_1) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   const supine_force_law law = supine_physics_model(SUPINE_LAW_PAPER).force;
@@ -78,7 +78,7 @@ TEST(test_force_paper_law_is_height_zero_to_one) {
     least = fmin(least, down[i]);
     most = fmax(most, down[i]);
     assert_close(down[i], (height(lungs, g, i) - low) / (high - low), 4 * DBL_EPSILON);
-    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* height for -g is 1 - height for g */
+    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* -g turns a height h into 1 - h */
   }
   assert_close(least, 0.0, 4 * DBL_EPSILON);
   assert_close(most, 1.0, 4 * DBL_EPSILON);
@@ -100,9 +100,9 @@ TEST(test_force_box_part_uses_box_coordinates) {
   free(force);
 }
 
-/* Softening multiplies the force by a factor of geometric mean 1 whose logarithm grows in
- * proportion to the height. */
-TEST(test_force_softened_follows_height) {
+/* Softening multiplies the force by a factor of geometric mean 1. The logarithm of this factor
+ * grows linearly with height. */
+TEST(test_force_softened_logarithm_linear_in_height) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
   supine_force_law law = {.base = 2.0};
@@ -165,15 +165,16 @@ TEST(test_directions_box_model_literal_values) {
   assert_close(lungs.midline, 10.0, 0.0);
   assert_int_equal(lungs.side[0], 1);
   assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
-  /* Vertex 1 is at X = Y = Z = 1: outer side, front, base. */
+  /* Vertex 1 has the box coordinates X = Y = Z = 1: outer side, front, base. */
   assert_close(d[3], 2.0, 1e-14);
   assert_close(d[4], -1.5, 1e-14);
   assert_close(d[5], -16.0, 1e-14);
-  /* The planes of the back (Y = 0), apex (Z = 0) and midline (X = 0) are fixed. */
+  /* No point of the back (Y = 0), the apex (Z = 0) or the midline (X = 0) moves perpendicular to
+   * that plane. */
   assert_close(d[7], 0.0, 0.0);
   assert_close(d[11], 0.0, 0.0);
   assert_close(d[0], 0.0, 0.0);
-  /* Vertex 4 is at X = Y = Z = 1/2: 2 (1/2)^1.5, -1.5 (1/2), -16 (1/2)^1.4. */
+  /* Vertex 4 has the box coordinates X = Y = Z = 1/2: 2 (1/2)^1.5, -1.5 (1/2), -16 (1/2)^1.4. */
   assert_close(d[12], 0.70710678118654752, 1e-14);
   assert_close(d[13], -0.75, 1e-14);
   assert_close(d[14], -6.0628662660415918, 1e-13);
@@ -199,11 +200,11 @@ TEST(test_directions_bad_constants_refused) {
   supine_direction_law law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   law.c[3] = 0.0;
   assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
-  assert_non_null(strstr(error.message, "c4"));
+  assert_says(error.message, "c4");
   law = supine_physics_model(SUPINE_LAW_PAPER).direction;
   law.c[4] = NAN;
   assert_int_equal(supine_physics_directions(*state, &law, d, &error), SUPINE_ERROR_ARGUMENT);
-  assert_non_null(strstr(error.message, "c5"));
+  assert_says(error.message, "c5");
 }
 
 TEST_GROUP(setup, teardown)

@@ -46,7 +46,7 @@ def close(name, a, b, tolerance):
 
 
 def plastimatch_stats(path):
-    """Return the rows minimum, mean and maximum of the three components."""
+    """Return an array [3, 3]: minimum, mean and maximum (rows) of the three components."""
     text = run("plastimatch", "stats", path)
     return numpy.array([[float(x) for x in re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text).groups()]
                         if re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text) else [numpy.nan] * 3
@@ -75,7 +75,7 @@ if shutil.which("plastimatch"):
     for ending in ("nrrd", "nii.gz", "mha"):
         close(f"plastimatch: f.{ending}", plastimatch_stats(f"f.{ending}"), wanted, 2e-3)
 
-# A warped image written as .mha is converted by plastimatch and read by nibabel.
+# Warp images. One written as .mha is converted by plastimatch and then read by nibabel.
 size = (40, 36, 38)
 grid = numpy.indices(size).sum(0) % 7
 nibabel.save(nibabel.Nifti1Image(grid.astype(numpy.int16), numpy.diag([-10.0, -10.0, 10.0, 1.0])), "in.nii.gz")
@@ -149,7 +149,7 @@ if vtk:
                     if not os.path.exists("v.ply") or open("v.ply", "rb").read() != open("wanted.ply", "rb").read():
                         faults.append(f"VTK's VTP, mode {mode}, header {header}, packed {packed}, encoded {encoded}")
 
-# A folder of TotalSegmentator masks, output to a pipe, and file names that are not UTF-8 work.
+# Test a folder of TotalSegmentator masks, output to a pipe, and a file name that is not UTF-8.
 os.mkdir("segmentations")
 where = numpy.indices((58, 46, 40)).transpose(1, 2, 3, 0) * [5, 4, 6] + [-141.3, -85.7, -113.9]
 x, y, z = numpy.moveaxis(where, -1, 0)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core: positions and normals, read by
- * transform feedback, equal those of the C evaluator within rounding. One draw has lungs of
+/* Run supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core. Positions and normals, read
+ * by transform feedback, equal those of the C evaluator within rounding. The lungs of one draw have
  * different gains. The tests are skipped if EGL has no such context. */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
@@ -64,7 +64,7 @@ typedef struct gl_api {
 #undef MEMBER
 } gl_api;
 
-/* Create a context of this API without a surface and make it current; return false if that is not
+/* Create a context of this API without a surface and make it current. Return false if that is not
  * possible. */
 static bool make_context(EGLenum api, EGLDisplay *display, EGLContext *context, gl_api *gl) {
   const EGLint renderable = api == EGL_OPENGL_API ? EGL_OPENGL_BIT : EGL_OPENGL_ES3_BIT;
@@ -162,7 +162,8 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
   return program;
 }
 
-/* Create a framebuffer, as a context without a surface has none, even if nothing is drawn. */
+/* Create a framebuffer. Drawing needs one, even without output, and a context without a surface has
+ * none. */
 static void make_framebuffer(const gl_api *gl) {
   GLuint framebuffer = 0;
   GLuint renderbuffer = 0;
@@ -215,8 +216,8 @@ static void load_model(const gl_api *gl, const model *m) {
   }
 }
 
-/* Compute position and normal of each vertex by the shader in one draw, `captured` [VERTICES,
- * 6]. */
+/* Set captured [VERTICES, 6] to the position and normal of each vertex, computed by the shader in
+ * one draw. */
 static void run_shader(const gl_api *gl, GLuint program, const model *m, float *captured) {
   const GLsizeiptr output = (GLsizeiptr)(6 * VERTICES * sizeof(float));
   const GLsizei vectors = (GLsizei)((m->modes + 3) / 4);
@@ -242,8 +243,8 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
   memcpy(captured, mapped, (size_t)output);
 }
 
-/* Tolerance of normals: the GPU has the same packed numbers as the C evaluator, but rounds
- * otherwise, and sums of random modes lose a digit by cancellation. */
+/* Tolerance of normals. The GPU has the same packed numbers as the C evaluator but rounds
+ * differently, and sums of random modes lose a digit by cancellation. */
 static const double normal_rounding = 1e-4;
 
 static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes) {
@@ -301,7 +302,7 @@ static void check_glsl(EGLenum api, const char *version) {
   EGLContext context = EGL_NO_CONTEXT;
   gl_api gl = {0};
   if (!make_context(api, &display, &context, &gl)) {
-    print_message("no surfaceless EGL context: skipped\n");
+    print_message("skipped: EGL has no context without a surface\n");
     skip();
     return;
   }
@@ -309,7 +310,6 @@ static void check_glsl(EGLenum api, const char *version) {
   make_framebuffer(&gl);
   size_t length = 0;
   unsigned char *library = test_read(SUPINE_GLSL, &length);
-  library[length] = '\0';
   static const size_t modes[] = {1, 4, 6, 11, 16};
   for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {
     check_modes(&gl, version, (const char *)library, modes[i]);

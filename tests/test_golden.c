@@ -6,8 +6,8 @@
 
 #include "tests/poses.h"
 
-/* Assert the numbers that version 0.1.0 printed for its file. The files of all versions hold the
- * same synthetic pair of lungs with 324 vertices. */
+/* Assert that the basis has the numbers that version 0.1.0 of the program printed. The golden files
+ * of all formats hold the same synthetic pair of lungs with 324 vertices. */
 static void check_golden(const char *path, const char *version, const char *checksum) {
   supine_basis *basis = NULL;
   supine_error error = {0};

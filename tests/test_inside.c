@@ -21,7 +21,7 @@ static int setup(void **state) {
   }
   (void)snprintf(surface_path, sizeof surface_path, "%s/surface", folder);
   (void)snprintf(inside_path, sizeof inside_path, "%s/inside", folder);
-  helper_write_basis(surface_path, 10, 2); /* 1,002 vertices each */
+  helper_write_basis(surface_path, 10, 2); /* two lungs of 1,002 vertices each */
   surface = helper_open(surface_path);
   return supine_inside_shells_create(surface, &shells, NULL) == SUPINE_OK ? 0 : -1;
 }
@@ -36,8 +36,8 @@ static double distance(const double a[3], const double b[3]) {
   return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
 }
 
-/* Draw a random point on the surface of a lung; return also the corners of its triangle and their
- * weights. */
+/* Draw a random point p on the surface of a lung. Set corner and weight to the vertices of its
+ * triangle and their weights in p. */
 static void random_surface_point(const supine_inside_shell *shell, uint64_t *seed, double p[3],
                                  size_t corner[3], double weight[3]) {
   const size_t t = (size_t)(helper_random(seed) * (double)shell->triangle_count);
@@ -57,8 +57,8 @@ static void random_surface_point(const supine_inside_shell *shell, uint64_t *see
   }
 }
 
-/* Draw a point p at `share` of the way from the centre of a lung to its surface: inside if `share`
- * is below 1. */
+/* Draw a point p on a random ray from the centre of a lung, at `share` of the distance to the
+ * surface. It is inside if `share` is below 1. */
 static void point_at_share(size_t lung, uint64_t *seed, double share, double p[3]) {
   const double centre[3] = {lung == 0 ? 71.3 : -72.9, 3.1, -40.7};
   size_t corner[3];
@@ -81,11 +81,13 @@ static double slow_distance(const supine_inside_shell *shell, const double x[3])
     double low = 0.0;
     double high = 1.0;
     double found = INFINITY;
-    for (int i = 0; i < 60; ++i) { /* ternary search: the distance is convex in a */
+    for (int i = 0; i < 60; ++i) { /* ternary search in the barycentric coordinate a, in which the
+                                      distance is convex */
       double at[2];
       for (int side = 0; side < 2; ++side) {
         const double a = low + (side + 1) * (high - low) / 3.0;
-        /* Squared distance at the nearest b for this a, on a line across the triangle. */
+        /* Squared distance of x from the line of constant a across the triangle. The nearest point
+         * of this line is at b. */
         double square = 0.0;
         double along = 0.0;
         double length = 0.0;
@@ -114,12 +116,12 @@ static double slow_distance(const supine_inside_shell *shell, const double x[3])
   return best;
 }
 
-TEST(test_surface_find_side_and_distance_of_random_points) {
+TEST(test_surface_find_random_points_side_and_distance_correct) {
   uint64_t seed = 71;
   for (int i = 0; i < 400; ++i) {
     const double share = 1.7 * helper_random(&seed);
     double p[3];
-    /* Near the surface, a flat triangle may be on the other side of the point. */
+    /* Skip points at the surface, whose side is uncertain. */
     if (fabs(share - 1.0) < 0.02) {
       continue;
     }
@@ -139,7 +141,7 @@ TEST(test_surface_find_with_hint_same_answer) {
   supine_inside_place near = {0};
   for (int i = 0; i < 500; ++i) {
     double p[3];
-    if (i % 50 == 0) { /* a random walk with restarts, at which the hint is far away */
+    if (i % 50 == 0) { /* restart the random walk far from the hint */
       point_at_share(0, &seed, 1.4 * helper_random(&seed), p);
     } else {
       for (int k = 0; k < 3; ++k) {
@@ -154,7 +156,7 @@ TEST(test_surface_find_with_hint_same_answer) {
   }
 }
 
-TEST(test_surface_find_torn_surface_inside_stays_inside) {
+TEST(test_surface_find_surface_with_hole_side_correct) {
   const supine_inside_shell *shell = &shells.shell[0];
   supine_inside_surface *torn = NULL;
   uint64_t seed = 15;
@@ -171,7 +173,7 @@ TEST(test_surface_find_torn_surface_inside_stays_inside) {
   supine_inside_surface_destroy(torn);
 }
 
-TEST(test_biharmonic_centres_and_affine_exact) {
+TEST(test_biharmonic_fit_centres_and_affine_values_exact) {
   enum { COUNT = 300, COLUMNS = 4, CENTRES = 120 };
   double points[3 * COUNT];
   double values[COUNT * COLUMNS];
@@ -191,7 +193,7 @@ TEST(test_biharmonic_centres_and_affine_exact) {
   supine_inside_biharmonic_evaluate(&fit, COUNT, points, found);
   double noise = 0.0;
   for (size_t i = 0; i < COUNT; ++i) {
-    /* Tolerance for values up to 60 mm: the condition of the matrix is about 1e5. */
+    /* The tolerance is for values up to 60 mm and a matrix of condition about 1e5. */
     for (size_t k = 0; k < 3; ++k) {
       assert_true(fabs(found[COLUMNS * i + k] - values[COLUMNS * i + k]) < 1e-9);
     }
@@ -205,18 +207,18 @@ TEST(test_biharmonic_centres_and_affine_exact) {
   supine_inside_biharmonic_free(&fit);
 }
 
-TEST(test_biharmonic_points_in_a_plane_refused) {
+TEST(test_biharmonic_fit_points_in_a_plane_refused) {
   const double points[] = {0, 0, 1, 3, 0, 1, 0, 4, 1, 7, 8, 1, 2, 9, 1};
   const double values[5] = {0};
   supine_inside_biharmonic fit;
   supine_error error;
   assert_int_equal(supine_inside_biharmonic_fit(5, points, 1, values, 5, &fit, &error),
                    SUPINE_ERROR_NUMERICAL);
-  assert_non_null(strstr(error.message, "plane"));
+  assert_says(error.message, "plane");
 }
 
-/* Make content of points in both lungs, each at a random share from `lowest` to `highest` of the
- * way to the surface. */
+/* Make content of points in both lungs. Each point is at a random share, from `lowest` to
+ * `highest`, of the way from the centre of its lung to the surface. */
 static supine_inside_content made_points(size_t count, double lowest, double highest,
                                          uint64_t seed) {
   supine_inside_content content = {.count = count, .part_count = count};
@@ -244,7 +246,8 @@ static supine_inside_report embed(const supine_inside_content *content, bool cla
   return report;
 }
 
-/* Return the largest distance between embedded points and the exact motion of one mode, mm. */
+/* Return the largest distance, mm, between embedded points moved by one mode and their exact
+ * positions. */
 static double farthest_from(const supine_inside_content *content, int mode) {
   supine_basis *inside = helper_open(inside_path);
   const double scales[2] = {1.3, 1.3};
@@ -292,7 +295,7 @@ TEST(test_embed_affine_motion_exact_quadratic_approximate) {
   supine_inside_content_free(&content);
 }
 
-/* Points on the surface move with it within 0.01 mm, for all modes at once, even with few
+/* Embedded points on the surface follow it to 0.01 mm, for all modes at once, even with few
  * centres. */
 TEST(test_embed_surface_points_move_with_surface) {
   enum { COUNT = 600 };
@@ -333,9 +336,9 @@ TEST(test_embed_surface_points_move_with_surface) {
   supine_inside_content_free(&content);
 }
 
-/* In a scan below full inflation, content is embedded at its position in the scan, and has that
+/* In a scan below full inflation, content is embedded at its position in the scan. It has that
  * position in the state of the scan. Content on the surface of the scan moves with the surface. */
-TEST(test_embed_scan_below_full_counts_from_scan) {
+TEST(test_embed_scan_below_full_measured_from_scan) {
   enum { COUNT = 400 };
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned", folder);
@@ -389,7 +392,7 @@ TEST(test_embed_scan_below_full_counts_from_scan) {
     assert_true(part[i] % 2 == 1 || distance(got, target + 3 * (size_t)part[i]) < 0.01);
   }
   supine_deform(inside, &moved_shells.scan, xyz);
-  for (size_t i = 0; i < COUNT; ++i) { /* at the given positions, to the rounding of float32 */
+  for (size_t i = 0; i < COUNT; ++i) { /* at the given positions, except for rounding */
     const double got[3] = {(double)xyz[3 * i], (double)xyz[3 * i + 1], (double)xyz[3 * i + 2]};
     assert_true(distance(got, content.points + 3 * (size_t)part[i]) < 1e-4);
   }
@@ -413,7 +416,7 @@ TEST(test_shells_unreachable_scan_refused) {
   supine_basis_close(far);
 }
 
-TEST(test_embed_file_shares_weights_volume_and_metadata) {
+TEST(test_embed_file_repeats_weights_volumes_and_metadata) {
   supine_inside_content content = made_points(40, 0.2, 0.9, 2);
   (void)embed(&content, false, 0);
   supine_basis *inside = helper_open(inside_path);
@@ -442,12 +445,12 @@ TEST(test_embed_file_shares_weights_volume_and_metadata) {
   supine_inside_shells none;
   supine_error error;
   assert_int_equal(supine_inside_shells_create(inside, &none, &error), SUPINE_ERROR_FORMAT);
-  assert_non_null(strstr(error.message, "points"));
+  assert_says(error.message, "points");
   supine_basis_close(inside);
   supine_inside_content_free(&content);
 }
 
-TEST(test_embed_points_in_one_lung_file_has_both) {
+TEST(test_embed_points_in_one_lung_file_has_both_lungs) {
   supine_inside_content content = made_points(30, 0.2, 0.9, 2);
   for (int other = 0; other < 2; ++other) {
     for (size_t i = 0; i < content.count; ++i) {
@@ -465,7 +468,7 @@ TEST(test_embed_points_in_one_lung_file_has_both) {
   supine_inside_content_free(&content);
 }
 
-TEST(test_embed_outside_counted_and_clamped) {
+TEST(test_embed_point_outside_counted_and_clamped) {
   supine_inside_content content = made_points(50, 0.3, 0.9, 4);
   const double far[3] = {71.3, 3.1, 900.0};
   memcpy(content.points + (size_t)3 * 17, far, sizeof far);
@@ -474,7 +477,7 @@ TEST(test_embed_outside_counted_and_clamped) {
   assert_int_equal(report.farthest, 17);
   const supine_inside_place place = supine_inside_surface_find(shells.shell[0].surface, far, NULL);
   assert_true(fabs(report.farthest_mm + place.depth) < 1e-9 && report.farthest_mm > 600.0);
-  /* An affine motion is exact outside, too. */
+  /* An affine motion is exact outside the lungs, too. */
   assert_true(farthest_from(&content, 0) < 8.0 * 0x1p-24 * 1024.0);
   report = embed(&content, true, 0);
   assert_int_equal(report.outside, 1);
@@ -500,7 +503,7 @@ TEST(test_embed_outside_counted_and_clamped) {
   supine_inside_content_free(&content);
 }
 
-/* Every point inside the lungs is in a cell of the grid whose eight corners are stored. */
+/* Every point inside the lungs is in a grid cell whose eight corners are stored. */
 TEST(test_grid_points_inside_have_all_cell_corners) {
   const supine_image like = {.size = {300, 260, 280},
                              .origin = {180.0, 120.0, -200.0},
@@ -560,10 +563,10 @@ TEST(test_grid_bad_requests_refused) {
                    SUPINE_ERROR_ARGUMENT);
   assert_int_equal(supine_inside_content_grid(&shells, NULL, 0.01, 0.0, &content, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_non_null(strstr(error.message, "larger"));
+  assert_says(error.message, "larger");
   assert_int_equal(supine_inside_content_grid(&shells, &elsewhere, 4.0, 0.0, &content, &error),
                    SUPINE_ERROR_MESH);
-  assert_non_null(strstr(error.message, "axes"));
+  assert_says(error.message, "axes");
   assert_int_equal(supine_inside_content_grid(&shells, NULL, 5000.0, 0.0, &content, &error),
                    SUPINE_ERROR_MESH);
 }
@@ -602,7 +605,7 @@ TEST(test_content_points_bad_files_refused) {
     test_write(path, bad[i]);
     assert_int_equal(supine_inside_content_points(path, NULL, &content, &error),
                      SUPINE_ERROR_FORMAT);
-    assert_non_null(strstr(error.message, path));
+    assert_says(error.message, path);
     supine_inside_content_free(&content);
   }
   supine_inside_content content = {0};
@@ -652,8 +655,8 @@ static double part_volume(const supine_basis_info *info, uint32_t part_end, cons
   return sum / 6.0;
 }
 
-/* Return the sum of squared distances from `to` after a rotation of `from` by `angle` about an axis
- * through its mean. */
+/* Rotate the points `from` by `angle` about an axis through their mean. Return the sum of their
+ * squared distances from the points `to`. */
 static double misfit_turned(size_t count, const float *from, const float *to, size_t axis,
                             double angle) {
   const size_t a = (axis + 1) % 3;
@@ -679,9 +682,9 @@ static double misfit_turned(size_t count, const float *from, const float *to, si
   return sum;
 }
 
-/* A rigid tumour beside a soft one has its given position in the state of the scan, keeps its
- * volume in every pose, and moves by the rigid motion that fits the field best. All functions that
- * compute positions agree. */
+/* A rigid tumour lies beside a soft one. In the state of the scan it has its given position. In
+ * every pose it keeps its volume, and its motion is the rigid motion that fits the field best. All
+ * functions that compute positions agree. */
 TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned-rigid", folder);
@@ -694,7 +697,7 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   supine_inside_content content = {0};
   for (size_t side = 0; side < 2; ++side) {
     supine_mesh mesh = helper_lump(7, 0.0, 9 + side);
-    /* Make it 40 mm long, and move it into a lung. */
+    /* Make the lump 40 mm long, and move it into a lung. */
     for (size_t k = 0; k < 3 * mesh.vertex_count; ++k) {
       mesh.vertices[k] = 0.15 * mesh.vertices[k] + (k % 3 == 0 ? 73.7 - 149.1 * (double)side : 3.0);
     }
@@ -708,7 +711,7 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   supine_error error;
   assert_int_equal(supine_inside_content_make_rigid(&content, "tumor", &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_non_null(strstr(error.message, "'tumor'"));
+  assert_says(error.message, "'tumor'");
   free(content.rigid);
   assert_int_equal(supine_inside_content_make_rigid(&content, "tumour", NULL), SUPINE_OK);
   assert_int_equal(embed(&content, false, 0).rigid, 1);
@@ -718,11 +721,11 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   const uint32_t end = ((const uint32_t *)supine_basis_tensor(inside, "rigid")->data)[1];
   assert_int_equal(end, n / 2);
   float *xyz = malloc(4 * 3 * n * sizeof *xyz);
-  float *others = xyz + 3 * n; /* [3, N, 3] positions by other functions */
+  float *others = xyz + 3 * n; /* [3, N, 3] results of other functions */
   const supine_pose *scan = &moved_shells.scan;
   supine_deform(inside, scan, xyz);
   const uint32_t *part = supine_basis_tensor(inside, "part")->data;
-  for (size_t i = 0; i < 3 * n; ++i) { /* the content is in the file's order, left lung first */
+  for (size_t i = 0; i < 3 * n; ++i) { /* the order of the file is that of the content */
     assert_close((double)xyz[i], content.points[i], 2e-4);
     assert_int_equal(part[i / 3], i / 3 >= end);
   }

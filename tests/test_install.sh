@@ -44,11 +44,11 @@ case $needed in
 *) echo "needs $needed"; exit 1 ;;
 esac
 
-# The library exports only names with supine_, each with a version; the archive defines no others.
+# The shared library exports only names that begin with supine_, each with a version.
 nm -D --defined-only "$lib/libsupine_runtime.so" | awk '{print $3}' >"$work/names"
 grep -q '^supine_deform@@SUPINE_0$' "$work/names"
 if grep -Ev '^(supine_[a-z0-9_]*@@SUPINE_0|SUPINE_0.*)$' "$work/names"; then exit 1; fi
-# The library exports exactly the functions that the installed headers declare. Each header compiles alone, in C
+# It exports exactly the functions that the installed headers declare. Each header compiles alone, in C
 # and in C++, and cites no header that is not installed.
 for header in "$prefix"/include/supine/*.h; do
   name=supine/$(basename "$header")
@@ -68,9 +68,10 @@ cat "$prefix"/include/supine/*.h | grep -o '[A-Za-z0-9_./]*\.h\b' | sort -u | wh
   *) [ -f "$prefix/include/$named" ] || { echo "a header cites $named, which is not installed"; exit 1; } ;;
   esac
 done
+# The archive defines only names that begin with supine_.
 nm --defined-only --extern-only "$lib/libsupine_runtime.a" | awk 'NF == 3 {print $3}' >"$work/names"
 if grep -v '^supine_' "$work/names"; then exit 1; fi
 
-# Undefined names of the archive are defined in libc, in libm or in the archive.
+# The archive uses no names of FFTW, GSL, assimp, threads or BLAS.
 nm --undefined-only "$lib/libsupine_runtime.a" | awk '{print $2}' | sort -u >"$work/undefined"
 if grep -Ei 'fftw|gsl_|assimp|^ai[A-Z]|pthread|cblas' "$work/undefined"; then exit 1; fi

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The inverse of the equilibrium recovers the force from its catch, with the paper's links and with
- * a reach. */
+/* The inverse of the equilibrium recovers the force from its catch, with the paper's transfer and
+ * with a reach. */
 #include "precompute/physics/model.h"
 #include "test.h"
 
@@ -58,7 +58,7 @@ static void solve(const fixture *f, int k, const double *stiffness, double *catc
                    SUPINE_OK);
 }
 
-TEST(test_equilibrium_force_from_catch_recovers_force) {
+TEST(test_equilibrium_force_from_catch_recovered) {
   const fixture *f = *state;
   const size_t n = f->lungs.mesh.vertex_count;
   double *catch_ = malloc(n * sizeof *catch_);

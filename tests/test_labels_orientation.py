@@ -26,20 +26,20 @@ faults = 0
 
 
 def made_map():
-    """Return labels as lungmask writes them, and the affine matrix of a frame along RAS. The right lung is larger; both
-    are wider towards the feet, where they reach backwards."""
+    """Return a map with labels of lungmask, and its affine matrix, with axes along RAS. The right lung is larger.
+    Towards the feet, both lungs are wider and lie further back."""
     affine = numpy.diag([*SPACING, 1.0])
     affine[:3, 3] = [-141.3, -85.7, -113.9]
     index = numpy.stack(numpy.meshgrid(*map(numpy.arange, SIZE), indexing="ij"), -1)
     x, y, z = numpy.moveaxis(index @ affine[:3, :3] + affine[:3, 3], -1, 0)
-    narrow = 1 - 0.2 * z / 100
+    relative_width = 1 - 0.2 * z / 100
     half = numpy.where(x > 0, 58, 53)  # in RAS, x points to the patient's right
-    inside = ((abs(x) - 66) / (half * narrow)) ** 2 + ((y - 0.25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
+    inside = ((abs(x) - 66) / (half * relative_width)) ** 2 + ((y - 0.25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
     return numpy.where(inside, numpy.where(x > 0, 1, 2), 0).astype(numpy.uint8), affine
 
 
 def phantom_map(folder):
-    """Return labels of synthetic lungs, whose shape shows their axes, and the affine matrix of a frame along RAS."""
+    """Return a label map of synthetic lungs, whose shape shows their axes, and its affine matrix, with axes along RAS."""
     path = os.path.join(folder, "phantom.ply")
     subprocess.run([supine, "phantom", "--vertices", "8000", "-o", path], check=True, stdout=subprocess.DEVNULL)
     reader = vtk.vtkPLYReader()
@@ -76,7 +76,7 @@ def phantom_map(folder):
 
 def check_header(labels, affine, flips, folder):
     """Check that the message for a header with reversed axes (rotated by 180 degrees or mirrored) names the option
-    that corrects it, and that no axes are proposed for a right header."""
+    that corrects it, and that no axes are proposed for a correct header."""
     global faults
     path = os.path.join(folder, "header.nii.gz")
     nibabel.save(nibabel.Nifti1Image(labels, numpy.diag([*(-1.0 if f else 1.0 for f in flips), 1.0]) @ affine), path)
@@ -126,7 +126,7 @@ def centres(labels, affine):
 
 
 def by_vtk(path):
-    """Return the same as `centres` by VTK's reader, whose matrices apply to mm along the axes of the image."""
+    """Return the centres and volumes by VTK's reader. Its matrices expect mm along the image axes, not voxel indices."""
     reader = vtk.vtkNIFTIImageReader()
     reader.SetFileName(path)
     reader.Update()
@@ -182,7 +182,7 @@ def check(name, labels, affine, folder, form):
     back = nibabel.load(path)
     wanted = centres(numpy.asarray(back.dataobj), back.affine)
     ours, said = by_supine(path, folder)
-    # However the map is stored, the only warning is that the lungs are small for full inflation.
+    # The only warning allowed is that the lungs are small for full inflation.
     warned = [line for line in said.splitlines() if "warning" in line and "full inflation" not in line]
     if ours is None or warned:
         faults += 1

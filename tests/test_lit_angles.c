@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Angles between the normals of supine_deform_lit and those of supine_normals are within the
- * documented limits and as stated in the file, in held-out postures and volumes from rest to full
- * inflation. */
+/* Compare the normals of supine_deform_lit with those of supine_normals, in held-out postures and
+ * volumes from rest to full inflation. The angles between them are within the documented limits,
+ * and are those stated in the file. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -22,8 +22,7 @@ static const double p999_most = 1.0;
 static const double printed = 0.05;
 /* Tolerance of the mean over STATES random states, in standard errors. */
 static const double sigmas = 4.0;
-/* Tolerance of the percentile as a ratio; it is large, as the worst states determine the
- * percentile. */
+/* Tolerance of the percentile, as a ratio. It is large: few states determine the percentile. */
 static const double p999_near = 1.4;
 
 /* Make a basis of lungs scanned at full inflation, by the default law with this softening. */
@@ -41,8 +40,8 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   assert_true(file >= 0 && close(file) == 0);
   options.model.force.soften = soften;
   options.reference = &reference;
-  /* Exact storage: rounded reference positions would rotate small triangles, from which the
-   * reference normals are computed. */
+  /* Exact storage, because rounded reference positions would rotate small triangles, and with them
+   * the reference normals. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   if (supine_reference_find(lungs, &options.model, &full, &resting, &reference, &error) !=
           SUPINE_OK ||
@@ -60,7 +59,8 @@ static int compare_floats(const void *left, const void *right) {
   return a < b ? -1 : a > b;
 }
 
-/* Compute the angle at each vertex in a random state, [N], degrees; return the mean. */
+/* Set angles [N] to the angle between both normals of each vertex in a random state, degrees.
+ * Return their mean. */
 static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, float *lit,
                       float *exact, float *angles) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -140,7 +140,7 @@ static void check_real(const char *left, const char *right, supine_axes axes, do
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lit_synthetic_lungs_angle_errors_as_stated) {
+TEST(test_deform_lit_synthetic_lungs_angles_as_stated) {
   supine_mesh mesh = {0};
   supine_lungs lungs = {0};
   assert_int_equal(supine_phantom_create(8000, 6000.0, &mesh, NULL), SUPINE_OK);
@@ -150,18 +150,18 @@ TEST(test_lit_synthetic_lungs_angle_errors_as_stated) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_lit_adult_angle_errors_as_stated) {
+TEST(test_deform_lit_adult_angles_as_stated) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 0.0, 16);
 }
 
-TEST(test_lit_adult_softened_sixteen_modes_angle_errors_as_stated) {
+TEST(test_deform_lit_softened_adult_angles_as_stated) {
   check_real("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", SUPINE_AXES_AUTO, 1.0, 16);
 }
 
-TEST(test_lit_covid001_angle_errors_as_stated) {
+TEST(test_deform_lit_covid001_angles_as_stated) {
   check_real("covid/covid001_left.ply", "covid/covid001_right.ply", SUPINE_AXES_RAS, 0.0, 16);
 }
 
-TEST(test_lit_covid005_angle_errors_as_stated) {
+TEST(test_deform_lit_covid005_angles_as_stated) {
   check_real("covid/covid005_left.ply", "covid/covid005_right.ply", SUPINE_AXES_RAS, 0.0, 16);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors, and lungs located from observed points that were moved by the law. */
+/* Expected errors, and lungs located from points that the law has moved. */
 #include "test.h"
 
 #include <supine/locate.h>
@@ -48,7 +48,7 @@ static supine_state state_of(const char *text) {
   return state;
 }
 
-/* Compute the positions of all vertices in a state, xyz [3 VERTICES]. */
+/* Set xyz [VERTICES, 3] to the positions of all vertices in a state. */
 static void deform(const supine_basis *basis, const supine_state *state, float *xyz) {
   supine_pose pose;
   supine_error error = {0};
@@ -58,8 +58,8 @@ static void deform(const supine_basis *basis, const supine_state *state, float *
   supine_deform(basis, &pose, xyz);
 }
 
-/* Move a point as between two frames: rotate it by 40 degrees about (1, 2, 2) / 3 if `turned`, and
- * shift it. */
+/* Convert a point to another frame of reference: if `turned`, rotate it by 40 degrees about (1, 2,
+ * 2) / 3, then shift it. */
 static void move(bool turned, const double x[3], double moved[3]) {
   static const double shift[3] = {512, -207, 1020};
   const double c = turned ? cos(0.7) : 1;
@@ -73,12 +73,12 @@ static void move(bool turned, const double x[3], double moved[3]) {
   }
 }
 
-/* Set the observed points: one of each twenty vertices, in a state. */
+/* Observe one of every twenty vertices in the given state. */
 static void observe(world *w, const supine_state *state, bool turned) {
   float xyz[3 * VERTICES];
   deform(w->basis, state, xyz);
   for (size_t j = 0; j < SEEN; ++j) {
-    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* includes a tip of each lung */
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* including a tip of each lung */
     const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
     w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
     move(turned, x, w->seen[j].position);
@@ -117,7 +117,7 @@ static supine_location locate(world *w, const supine_state *state, bool rigid) {
   return found;
 }
 
-TEST(test_locate_points_of_law_recover_positions_and_volume) {
+TEST(test_locate_points_moved_by_law_positions_and_volume_recovered) {
   world *w = *state;
   const supine_state truth = state_of("prone:rest+300");
   const supine_state posture = state_of("prone");
@@ -177,7 +177,7 @@ TEST(test_locate_wrong_point_reported_and_ignored) {
   }
 }
 
-TEST(test_locate_any_points_error_not_above_prior) {
+TEST(test_locate_any_number_of_points_error_at_most_prior) {
   world *w = *state;
   const supine_state truth = state_of("supine:scan-900");
   float expected[VERTICES];
@@ -243,13 +243,14 @@ TEST(test_locate_bad_task_refused) {
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
   task.count = 3;
-  w->seen[1] = w->seen[2] = w->seen[0]; /* points in one position show no rotation */
+  w->seen[1] = w->seen[2] = w->seen[0]; /* three points in one place determine no rotation */
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
 }
 
 /* sigma^2 = |u| min(4.5 mm, RMS of u) for a displacement u from the scan. If the volume is relative
- * to an assumed rest, the square of the displacement by 5 % of full inflation is added. */
+ * to rest, whose volume is assumed, add the square of the displacement caused by 5 % of full
+ * inflation. */
 TEST(test_expected_error_any_state_equals_formula) {
   world *w = *state;
   const supine_basis_info *info = supine_basis_get_info(w->basis);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Lungs from surfaces and their sides, synthetic lungs, and volume forms. */
-#include <float.h>
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/model.h"
@@ -124,7 +123,7 @@ static void turn_inwards(supine_mesh *mesh, size_t first) {
   }
 }
 
-TEST(test_lungs_inward_flipped_and_reported) {
+TEST(test_lungs_inward_triangles_reversed_and_reported) {
   for (int which = 0; which < 4; ++which) { /* bit 0 reverses the left lung, bit 1 the right */
     supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(6, -80.0, 4)};
     const double volume = supine_mesh_volume(&lumps[0]) + supine_mesh_volume(&lumps[1]);
@@ -150,13 +149,11 @@ static void expect_refused(const supine_mesh *meshes, size_t count, const double
   supine_lungs lungs = {0};
   supine_error error = {0};
   assert_int_equal(supine_lungs_create(meshes, count, midline, &lungs, &error), SUPINE_ERROR_MESH);
-  if (strstr(error.message, words) == NULL) {
-    fail_msg("the message '%s' lacks '%s'", error.message, words);
-  }
+  assert_says(error.message, words);
   assert_null(lungs.mesh.vertices);
 }
 
-TEST(test_lungs_given_twice_refused_at_any_resolution) {
+TEST(test_lungs_same_lung_twice_refused) {
   supine_mesh lumps[3] = {helper_lump(20, 90.0, 3), helper_lump(6, -80.0, 4),
                           helper_lump(20, 90.0, 3)};
   expect_refused(lumps, 3, NULL, "surfaces 1 and 3 fill the same box: give each lung once");
@@ -190,7 +187,7 @@ TEST(test_lungs_midline_out_of_place_refused) {
   expect_refused(lumps, 2, &midline, "x = 80 mm runs through the left lung");
   midline = 95.0;
   expect_refused(lumps, 1, &midline, "runs through the right lung");
-  midline = 20.0; /* 20 mm off is accepted */
+  midline = 20.0; /* 20 mm from the middle is accepted */
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(lumps, 2, &midline, &lungs, NULL), SUPINE_OK);
   assert_int_equal(lungs.lung_count, 2);
@@ -217,7 +214,7 @@ TEST(test_lungs_flat_or_empty_surface_refused) {
   supine_lungs lungs = {0};
   supine_error error;
   assert_int_equal(supine_lungs_create(&flat, 1, NULL, &lungs, &error), SUPINE_ERROR_MESH);
-  assert_non_null(strstr(error.message, "along z"));
+  assert_says(error.message, "along z");
   assert_int_equal(supine_lungs_create(&empty, 1, NULL, &lungs, &error), SUPINE_ERROR_MESH);
 }
 
@@ -244,8 +241,8 @@ TEST(test_phantom_pair_closed_with_given_volume) {
   assert_int_equal(supine_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
 }
 
-/* The phantom keeps its shape. Every harmonic of the shape contributes to the compared sums over
- * vertices, whose expected values are from its first version. */
+/* The phantom keeps the shape of its first version, with which the expected sums over vertices were
+ * computed. Every harmonic of the shape contributes to these sums. */
 TEST(test_phantom_create_same_shape_as_first_version) {
   static const double made[2] = {-542.627977, 212.207209};
   supine_mesh mesh = {0};
@@ -258,7 +255,7 @@ TEST(test_phantom_create_same_shape_as_first_version) {
         sum += sin((double)(v + 1) * (double)(a + 1)) * mesh.vertices[3 * v + a];
       }
     }
-    /* mm, a hundredth of the contribution of the smallest coefficient */
+    /* the tolerance, mm, is a hundredth of the contribution of the smallest coefficient */
     assert_true(fabs(sum - made[lung]) < 1e-4);
   }
   supine_mesh_free(&mesh);
@@ -281,9 +278,9 @@ static double gained(const supine_lungs *lungs, size_t lung, const double *d, co
   const size_t first = lungs->triangle_begin[lung];
   supine_mesh part = {n, lungs->mesh.vertices, lungs->triangle_begin[lung + 1] - first,
                       lungs->mesh.triangles + 3 * first};
-  const double rest = supine_mesh_volume(&part);
+  const double before = supine_mesh_volume(&part);
   part.vertices = moved;
-  const double volume = 1e-3 * (supine_mesh_volume(&part) - rest);
+  const double volume = 1e-3 * (supine_mesh_volume(&part) - before);
   free(moved);
   return volume;
 }

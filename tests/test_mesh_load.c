@@ -40,11 +40,10 @@ static void expect_refused(const char *path, const supine_mesh_load_options *opt
   supine_mesh mesh = {0};
   supine_mesh_report report = {.degenerate_faces = 77};
   supine_error error = {0};
-  const supine_status status = supine_mesh_load(path, options, &mesh, &report, &error);
-  if (status != expected || strstr(error.message, words) == NULL ||
-      strstr(error.message, path) == NULL || strchr(error.message, '\n') != NULL) {
-    fail_msg("%s: status %d, message \"%s\"", path, (int)status, error.message);
-  }
+  assert_int_equal(supine_mesh_load(path, options, &mesh, &report, &error), expected);
+  assert_says(error.message, words);
+  assert_says(error.message, path);
+  assert_null(strchr(error.message, '\n'));
   assert_int_equal(error.status, expected);
   assert_null(mesh.vertices);
   assert_null(mesh.triangles);

@@ -147,8 +147,8 @@ static void check_report(const char *name) {
   for (const char *at = strstr(text, "src="); at != NULL; at = strstr(at + 1, "src=")) {
     assert_true(strncmp(at, "src=\"data:", 10) == 0);
   }
-  assert_non_null(strstr(text, "prefers-color-scheme:dark"));
-  assert_non_null(strstr(text, "@media print"));
+  assert_says(text, "prefers-color-scheme:dark");
+  assert_says(text, "@media print");
   assert_int_equal(count_words(text, "<polyline"), 2 * 3);
   free(text);
 }

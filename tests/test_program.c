@@ -184,7 +184,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
   char head[256] = "";
   (void)take_file("ras.ply", head, sizeof head - 1);
-  assert_non_null(strstr(head, "SPACE=RAS cm\n"));
+  assert_says(head, "SPACE=RAS cm\n");
   /* The file has the left lung first, so its order does not change. */
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "again.ply",
@@ -195,11 +195,11 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "breathe ras.safetensors --posture left --as-scanned --fps 0.2 -o breath.vtp");
   static char text[1 << 20];
   assert_true(take_file("breath.vtp", text, sizeof text) > 0);
-  assert_non_null(strstr(text, "RAS"));
+  assert_says(text, "RAS");
   EXPECT(0, "frames", "breathe ras.safetensors --posture left --fps 0.2 -o breath.vtp");
   /* Without --as-scanned, the file has the same arrays. */
   assert_true(take_file("breath.vtp", text, sizeof text) > 0);
-  assert_non_null(strstr(text, "Name=\"displacement_magnitude\""));
+  assert_says(text, "Name=\"displacement_magnitude\"");
   EXPECT(1, "is for VTP files",
          "breathe ras.safetensors --posture left --as-scanned -o b.safetensors");
   EXPECT(1, "full-2000", "precompute low.ply --scanned supine:-2000 -o b.safetensors");
@@ -322,7 +322,7 @@ TEST(test_solve_unit_force_writes_column) {
   static char text[1 << 20];
   EXPECT(0, "", "solve lungs.ply --unit-force 17 -o column.csv");
   text[take_file("column.csv", text, sizeof text - 1)] = '\0';
-  assert_non_null(strstr(text, "vertex,x_mm,y_mm,z_mm,response\n0,"));
+  assert_says(text, "vertex,x_mm,y_mm,z_mm,response\n0,");
   EXPECT(1, "counted from 0", "solve lungs.ply --unit-force 99999 -o column.csv");
 }
 

@@ -118,7 +118,7 @@ TEST(test_evaluate_outside_range_or_bad_curve_refused) {
   for (size_t j = 0; j < 4; ++j) {
     assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 1, &beyond[j], &out, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "-4.3 to 38.7 cmH2O"));
+    assert_says(error.message, "-4.3 to 38.7 cmH2O");
   }
   supine_pv_curve bad[6] = {sigmoid, sigmoid, sigmoid, sigmoid, sigmoid, sigmoid};
   bad[0].pressure[1] = bad[0].pressure[0];

@@ -263,9 +263,8 @@ static void expect_format(size_t count, const double *pressures, const double *v
   supine_pv_curve curve;
   supine_error error = {0};
   assert_int_equal(fit(count, pressures, volumes, 0.95, &curve, NULL, &error), SUPINE_ERROR_FORMAT);
-  if (strstr(error.message, text) == NULL || strstr(error.message, more) == NULL) {
-    fail_msg("the message '%s' lacks '%s' or '%s'", error.message, text, more);
-  }
+  assert_says(error.message, text);
+  assert_says(error.message, more);
 }
 
 TEST(test_fit_bad_samples_message_names_line) {

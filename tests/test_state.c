@@ -76,8 +76,8 @@ TEST(test_state_parse_bare_number_lists_meanings) {
     supine_state parsed = unset;
     supine_error error;
     assert_int_equal(supine_state_parse(numbers[i], &parsed, &error), SUPINE_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "rest+500"));
-    assert_non_null(strstr(error.message, "500mL"));
+    assert_says(error.message, "rest+500");
+    assert_says(error.message, "500mL");
     assert_memory_equal(&parsed, &unset, sizeof parsed);
   }
 }

@@ -165,7 +165,7 @@ TEST(test_create_small_grid_or_high_band_refused) {
                      SUPINE_ERROR_ARGUMENT);
     assert_null(plan);
     assert_int_equal(error.status, SUPINE_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "directions cannot represent band"));
+    assert_says(error.message, "directions cannot represent band");
     supine_sh_grid_destroy(grid);
   }
   supine_sh_transform_destroy(NULL);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Validations of [Santhanam2008] IV, shared by the tests and bench_validation. */
+/* Validations of [Santhanam2008], section IV, shared by the tests and bench_validation. */
 #ifndef SUPINE_VALIDATION_H
 #define SUPINE_VALIDATION_H
 
@@ -13,12 +13,11 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
-#include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/precompute.h"
 #include <supine/volume.h>
 
-/* A network of masses and links; triangles are optional. */
+/* A network of masses and links, with or without triangles. */
 typedef struct frame {
   supine_mesh mesh;
   supine_topology topology;
@@ -96,17 +95,17 @@ static inline supine_status frame_solve(const frame *f, const double *stiffness,
 typedef struct mass_spring_damper {
   size_t count;
   size_t links;
-  const uint32_t *ends; /* [links, 2] masses at the ends */
+  const uint32_t *ends; /* [links, 2] masses at the ends of each link */
   double *k;            /* [links] spring constant k_ij */
   double *ground;       /* [count] spring constant to the ground */
   double *push;         /* [count] push p_i */
   double damping;
-  size_t evaluations; /* number of evaluations of the right-hand side so far */
+  size_t evaluations; /* of the right-hand side of the equation of motion */
 } mass_spring_damper;
 
-/* Create the system that has the equilibrium defined in equilibrium.h, for stiffness E of geometric
- * mean 1: its springs have the constants k_ij of links, and those to the ground the excess of the
- * diagonal over the sum of k_ij. */
+/* Create a system whose equilibrium y is E F of equilibrium.h, for a stiffness E of geometric
+ * mean 1. In the matrix of the equation for y, the element of a link is -k_ij, and the row of a
+ * mass sums to ground_i. */
 static inline mass_spring_damper damper_create(const frame *f, const double *stiffness,
                                                const double *force) {
   const size_t n = f->mesh.vertex_count;
@@ -162,8 +161,8 @@ static inline int damper_slope(double time, const double *state, double *slope, 
   return GSL_SUCCESS;
 }
 
-/* Integrate for `seconds` from y = 0, set catch_ to F = y / E, and call `seen`, if given, at
- * `marks` evenly spaced times. Return false if GSL fails. */
+/* Integrate for `seconds` from y = 0. At each of `marks` evenly spaced times, set catch_ to F = y /
+ * E and call `seen` if it is not NULL. Return false if GSL fails. */
 static inline bool damper_integrate(mass_spring_damper *system, const double *stiffness,
                                     double seconds, size_t marks, double *catch_,
                                     void (*seen)(void *context, size_t evaluations,
@@ -193,7 +192,7 @@ static inline bool damper_integrate(mass_spring_damper *system, const double *st
   return good;
 }
 
-/* Return the RMS of a - b relative to the RMS of b. */
+/* Return the RMS of a - b divided by the RMS of b. */
 static inline double relative_rms(size_t count, const double *a, const double *b) {
   double difference = 0.0;
   double norm = 0.0;
@@ -204,8 +203,8 @@ static inline double relative_rms(size_t count, const double *a, const double *b
   return sqrt(difference / norm);
 }
 
-/* Return a force on a sheet: a peak at its centre, with a radius of a fifth of its side, plus a
- * slope (malloc). */
+/* Return a force on a sheet (malloc): a peak at the centre, whose radius is a fifth of the side,
+ * plus a slope along y. */
 static inline double *plane_force(const frame *f) {
   const size_t n = f->mesh.vertex_count;
   const double *last = f->mesh.vertices + 3 * (n - 1);
@@ -238,7 +237,7 @@ static inline void normalise_stiffness(size_t count, double *stiffness) {
   }
 }
 
-/* Return the stiffness of a ring whose middle third is `factor` times as stiff as the rest
+/* Return the stiffness of a ring. Its middle third is `factor` times as stiff as the two others
  * (malloc). */
 static inline double *ring_stiffness(size_t count, double factor) {
   double *stiffness = calloc(count, sizeof *stiffness);
@@ -248,17 +247,18 @@ static inline double *ring_stiffness(size_t count, double factor) {
   return stiffness;
 }
 
-/* number of slabs of equal height along gravity; 0 is the uppermost */
+/* number of slabs of equal height along gravity; slab 0 is the uppermost */
 enum { ZONES = 10 };
 
 typedef struct ventilation {
-  double index[ZONES]; /* mean catch, relative to the mean over all slabs */
+  double index[ZONES]; /* mean catch of a slab divided by the mean catch of all slabs */
   double swept[ZONES]; /* ratio of a slab's share of the breath to its share of the area */
-  double slope;        /* least-squares slope of the index over relative height, 0 to 1 */
-  double height;       /* height of the lungs along gravity, mm */
+  double slope; /* least-squares slope of the index over the position along gravity, from 0 (top) to
+                   1 */
+  double height; /* height of the lungs along gravity, mm */
 } ventilation;
 
-/* Measure the ventilation of a breath of `volume` mL with gravity along g. */
+/* Measure the ventilation of a breath of `volume` mL. */
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
@@ -294,8 +294,9 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
     areas[zone] += area[i];
     caught[zone] += area[i] * solution.catch_[i];
   }
-  for (size_t t = 0; t < lungs->mesh.triangle_count;
-       ++t) { /* volume swept by each triangle, with the mean of its areas before and after */
+  /* Volume swept by a triangle: its mean displacement times the mean of its old and new area
+   * vectors. */
+  for (size_t t = 0; t < lungs->mesh.triangle_count; ++t) {
     const uint32_t *c = lungs->mesh.triangles + 3 * t;
     double middle[3] = {0.0, 0.0, 0.0};
     double move[3] = {0.0, 0.0, 0.0};
@@ -355,7 +356,7 @@ cleanup:
 typedef struct nearest_grid {
   double low[3], size;
   size_t cells[3];
-  size_t *begin;   /* [cells + 1] index in `order` of the first vertex of each cell */
+  size_t *begin;   /* [number of cells + 1] index in `order` of the first vertex of each cell */
   uint32_t *order; /* [N] vertices sorted by cell */
   const supine_mesh *mesh;
 } nearest_grid;
@@ -399,7 +400,8 @@ static inline void nearest_free(nearest_grid *grid) {
   free(grid->order);
 }
 
-/* Return the nearest vertex in the cell of p and its neighbours; SIZE_MAX if they are empty. */
+/* Return the vertex nearest to p in the cell of p and its neighbours, or SIZE_MAX if these cells
+ * are empty. */
 static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   long cell[3];
   size_t found = SIZE_MAX;
@@ -428,7 +430,7 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   return found;
 }
 
-/* Compute the displacements `moves` [N, 3] of a breath of `volume` mL, mm. */
+/* Set moves [N, 3], mm, to the displacements in a breath of `volume` mL. */
 static inline supine_status breathe_at(const supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -479,8 +481,8 @@ static inline supine_status spread_of(const supine_lungs *lungs, double reach, s
   return status;
 }
 
-/* Return the RMS difference of the displacements of two meshes of a lung, relative to those of
- * `fine`, at the vertices of `coarse` and the vertices of `fine` nearest to them. */
+/* Compare the displacements of two meshes of a lung at each vertex of `coarse` and the nearest
+ * vertex of `fine`. Return their RMS difference divided by the RMS displacement of `fine`. */
 static inline double drift_of(const supine_mesh *coarse, const double *coarse_moves,
                               const supine_mesh *fine, const double *fine_moves) {
   nearest_grid grid = nearest_create(fine, 5.0);
