@@ -1,10 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Install the packages that are needed, on a bare Debian 12 as root, then build and
-#   sh cmake/debian.sh demo    make a pair of synthetic lungs, precompute and deform them
-#   sh cmake/debian.sh build   build the tests, too
-#   sh cmake/debian.sh test    run the tests
-#   sh cmake/debian.sh count   print which lines the quick tests reach
+# On a bare Debian 12, as root, install the packages that are needed, and then
+#   sh cmake/debian.sh demo    build; make, precompute, deform and draw synthetic lungs
+#   sh cmake/debian.sh build   build the program and the tests
+#   sh cmake/debian.sh test    build, and run the tests
+#   sh cmake/debian.sh count   print the lines that the quick tests do not reach
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -45,14 +45,14 @@ demo)
   exec sh cmake/demo.sh build/release/supine demo
   ;;
 build | test)
-  # Tests run exported files in node and Chromium; install them only if they are not on PATH.
+  # Tests open exported files in node and Chromium. Install each only if it is not on PATH.
   command -v npm >/dev/null || tests="$tests nodejs npm"
   command -v chromium >/dev/null || tests="$tests chromium"
   # shellcheck disable=SC2086
   install_missing $build $tests
   [ -d tests/export/node_modules/vtk.js ] ||
     npm install --prefix tests/export --no-package-lock --no-audit --no-fund --silent ||
-    echo "packages of npm could not be installed: tests that need them are skipped" >&2
+    echo "npm could not install vtk.js and other packages: tests that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON
   cmake --build --preset release
   [ "$1" = build ] || exec ctest --preset release

@@ -8,7 +8,7 @@ set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR wasm32)
 set(CMAKE_C_COMPILER clang)
 set(CMAKE_C_COMPILER_TARGET wasm32-wasi)
-set(CMAKE_C_FLAGS_INIT -mbulk-memory) # in every browser that has 128-bit vectors, which the kernel needs
+set(CMAKE_C_FLAGS_INIT -mbulk-memory) # every browser with the 128-bit vectors that the kernel needs has it
 set(CMAKE_C_FLAGS_MINSIZEREL "-Oz -DNDEBUG" CACHE STRING "")
 set(CMAKE_SYSROOT /usr) # clang searches include/wasm32-wasi and lib/wasm32-wasi there
 # Use xxhash.h of the host, as it contains the whole implementation.

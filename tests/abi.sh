@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Check that programs linked with an older run-time library still run: tests/abi.sh [REVISION]
 #
-# Compare the library of REVISION with the current one by abidiff (Debian's abigail-tools). The default is
-# the last tag or, if there is none, the commit that set the current version number. Exit with 0 if nothing
-# changed, else with abidiff's report and code.
+# Compare the library of REVISION with that of HEAD by abidiff (Debian's abigail-tools). The default is the
+# last tag or, if there is none, the commit that set the current version number. Exit with 0 if the interfaces
+# are equal, else with abidiff's report and code.
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
 revision=${1:-$(git -C "$source" describe --tags --abbrev=0 2>/dev/null ||

@@ -3,7 +3,7 @@
 # Run static analysis: tests/analyse.sh [cppcheck|clang-tidy|clang]
 #
 # Run cppcheck and clang-tidy (.clang-tidy) on every source, and build everything by clang with warnings as
-# errors; all three by default. Print nothing and exit with 0 if nothing is found.
+# errors. An argument selects one of the three. Print nothing and exit with 0 if nothing is found.
 set -eu
 cd "$(dirname "$0")/.."
 what=${1:-all}
@@ -21,7 +21,7 @@ if [ "$what" = all ] || [ "$what" = clang ]; then
   cmake --build build/clang >>build/clang.log || { grep -E 'error|warning' build/clang.log; exit 1; }
 fi
 if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
-  command -v clang-tidy >/dev/null || { echo "clang-tidy is not installed"; exit 1; }
+  command -v clang-tidy >/dev/null || { echo "clang-tidy is not installed: install it, or give cppcheck or clang"; exit 1; }
   # Check all sources of the build. status.c defines supine_error_set, so it is checked without analyse.h.
   {
     sed -n 's|^ *"file": "\(.*\)",*$|\1|p' build/clang/compile_commands.json | sort -u |

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Count the lines that the tests reach: tests/coverage.sh [quick]
 #
-# Build with gcov, run all tests (with `quick` those that together take two minutes), and print the lines of each
-# file that no test reaches, and the share of lines reached; the quick tests give a lower bound. Needs gcovr
-# (in Debian). Exit with an error if the share is below 90 %.
+# Build with gcov, and run all tests, or with `quick` those that together take two minutes. Print the lines of each
+# file that no test reaches, and the share of lines that the tests reach. Exit with an error if the share is below
+# 90 %. Needs Debian's gcovr.
 set -eu
 cd "$(dirname "$0")/.."
 # Tests left out by `quick`: they are slow with gcov and reach few lines that no other test reaches.

@@ -3,9 +3,9 @@
 
     python3 house.py SOURCE_FOLDER BUILD_FOLDER
 
-Each row of the table names a folder, says what it is for, and lists the folders above it in the table from which
-its files may include. A folder may also use the folders that those may use. Check also that files do not depend on
-each other in cycles, the prefix of external names, and the sizes of functions."""
+Each row of the table names a folder, states its content, and lists folders of earlier rows whose headers its files
+may include. Its files may also include the headers that those folders may include. Check, too, that files do not
+depend on each other in cycles, the prefixes of external names, and the sizes of functions."""
 import os
 import re
 import subprocess
@@ -32,16 +32,16 @@ def read_table():
     for line in table:
         row = re.fullmatch(r"\| `([a-z/]+)` \|([^|]*)\|([^|]*)\|", line)
         if row is None:
-            faults.append(f"ARCHITECTURE.md: not a row of three cells: {line}")
+            faults.append(f"ARCHITECTURE.md: a row needs three cells: {line}")
         else:
             rows.append(row.groups())
     for folder, what, uses in rows:
         if not what.strip():
-            faults.append(f"ARCHITECTURE.md does not say what {folder} is for")
+            faults.append(f"ARCHITECTURE.md: the row of {folder} states no content")
         folders[folder] = set()
         for used in re.findall(r"`([a-z/]+)`", uses):
             if used == folder or used not in folders:
-                faults.append(f"ARCHITECTURE.md: {folder} may use only folders above it, not {used}")
+                faults.append(f"ARCHITECTURE.md: {folder} may use only folders of earlier rows, not {used}")
             else:
                 folders[folder] |= {used} | folders[used]
     return folders
@@ -69,7 +69,7 @@ def included(file):
 
 def check_includes(folders, files):
     for folder in sorted({os.path.dirname(f) for f in files} - set(folders)):
-        faults.append(f"ARCHITECTURE.md's table lacks the folder {folder}")
+        faults.append(f"ARCHITECTURE.md: add a row for the folder {folder}")
     for file in files:
         folder = os.path.dirname(file)
         for used, name in included(file):
@@ -77,7 +77,7 @@ def check_includes(folders, files):
                 faults.append(f"{file} includes {name}: {folder} may not use {used}")
 
 
-def check_systems(files):
+def check_system_headers(files):
     """Check that in the library only posix.c and windows.c include headers of the operating system."""
     library = PUBLIC + ("runtime", "runtime/safetensors", "runtime/kernels", "runtime/compare")
     for file in files:
@@ -85,10 +85,10 @@ def check_systems(files):
             with open(os.path.join(source, file), encoding="utf-8") as text:
                 for name in re.findall(r"^#\s*include\s+<((?:sys/|unistd|fcntl|dirent|pthread|strings|windows).*?)>",
                                        text.read(), re.M):
-                    faults.append(f"{file} includes {name}: only posix.c and windows.c may")
+                    faults.append(f"{file} includes {name}: only posix.c and windows.c may include system headers")
 
 
-def check_files_apart(files):
+def check_include_cycles(files):
     """Check that files do not include each other in cycles."""
     graph = {f: set() for f in files}
     for file in files:
@@ -124,7 +124,7 @@ def check_names(folders):
         prefix = PREFIX.get(folder, (f"supine_{os.path.basename(folder)}_",))
         for symbol in defined:
             if not symbol.startswith((*prefix, "__")) and symbol + "_" not in prefix:
-                faults.append(f"{file}.c defines {symbol}, which does not begin {' or '.join(prefix)}")
+                faults.append(f"{file}.c defines {symbol}, which does not begin with {' or '.join(prefix)}")
     graph = {file: {home[name] for name in used if name in home} - {file} for file, _, used in listed}
     while leaves := {f for f, out in graph.items() if not out & set(graph)}:
         graph = {f: out for f, out in graph.items() if f not in leaves}
@@ -133,7 +133,7 @@ def check_names(folders):
     if graph:
         faults.append(f"files that use each other in cycles: {sorted(graph)}")
     if len(listed) < len(folders):
-        faults.append(f"only {len(listed)} object files in {build}")
+        faults.append(f"only {len(listed)} object files in {build}: build first")
 
 
 def check_sizes(files):
@@ -152,17 +152,17 @@ def check_sizes(files):
             before = text[:found.start()].rstrip()
             comment = before[before.rfind("/*"):] if before.endswith("*/") else ""
             if parameters.count(",") + 1 > 7 and "parameters" not in comment:
-                faults.append(f"{file}: {name} has {parameters.count(',') + 1} parameters")
+                faults.append(f"{file}: {name} has {parameters.count(',') + 1} parameters: at most 7, or give the reason above it")
             if lines > 60 and "lines" not in comment:
-                faults.append(f"{file}: {name} has {lines} lines")
+                faults.append(f"{file}: {name} has {lines} lines: at most 60, or give the reason above it")
 
 
 folders = read_table()
 files = tracked()
 check_sizes(files)
 check_includes(folders, files)
-check_systems(files)
-check_files_apart(files)
+check_system_headers(files)
+check_include_cycles(files)
 check_names(folders)
 for fault in faults:
     print(fault)

@@ -20,8 +20,8 @@ double fixture_random(uint64_t *state) {
   return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-/* Make a lung from the vertices begin <= i < end: a bipyramid over a polygon with its triangles, or
- * points without triangles if there are fewer than 5. */
+/* Make a lung of the vertices begin <= i < end: a bipyramid with its triangles. Fewer than 5
+ * vertices get no triangles. */
 static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_t *state) {
   const size_t corners = end - begin >= 5 ? end - begin - 2 : 0;
   for (size_t i = begin; i < end; ++i) {
@@ -47,8 +47,8 @@ static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_
   }
 }
 
-/* Compute the displacement u of vertex i by field k at weight 1, mm. */
-static void field(const fixture *f, size_t i, size_t k, double u[3]) {
+/* Compute the displacement of vertex i by mode k at weight 1, mm. */
+static void mode_displacement(const fixture *f, size_t i, size_t k, double u[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = f->vector
                   ? (double)f->coefficient[(3 * i + axis) * f->modes + k]
@@ -61,8 +61,9 @@ static double det(const double *a, const double *b, const double *c) {
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* Add the volume forms of one triangle, mL. Its part of the enclosed volume is a sixth of the
- * determinant of its deformed corners p + s * sum over k of w_k u_k, for reference positions p. */
+/* Add the volume forms of one triangle, mL. Its volume is a sixth of the determinant of its corners
+ * p + sum over k of w_k u_k, where mode k displaces p by u_k. The forms are the terms of degree 1,
+ * 2 and 3 in the weights w. */
 static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
   const size_t K = f->modes;
   double r[3][3];
@@ -74,20 +75,20 @@ static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
   for (size_t i = 0; i < K; ++i) {
     double a[3][3];
     for (size_t v = 0; v < 3; ++v) {
-      field(f, corner[v], i, a[v]);
+      mode_displacement(f, corner[v], i, a[v]);
     }
     f->linear[lung * K + i] +=
         (det(a[0], r[1], r[2]) + det(r[0], a[1], r[2]) + det(r[0], r[1], a[2])) / 6000;
     for (size_t j = 0; j < K; ++j) {
       double b[3][3];
       for (int v = 0; v < 3; ++v) {
-        field(f, corner[v], j, b[v]);
+        mode_displacement(f, corner[v], j, b[v]);
       }
       f->quadratic[(lung * K + i) * K + j] +=
           (det(a[0], b[1], r[2]) + det(a[0], r[1], b[2]) + det(r[0], a[1], b[2])) / 6000;
       for (size_t m = 0; m < K; ++m) {
         double c[3];
-        field(f, corner[2], m, c);
+        mode_displacement(f, corner[2], m, c);
         f->cubic[((lung * K + i) * K + j) * K + m] += det(a[0], b[1], c) / 6000;
       }
     }
@@ -151,8 +152,8 @@ fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed) 
   fixture *f = fixture_create(vertices, modes, 1, 2, false, false, 1, seed);
   memset(f->mode, 0, 4 * modes * sizeof *f->mode);
   memset(f->coefficient, 0, vertices * modes * sizeof *f->coefficient);
-  f->mode[0] = 1 / 0.28209479177387814;     /* makes the weight of mode 0 equal to 1 */
-  f->mode[4 + 1] = 1 / 0.48860251190291992; /* makes the weight of mode 1 equal to g_y */
+  f->mode[0] = 1 / 0.28209479177387814;     /* weight 1 in any direction */
+  f->mode[4 + 1] = 1 / 0.48860251190291992; /* weight g_y in the direction g */
   for (size_t i = 0; i < vertices; ++i) {
     const float *p = f->vertex + 3 * i;
     const double middle = 150.3 * ((double)f->lung[i] - 0.5);
@@ -258,7 +259,7 @@ void fixture_deform(const fixture *f, const double *weights, const double *scale
     }
     for (size_t k = 0; k < f->modes; ++k) {
       double u[3];
-      field(f, i, k, u);
+      mode_displacement(f, i, k, u);
       for (size_t axis = 0; axis < 3; ++axis) {
         xyz[3 * i + axis] += scales[f->lung[i]] * weights[k] * u[axis];
       }

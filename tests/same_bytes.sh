@@ -21,15 +21,15 @@ printf 'name,x,y,z\na,60,-150,-100\nb,-70,-120,-90\n' >points.csv
 "$first" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1
 
 failed=0
-# made ENDING COMMAND...: compare the command's output from every build and number of threads.
-made() {
+# compare ENDING COMMAND...: compare the command's output from every build and number of threads.
+compare() {
   ending=$1
   shift
   sums=""
   for program in $programs; do
     each=""
     for threads in 1 2 3 7; do
-      SUPINE_THREADS=$threads "$program" "$@" -o "out.$ending" >said 2>&1 || { cat said; exit 1; }
+      SUPINE_THREADS=$threads "$program" "$@" -o "out.$ending" >log 2>&1 || { cat log; exit 1; }
       each="$each $(sha256sum <"out.$ending" | cut -c1-16)"
       rm "out.$ending"
     done
@@ -46,17 +46,17 @@ made() {
   *) echo "$1 .$ending: differs between builds" ;;
   esac
 }
-made ply phantom --vertices 9000
-made safetensors precompute lungs.ply --band 5
-made safetensors precompute lungs.ply --band 3 --soften 1
-made ply solve lungs.ply --posture left
-made ply deform lungs.safetensors --posture prone
-made vtp deform lungs.safetensors --posture prone
-made html compare lungs.safetensors --postures supine,prone
-made png render lungs.safetensors --posture supine
-made html export lungs.safetensors
-made glb export lungs.safetensors
-made vtp breathe lungs.safetensors --posture prone
-made safetensors embed lungs.safetensors points.csv
-made csv deform points.safetensors --posture prone
+compare ply phantom --vertices 9000
+compare safetensors precompute lungs.ply --band 5
+compare safetensors precompute lungs.ply --band 3 --soften 1
+compare ply solve lungs.ply --posture left
+compare ply deform lungs.safetensors --posture prone
+compare vtp deform lungs.safetensors --posture prone
+compare html compare lungs.safetensors --postures supine,prone
+compare png render lungs.safetensors --posture supine
+compare html export lungs.safetensors
+compare glb export lungs.safetensors
+compare vtp breathe lungs.safetensors --posture prone
+compare safetensors embed lungs.safetensors points.csv
+compare csv deform points.safetensors --posture prone
 exit $failed

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare the output of a session with its golden file: same_output.py GOLDEN NOW.
+"""Compare the output of a session with its golden file: same_output.py GOLDEN OUTPUT.
 
-In output piped through `rounded`, the last of the four digits of a decimal number may differ by one, as results
-differ slightly between processors; everything else must be identical."""
+Results differ slightly between processors. In output piped through `rounded`, the last of the four digits of a
+decimal number may therefore differ by one. Everything else must be identical."""
 import difflib
 import math
 import re
@@ -23,21 +23,21 @@ def close(a, b):
     return a == b or abs(a - b) < 1.5 * 10.0 ** (math.floor(math.log10(largest)) - 3)
 
 
-def same(golden, now, rounded):
-    if golden == now or not rounded:
-        return golden == now
-    numbers = [NUMBER.findall(line) for line in (golden, now)]
-    return (NUMBER.sub("#", golden) == NUMBER.sub("#", now)
+def same(golden, output, rounded):
+    if golden == output or not rounded:
+        return golden == output
+    numbers = [NUMBER.findall(line) for line in (golden, output)]
+    return (NUMBER.sub("#", golden) == NUMBER.sub("#", output)
             and all(close(a, b) for a, b in zip(*numbers, strict=True)))
 
 
-golden, now = (lines_of(path) for path in sys.argv[1:3])
-alike = len(golden) == len(now)
+golden, output = (lines_of(path) for path in sys.argv[1:3])
+equal = len(golden) == len(output)
 rounded = False
-for is_golden, is_now in zip(golden, now):
-    if is_golden.startswith("$ "):
-        rounded = re.search(r"[$|;] rounded\b", is_golden) is not None
-    alike = alike and same(is_golden, is_now, rounded)
-if not alike:
-    print("\n".join(difflib.unified_diff(golden, now, *sys.argv[1:3], lineterm="")))
-sys.exit(0 if alike else 1)
+for expected, found in zip(golden, output):
+    if expected.startswith("$ "):
+        rounded = re.search(r"[$|;] rounded\b", expected) is not None
+    equal = equal and same(expected, found, rounded)
+if not equal:
+    print("\n".join(difflib.unified_diff(golden, output, *sys.argv[1:3], lineterm="")))
+sys.exit(0 if equal else 1)

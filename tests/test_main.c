@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Run the tests that TEST defines, in the order of their definitions. If a test is skipped and none
- * fails, exit with 77, so that CTest reports the program as skipped, not as passed. */
+ * fails, exit with 77, so that CTest reports a skipped program. */
 #include "test.h"
 
 #include <gsl/gsl_errno.h>
 
-/* NULL in programs that are linked without GSL. */
+/* NULL if the program is linked without GSL */
 #pragma weak gsl_set_error_handler_off
 
-enum { SKIPPED = 77 }; /* equal to SKIP_RETURN_CODE in CMakeLists.txt */
+enum { SKIPPED = 77 }; /* SKIP_RETURN_CODE in CMakeLists.txt */
 
 static struct CMUnitTest tests[64];
 static size_t test_count;

@@ -13,15 +13,15 @@ fail() {
 commands=$("$supine" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p')
 [ "$(echo "$commands" | wc -w)" -ge 11 ] || fail "commands: $commands"
 
-# Every option of --help-all is in the manual page of its command and in both completions.
+# Every option of --help-all is in the manual page of its command and in the completion for zsh.
 for command in $commands; do
   for option in $("$supine" "$command" --help-all | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*'); do
     sed 's/\\-/-/g' "supine-$command.1" | grep -q -- "$option" || fail "supine-$command.1 lacks $option"
     grep -A60 "^  $command)$" _supine | sed '/;;/q' | grep -q -- "$option" || fail "_supine: $command $option"
   done
   if command -v groff >/dev/null; then
-    said=$(groff -man -Tutf8 -ww -z "supine-$command.1" 2>&1)
-    [ -z "$said" ] || fail "supine-$command.1: $said"
+    warnings=$(groff -man -Tutf8 -ww -z "supine-$command.1" 2>&1)
+    [ -z "$warnings" ] || fail "supine-$command.1: $warnings"
   fi
 done
 

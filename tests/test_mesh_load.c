@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Small files of every format: welding, dropped elements, orientation, axes and units. */
+/* Small files of every format: merging of equal corners, dropped elements, orientation, axes,
+ * units. */
 #include <float.h>
-#include <math.h>
 #include <pthread.h>
 #include <sys/inotify.h>
 #include <sys/stat.h>
@@ -64,7 +64,7 @@ static void expect_tetrahedron(const supine_mesh *mesh) {
   assert_true(fabs(supine_mesh_volume(mesh) - 288000.0) < 1.0e-6);
 }
 
-TEST(test_load_stl_soup_equals_indexed) {
+TEST(test_load_stl_equal_corners_become_one_vertex) {
   char path[256];
   supine_mesh_report report = {0};
   supine_mesh soup = load(sample_text(state, "a.stl", tetrahedron_stl, path), NULL, &report);
@@ -79,7 +79,7 @@ TEST(test_load_stl_soup_equals_indexed) {
   supine_mesh_free(&soup);
 }
 
-/* Readers return 0 for -0, so that equal positions have equal bits. */
+/* Readers turn -0 into 0, so that equal positions have equal bits. */
 TEST(test_load_negative_zero_becomes_zero) {
   static const char text[] = SAMPLE_PLY(5, 2) "-0 -0 -0\n120 -0 0\n0 120 -0\n0 -0 0\n-0 0 120\n"
                                               "3 0 2 1\n3 3 1 4\n";
@@ -96,7 +96,7 @@ TEST(test_load_negative_zero_becomes_zero) {
   }
 }
 
-TEST(test_load_polygons_cut_points_and_lines_dropped) {
+TEST(test_load_polygons_triangulated_points_and_lines_dropped) {
   static const char text[] =
       "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nv 50 50 90\nv 7 7 7\nv 8 8 8\n"
       "f 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nl 6 7\np 6\n";
@@ -111,7 +111,7 @@ TEST(test_load_polygons_cut_points_and_lines_dropped) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_load_degenerate_and_unreferenced_dropped_counted) {
+TEST(test_load_degenerate_faces_and_unused_vertices_dropped) {
   static const char text[] =
       "ply\nformat ascii 1.0\nelement vertex 7\nproperty float x\nproperty float y\nproperty float "
       "z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n"
@@ -148,9 +148,9 @@ TEST(test_load_ply_strips_refused) {
               SUPINE_ERROR_MESH, "strips of triangles");
 }
 
-/* A flat concave face of any size is cut within its outline: all triangles face the same way and
- * their areas sum to that of the face. */
-TEST(test_load_concave_face_cut_inside) {
+/* A flat concave face is cut within its outline: all triangles face the same way and their areas
+ * add up to that of the face. */
+TEST(test_load_concave_face_triangulated_inside_outline) {
   static const double corners[7][3] = {{0, 0, 0},   {90, 0, 0}, {90, 30, 0}, {30, 30, 0},
                                        {30, 60, 0}, {0, 60, 0}, {0, 0, 50}};
   for (double size = 1.0; size > 1.0e-4; size /= 100.0) {
@@ -179,9 +179,9 @@ TEST(test_load_concave_face_cut_inside) {
   }
 }
 
-/* A face with collinear corners or self-intersections is still cut into its number of corners less
- * two triangles. */
-TEST(test_load_degenerate_faces_cut_into_all_triangles) {
+/* Even a face with collinear corners or self-intersections is cut into as many triangles as it has
+ * corners, less two. */
+TEST(test_load_collinear_or_crossing_face_triangulated) {
   static const char text[] = SAMPLE_PLY(6, 3) "0 0 0\n10 0 0\n20 0 0\n30 0 0\n0 10 0\n10 10 0\n"
                                               "4 0 1 2 3\n5 0 1 2 3 4\n4 0 5 4 1\n";
   char path[256];
@@ -200,9 +200,9 @@ TEST(test_load_face_of_too_many_corners_refused) {
   refuse_text(state, "a.ply", text, SUPINE_ERROR_FORMAT, "face 0 has 1025 corners");
 }
 
-/* Two nodes show the same tetrahedron, one shifted, the other mirrored and shifted. The triangles
- * of both face outwards. */
-TEST(test_load_nodes_transformed_mirror_keeps_orientation) {
+/* Two nodes of a scene use one tetrahedron; the second mirrors it. The triangles of both face
+ * outwards. */
+TEST(test_load_mirrored_node_triangles_face_outwards) {
   static const char text[] =
       "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
       "{\"children\":[1,2],\"translation\":[0,0,1000]},"
@@ -238,8 +238,8 @@ TEST(test_load_nodes_transformed_mirror_keeps_orientation) {
   supine_mesh_free(&mesh);
 }
 
-/* Load the tetrahedron with a first line `head` and these axes; return the x of vertex 1, 120 or
- * -120. */
+/* Load the tetrahedron with the first line `head` under these axes. Return the only x that is not
+ * 0: 120 or -120. */
 static double x_under(void **state, const char *name, const char *head, supine_axes axes,
                       supine_mesh_report *report) {
   char text[512];
@@ -284,8 +284,7 @@ TEST(test_load_axes_option_overrides_tag) {
   }
 }
 
-/* A SPACE tag is read anywhere in the header of a binary STL file; 3D Slicer writes it at the
- * beginning. */
+/* A SPACE tag may be anywhere in the header of a binary STL file; 3D Slicer writes it first. */
 TEST(test_load_axes_tag_in_stl_header_used) {
   static const char *const heads[] = {"SPACE=RAS", "a lung, SPACE=RAS"};
   for (size_t i = 0; i < 2; ++i) {
@@ -304,7 +303,7 @@ TEST(test_load_axes_tag_in_stl_header_used) {
   }
 }
 
-TEST(test_load_axes_foreign_tag_refused) {
+TEST(test_load_axes_unknown_tag_refused) {
   refuse_text(state, "a.obj", "# SPACE=LLS\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
               SUPINE_ERROR_FORMAT, "SPACE tag");
   refuse_text(state, "a.obj", "# SPACE=RASP\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
@@ -365,7 +364,7 @@ TEST(test_load_unreadable_path_reports_read_error) {
   expect_refused("/dev/null", NULL, SUPINE_ERROR_READ, "not a regular file");
   (void)sample_text(state, "a.obj", tetrahedron_obj, path);
   assert_int_equal(chmod(path, 0), 0);
-  if (access(path, R_OK) != 0) { /* root may read any file */
+  if (access(path, R_OK) != 0) { /* root reads any file */
     expect_refused(path, NULL, SUPINE_ERROR_READ, "Permission denied");
   }
   assert_int_equal(unlink(path), 0);
@@ -393,7 +392,7 @@ TEST(test_load_no_triangles_reports_mesh_error) {
               SUPINE_ERROR_MESH, "no triangles");
 }
 
-TEST(test_load_not_finite_mesh_vertex_named) {
+TEST(test_load_vertex_not_finite_named_in_message) {
   static const char head[] =
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
       "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
@@ -446,7 +445,7 @@ static void *read_often(void *argument) {
   return NULL;
 }
 
-/* The material files that an OBJ names are not opened: inotify sees no access. */
+/* Material files that an OBJ file names are not opened: inotify reports no access. */
 TEST(test_load_obj_materials_not_opened) {
   char materials[256];
   char text[1024];
@@ -465,7 +464,7 @@ TEST(test_load_obj_materials_not_opened) {
   assert_int_equal(unlink(materials), 0);
 }
 
-TEST(test_load_from_threads_good_and_bad) {
+TEST(test_load_in_several_threads_same_results) {
   enum { THREADS = 4 };
   static const char *const names[] = {"0", "1", "2", "3"};
   char paths[THREADS][2][256];
@@ -511,8 +510,8 @@ TEST(test_load_from_threads_good_and_bad) {
       "<DataArray type=\"UInt8\" Name=\"offsets\" format=\"appended\" offset=\"12\"/>",            \
       "<AppendedData encoding=\"" encoding "\">_" data "</AppendedData>")
 
-/* The arrays of bytes 0 0 0 1 0 0 0 1 0, 0 1 2 and 3 are read from text and from base64. In base64,
- * the size of an array precedes it in 4 or 8 bytes. */
+/* The same arrays are read from text and from base64. In base64, a size of 4 or 8 bytes precedes
+ * each array. */
 TEST(test_load_vtp_each_encoding_same_triangle) {
   static const char *const texts[] = {
       VTP_ASCII(VTP_POINTS, "0 1 2", "3"),

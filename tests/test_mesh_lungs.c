@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Real lungs (tests/README.md) have known sizes, topology and volumes. */
-#include <math.h>
-
 #include "mesh_samples.h"
 
 /* Load a file of the test data; skip the test if the file is missing. */
@@ -26,14 +24,13 @@ static supine_topology topology_of(const supine_mesh *mesh) {
   return topology;
 }
 
-/* Closed lungs have known numbers of vertices and triangles, genus and volume. */
-TEST(test_lungs_closed_known_numbers) {
+TEST(test_load_real_lungs_known_counts_and_volumes) {
   static const struct {
     const char *name;
     size_t vertices;
     size_t triangles;
     long genus;
-    double litres; /* volume, within 0.05 litres */
+    double litres; /* +- 0.05 */
   } cases[] = {
       {"lungs/chaste_left_5k.obj", 5001, 9998, 0, 3.4},
       {"lungs/chaste_right_5k.obj", 5001, 9998, 0, 4.2},
@@ -62,7 +59,7 @@ TEST(test_lungs_closed_known_numbers) {
   }
 }
 
-TEST(test_lungs_stl_soup_welds_closed) {
+TEST(test_load_real_stl_lungs_closed) {
   static const struct {
     const char *name;
     size_t vertices;
@@ -83,7 +80,7 @@ TEST(test_lungs_stl_soup_welds_closed) {
   }
 }
 
-TEST(test_lungs_known_defect_edges_counted) {
+TEST(test_topology_damaged_real_lung_edges_counted) {
   supine_mesh mesh = lung_load("covid/covid005_left_DEFECT.ply", NULL);
   supine_topology topology = topology_of(&mesh);
   assert_int_equal(topology.boundary_edges, 2);
@@ -95,8 +92,8 @@ TEST(test_lungs_known_defect_edges_counted) {
   supine_mesh_free(&mesh);
 }
 
-/* A lung saved as STL, without shared vertices, and loaded again is the same surface. */
-TEST(test_lungs_stl_round_trip_same_surface) {
+/* An STL file repeats a vertex in each of its triangles. */
+TEST(test_save_real_lung_as_stl_loads_same_surface) {
   supine_mesh mesh = lung_load("lungs/chaste_left.ply", NULL);
   char path[256];
   const supine_mesh_save_options options = {.axes = SUPINE_AXES_RAS};
@@ -107,7 +104,7 @@ TEST(test_lungs_stl_round_trip_same_surface) {
   assert_int_equal(unlink(path), 0);
   assert_int_equal(again.vertex_count, mesh.vertex_count);
   assert_int_equal(again.triangle_count, mesh.triangle_count);
-  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) { /* exact, as file and mesh are float32 */
+  for (size_t c = 0; c < 3 * mesh.triangle_count; ++c) { /* exact, as the mesh came from float32 */
     assert_memory_equal(again.vertices + 3 * (size_t)again.triangles[c],
                         mesh.vertices + 3 * (size_t)mesh.triangles[c], 3 * sizeof(double));
   }

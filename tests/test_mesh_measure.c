@@ -1,47 +1,38 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volume, box and areas of surfaces against closed forms. */
+/* Volume, box and areas of surfaces, compared with closed forms. */
 #include <float.h>
-#include <math.h>
 
 #include "mesh_samples.h"
-
-static const double pi = 3.14159265358979323846;
 
 /* Return the tolerance of a sum of `terms` terms of about `size`, each rounded a few times. */
 static double rounding(size_t terms, double size) {
   return 8.0 * (double)terms * DBL_EPSILON * size;
 }
 
-static void expect_near(double found, double expected, double tolerance) {
-  if (!(fabs(found - expected) <= tolerance)) {
-    fail_msg("%.17g is not within %.3g of %.17g", found, tolerance, expected);
-  }
-}
-
 TEST(test_volume_box_and_tetrahedron_literal) {
   supine_mesh box = sample_box();
   supine_mesh tetrahedron = sample_tetrahedron();
-  expect_near(supine_mesh_volume(&box), 1430000.0, rounding(12, 1430000.0));
-  expect_near(supine_mesh_volume(&tetrahedron), 288000.0, rounding(4, 288000.0));
+  assert_close(supine_mesh_volume(&box), 1430000.0, rounding(12, 1430000.0));
+  assert_close(supine_mesh_volume(&tetrahedron), 288000.0, rounding(4, 288000.0));
   supine_mesh_free(&box);
   supine_mesh_free(&tetrahedron);
 }
 
-TEST(test_volume_flipped_negative) {
+TEST(test_volume_reversed_triangles_negative) {
   supine_mesh box = sample_box();
   for (size_t t = 0; t < box.triangle_count; ++t) {
     const uint32_t swap = box.triangles[3 * t];
     box.triangles[3 * t] = box.triangles[3 * t + 1];
     box.triangles[3 * t + 1] = swap;
   }
-  expect_near(supine_mesh_volume(&box), -1430000.0, rounding(12, 1430000.0));
+  assert_close(supine_mesh_volume(&box), -1430000.0, rounding(12, 1430000.0));
   supine_mesh_free(&box);
 }
 
-/* The volume of a torus with corners (R + r cos b) cos a, (R + r cos b) sin a, r sin b, for angles
- * a in N steps and b in M steps, is N sin(2 pi / N) R (M / 2) r^2 sin(2 pi / M): any horizontal cut
- * is a ring between two regular polygons. It is also right far from the origin, where sums about
- * the origin cancel. */
+/* The volume of a torus with corners (R + r cos b) cos a, (R + r cos b) sin a, r sin b, for N
+ * angles a and M angles b, is N sin(2 pi / N) R (M / 2) r^2 sin(2 pi / M), as any horizontal
+ * section is a ring between two regular polygons. The torus is far from the origin, where sums
+ * about the origin cancel. */
 TEST(test_volume_torus_far_from_origin_closed_form) {
   enum { N = 37, M = 23 };
   const double R = 83.0;
@@ -50,8 +41,8 @@ TEST(test_volume_torus_far_from_origin_closed_form) {
   static uint32_t triangles[6 * N * M];
   for (uint32_t i = 0; i < N; ++i) {
     for (uint32_t j = 0; j < M; ++j) {
-      const double a = 2.0 * pi * i / N;
-      const double b = 2.0 * pi * j / M;
+      const double a = 2.0 * M_PI * i / N;
+      const double b = 2.0 * M_PI * j / M;
       double *vertex = vertices + 3 * (size_t)(i * M + j);
       vertex[0] = (R + r * cos(b)) * cos(a) + 4.0e6;
       vertex[1] = (R + r * cos(b)) * sin(a) - 3.0e6;
@@ -65,9 +56,9 @@ TEST(test_volume_torus_far_from_origin_closed_form) {
     }
   }
   supine_mesh torus = sample_make(N * M, vertices, 2 * N * M, triangles);
-  const double expected = N * sin(2.0 * pi / N) * R * 0.5 * M * r * r * sin(2.0 * pi / M);
-  /* Tolerance: coordinates are rounded by 5e6 epsilon mm, over a surface of about 96000 mm^2. */
-  expect_near(supine_mesh_volume(&torus), expected, 5.0e6 * DBL_EPSILON * 96000.0);
+  const double expected = N * sin(2.0 * M_PI / N) * R * 0.5 * M * r * r * sin(2.0 * M_PI / M);
+  /* Coordinates are rounded by 5e6 epsilon mm, over a surface of about 96000 mm^2. */
+  assert_close(supine_mesh_volume(&torus), expected, 5.0e6 * DBL_EPSILON * 96000.0);
   supine_mesh_free(&torus);
 }
 
@@ -87,12 +78,12 @@ TEST(test_vertex_area_tetrahedron_literal) {
   supine_mesh mesh = sample_tetrahedron();
   double area[4];
   supine_mesh_vertex_area(&mesh, area);
-  /* Three right triangles have 120^2 / 2 = 7200 mm^2 each; the slanted one has sqrt(3) times
-   * that. */
+  /* The three faces in the coordinate planes have 120^2 / 2 = 7200 mm^2 each, the fourth has
+   * sqrt(3) times that. */
   const double slanted = 7200.0 * sqrt(3.0);
-  expect_near(area[0], 7200.0, rounding(3, 7200.0));
+  assert_close(area[0], 7200.0, rounding(3, 7200.0));
   for (int i = 1; i < 4; ++i) {
-    expect_near(area[i], (2.0 * 7200.0 + slanted) / 3.0, rounding(3, 9000.0));
+    assert_close(area[i], (2.0 * 7200.0 + slanted) / 3.0, rounding(3, 9000.0));
   }
   supine_mesh_free(&mesh);
 }
@@ -105,7 +96,7 @@ TEST(test_vertex_area_sums_to_surface) {
   for (int i = 0; i < 8; ++i) {
     sum += area[i];
   }
-  expect_near(sum, 2.0 * (100.0 * 110.0 + 110.0 * 130.0 + 130.0 * 100.0), rounding(36, 76600.0));
+  assert_close(sum, 2.0 * (100.0 * 110.0 + 110.0 * 130.0 + 130.0 * 100.0), rounding(36, 76600.0));
   supine_mesh_free(&box);
 }
 

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Each allocation of loading, welding, measuring and saving fails in turn. The result is a reported
- * error or the same as without the failure, and nothing leaks (checked by a leak sanitizer). */
+/* When any allocation of loading, measuring or saving fails, the function reports an error or does
+ * without the memory. A leak sanitizer checks that nothing leaks. The linker option --wrap
+ * redirects allocations to this file. */
 #include <errno.h>
 #include <sys/mman.h>
 
 #include "mesh_samples.h"
 
-/* Number of allocations that still succeed before one fails; negative: none fails. The linker
- * redirects allocations to this file. */
+/* number of allocations that still succeed before one fails; negative if none shall fail */
 static int allocations_left = -1;
-static int *allocations_failed; /* shared with the process in which assimp runs */
+static int *allocations_failed; /* in shared memory, as assimp runs in another process */
 
 static int allocation_fails(void) {
   const int fails = allocations_left >= 0 && allocations_left-- == 0;
@@ -42,8 +42,8 @@ void *__wrap_realloc(void *old, size_t size) {
 }
 /* NOLINTEND(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
 
-/* Run `work` with allocation 0, 1, 2, ... failing, until a run ends before that allocation. Assert
- * that there were at least `least` allocations. */
+/* Run `work` again and again; allocation n of run n fails. Stop at the first run with at most n
+ * allocations, and assert that n is at least `least`. */
 static void fail_each(supine_status (*work)(const char *path, supine_error *error),
                       const char *path, int least) {
   for (int nth = 0;; ++nth) {
@@ -61,9 +61,9 @@ static void fail_each(supine_status (*work)(const char *path, supine_error *erro
       return;
     }
     if (status == SUPINE_OK) {
-      continue; /* the memory was optional, as that of a buffer */
+      continue; /* the memory was optional, such as a buffer */
     }
-    /* Without memory, opening an output may give a write error; its message names memory. */
+    /* Opening an output without memory gives a write error, whose message names memory. */
     if ((status != SUPINE_ERROR_MEMORY && status != SUPINE_ERROR_WRITE) || error.status != status ||
         strstr(error.message, "memory") == NULL) {
       fail_msg("%s: allocation %d: status %d, \"%s\"", path, nth, (int)status, error.message);
@@ -92,7 +92,8 @@ TEST(test_load_each_allocation_failing_reports_memory_error) {
   for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
     char path[256];
     (void)sample_text(state, files[i].name, files[i].text, path);
-    fail_each(load, path, 5); /* arrays of bytes, vertices and triangles, and two for welding */
+    /* arrays of bytes, vertices and triangles, and two to merge vertices */
+    fail_each(load, path, 5);
     assert_int_equal(unlink(path), 0);
   }
 }
@@ -110,7 +111,8 @@ static supine_status find_edges(const char *path, supine_error *error) {
   assert_true((status == SUPINE_OK) == (topology.component != NULL));
   supine_mesh_topology_free(&topology);
   supine_mesh_free(&mesh);
-  return supine_error_set(error, status, "out of memory"); /* the function sets no message */
+  /* supine_mesh_topology_create sets no message. */
+  return supine_error_set(error, status, "out of memory");
 }
 
 TEST(test_topology_each_allocation_failing_reports_memory_error) {
@@ -131,8 +133,8 @@ static supine_status save(const char *path, supine_error *error) {
   return status;
 }
 
-/* Only writing VTP and opening an output allocate. If a file were left, the removal of the folder
- * would fail. */
+/* Only opening an output and writing VTP allocate. A file left behind would keep the folder from
+ * being removed. */
 TEST(test_save_each_allocation_failing_reports_memory_error) {
   static const char *const names[] = {"a.ply", "a.obj", "a.stl", "a.vtp"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Saved files: equal when read back, displacements and expected errors, and never incomplete. */
+/* Saved files: equal when read again, with displacements and expected errors, never incomplete. */
 #include <fcntl.h>
 #include <float.h>
-#include <math.h>
 #include <sys/stat.h>
 
 #include "mesh_samples.h"
@@ -10,7 +9,7 @@
 
 static const char *const endings[] = {"a.ply", "a.obj", "a.stl", "a.VTP"};
 
-/* Make a box whose corners are rounded in float32. */
+/* Make a box with coordinates that float32 rounds. */
 static supine_mesh make_crooked(void) {
   supine_mesh mesh = sample_box();
   for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
@@ -27,8 +26,8 @@ static void save(const char *path, const supine_mesh *mesh,
   }
 }
 
-/* Return the vertex nearest to a position, and its distance. Loading reorders vertices, so they are
- * compared by position. */
+/* Return the vertex nearest to a position, and its distance. Loaded vertices have another order, so
+ * tests compare positions. */
 static size_t nearest(const supine_mesh *mesh, const double position[3], double *distance) {
   size_t found = 0;
   *distance = INFINITY;
@@ -71,8 +70,7 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
       if (supine_mesh_load(path, NULL, &again, &report, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      /* Positions are rounded to float32; assimp may round text once more; VTP has steps of 1/256
-       * mm. */
+      /* Positions are float32, assimp may round text again, and VTP has steps of 1/256 mm. */
       static const double tolerance[] = {64.0 * FLT_EPSILON, 512.0 * FLT_EPSILON,
                                          64.0 * FLT_EPSILON, 0.5 / 256.0};
       expect_same(&again, &mesh, tolerance[k]);
@@ -86,7 +84,7 @@ TEST(test_save_load_round_trip_each_format_and_axes) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_save_load_indexed_keeps_order) {
+TEST(test_save_ply_loads_in_same_order) {
   supine_mesh mesh = sample_box();
   char path[256];
   save(sample_path(state, "a.ply", path), &mesh, NULL);
@@ -115,7 +113,7 @@ static const char *find(const unsigned char *bytes, size_t size, const char *tex
   return found + strlen(text);
 }
 
-/* The displacement of one vertex is (3, 4, 12) mm, 13 mm in length; in RAS it is (-3, -4, 12). */
+/* Vertex 2 moves by (3, 4, 12) mm, 13 mm in length; in RAS by (-3, -4, 12). */
 TEST(test_save_ply_displacement_in_each_row) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
@@ -145,7 +143,7 @@ TEST(test_save_ply_displacement_in_each_row) {
   supine_mesh_free(&mesh);
 }
 
-/* The expected error is in mm even if the file is in cm. In each row it is the last value. */
+/* The expected error is in mm even in a file in cm, and is the last value of each row. */
 TEST(test_save_expected_error_stays_in_millimetres) {
   static const float errors[4] = {1.5F, 2.5F, 3.5F, 4.5F};
   supine_mesh mesh = sample_tetrahedron();
@@ -207,12 +205,12 @@ static uint64_t size_at(const unsigned char *bytes) {
   return value;
 }
 
-/* Decompress an array of one block and at most 64 bytes, whose size is `expected`; return the start
- * of the next array. */
+/* Decompress an array of one block; assert that it has `expected` bytes, at most 64. Return the
+ * start of the next array. */
 static const unsigned char *unpack(const unsigned char *at, unsigned char *array, size_t expected) {
   uLongf size = 64;
   assert_int_equal(size_at(at), 1);
-  assert_int_equal(size_at(at + 16), expected); /* size of the last block */
+  assert_int_equal(size_at(at + 16), expected);
   const size_t packed = size_at(at + 24);
   assert_int_equal(uncompress(array, &size, at + 32, packed), Z_OK);
   assert_int_equal(size, expected);
@@ -299,8 +297,7 @@ TEST(test_save_vtp_opens_in_vtk) {
   assert_int_equal(unlink(path), 0);
 }
 
-/* A series with an impossible path is refused, and a series that is not committed leaves no
- * file. */
+/* A series with an impossible path is refused. A series closed without a commit leaves no file. */
 TEST(test_series_impossible_or_uncommitted_leaves_no_file) {
   static const double times[2] = {0.0, 0.5};
   supine_mesh mesh = sample_tetrahedron();
@@ -315,7 +312,7 @@ TEST(test_series_impossible_or_uncommitted_leaves_no_file) {
   supine_mesh_series_close(NULL);
 
   assert_int_equal(mkfifo(path, 0600), 0);
-  /* With a reader, opening the FIFO for writing does not block. */
+  /* Opening a FIFO for writing does not block if it has a reader. */
   const int reader = open(path, O_RDONLY | O_NONBLOCK);
   assert_true(reader >= 0);
   assert_int_equal(supine_mesh_series_open(path, &mesh, NULL, 2, times, &series, &error),
@@ -342,8 +339,8 @@ TEST(test_series_impossible_or_uncommitted_leaves_no_file) {
   supine_mesh_free(&mesh);
 }
 
-/* Axes and units apply to all arrays. Lengths are rounded to steps that are a power of two in the
- * unit of the file. */
+/* Axes and units apply to all arrays. Lengths are multiples of a power of two in the unit of the
+ * file. */
 TEST(test_save_vtp_axes_units_and_rounding_applied) {
   supine_mesh mesh = sample_tetrahedron();
   double rest[12];
@@ -372,17 +369,17 @@ TEST(test_save_vtp_axes_units_and_rounding_applied) {
   for (size_t i = 0; i < 6; ++i) {
     at = unpack(at, arrays[i], sizes[i]);
   }
-  static const double grid = 1.0 / 262144.0; /* m, the greatest power of two below 1/256 mm */
+  static const double step = 1.0 / 262144.0; /* in m: the largest power of two below 1/256 mm */
   for (size_t i = 0; i < 12; ++i) {
     const double sign = i % 3 == 2 ? 1.0 : -1.0;
     const double point = (double)float_at(arrays[0] + 4 * i);
-    assert_true(fabs(point - sign * mesh.vertices[i] / 1000.0) <= 0.5 * grid);
-    assert_true(point / grid == rint(point / grid));
+    assert_true(fabs(point - sign * mesh.vertices[i] / 1000.0) <= 0.5 * step);
+    assert_true(point / step == rint(point / step));
     const double normal = (double)float_at(arrays[5] + 4 * i);
     assert_true(fabs(normal - sign * (double)normals[i]) <= 1.0 / 512.0);
   }
-  assert_true(fabs((double)float_at(arrays[3] + 36) + 0.003) <= 0.5 * grid);
-  assert_true(fabs((double)float_at(arrays[4] + 12) - 0.003) <= grid);
+  assert_true(fabs((double)float_at(arrays[3] + 36) + 0.003) <= 0.5 * step);
+  assert_true(fabs((double)float_at(arrays[4] + 12) - 0.003) <= step);
   free(bytes);
   supine_mesh_free(&mesh);
   assert_int_equal(unlink(path), 0);
@@ -406,7 +403,7 @@ TEST(test_save_unknown_ending_refused) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_save_not_finite_mesh_no_file) {
+TEST(test_save_vertex_not_finite_refused_without_file) {
   static const double bad[] = {(double)NAN, (double)INFINITY, -1.0e39};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_mesh mesh = sample_tetrahedron();
@@ -421,7 +418,7 @@ TEST(test_save_not_finite_mesh_no_file) {
   }
 }
 
-TEST(test_save_too_large_refused) {
+TEST(test_save_too_many_vertices_refused) {
   const supine_mesh mesh = {.vertex_count = (size_t)INT32_MAX + 1};
   char path[256];
   assert_int_equal(supine_mesh_save(sample_path(state, "a.ply", path), &mesh, NULL, NULL),
@@ -442,7 +439,6 @@ TEST(test_save_missing_folder_reports_write_error) {
   supine_mesh_free(&mesh);
 }
 
-/* Writing through a link to a full device is reported. */
 TEST(test_save_full_disk_reports_write_error) {
   supine_mesh mesh = sample_tetrahedron();
   for (size_t i = 0; i < sizeof endings / sizeof *endings; ++i) {

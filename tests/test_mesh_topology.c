@@ -8,8 +8,7 @@ static supine_topology topology_of(const supine_mesh *mesh) {
   return topology;
 }
 
-/* Assert the numbers of vertices, edges, triangles and components and the genus of a closed
- * surface; free it. */
+/* Assert the properties of a closed surface; free it. */
 static void expect_closed(supine_mesh mesh, size_t vertices, size_t edges, size_t triangles,
                           size_t components, long genus) {
   supine_topology topology = topology_of(&mesh);
@@ -27,12 +26,10 @@ static void expect_closed(supine_mesh mesh, size_t vertices, size_t edges, size_
   supine_mesh_free(&mesh);
 }
 
-/* Make a torus from a grid of `around` x `across` vertices whose opposite sides are joined. */
+/* Make a torus: join opposite sides of a grid of `around` x `across` vertices. */
 static supine_mesh make_torus(uint32_t around, uint32_t across) {
-  supine_mesh mesh = sample_make(0, NULL, 0, NULL);
-  supine_mesh_free(&mesh);
-  mesh.vertex_count = (size_t)around * across;
-  mesh.triangle_count = 2 * mesh.vertex_count;
+  supine_mesh mesh = {.vertex_count = (size_t)around * across,
+                      .triangle_count = (size_t)2 * around * across};
   mesh.vertices = calloc(3 * mesh.vertex_count, sizeof *mesh.vertices);
   mesh.triangles = malloc(3 * mesh.triangle_count * sizeof *mesh.triangles);
   assert_non_null(mesh.vertices);
@@ -110,7 +107,7 @@ TEST(test_topology_two_tetrahedra_components_in_order) {
 }
 
 TEST(test_topology_components_joined_late_count_as_one) {
-  /* Only the last triangles join the parts of a strip, and the last part is numbered first. */
+  /* Only the last two triangles join the first three; the third triangle has vertex 0. */
   static const double vertices[27] = {0};
   static const uint32_t triangles[] = {8, 7, 6, 5, 4, 3, 2, 1, 0, 6, 5, 7, 3, 2, 4};
   supine_mesh mesh = sample_make(9, vertices, 5, triangles);
@@ -123,7 +120,7 @@ TEST(test_topology_components_joined_late_count_as_one) {
   supine_mesh_free(&mesh);
 }
 
-/* A closed surface whose two ends share a vertex has V - E + F = 1, so its genus is undefined. */
+/* If two points of a sphere become one vertex, V - E + F = 1, and the genus is undefined. */
 TEST(test_topology_pinched_in_a_vertex_no_genus) {
   static const double vertices[21] = {0};
   static const uint32_t triangles[] = {0, 2, 1, 0, 3, 2, 0, 1, 3, 1, 2, 5, 1, 5, 4, 2, 3, 6,
@@ -169,7 +166,7 @@ TEST(test_topology_flipped_triangle_inconsistent) {
 }
 
 TEST(test_topology_hub_of_many_edges_sorted) {
-  /* Make a disc around vertex 0, whose rim visits the other vertices in steps of 331. */
+  /* a disc around vertex 0; its rim takes every 331st of the other vertices */
   enum { RIM = 997 };
   static double vertices[3 * (RIM + 1)];
   static uint32_t triangles[3 * RIM];
@@ -192,8 +189,8 @@ TEST(test_topology_hub_of_many_edges_sorted) {
 }
 
 TEST(test_topology_touching_tetrahedra_no_genus) {
-  /* Two closed surfaces that share a vertex have V - E + F = 7 - 12 + 8 = 3, which is impossible
-   * for one surface. */
+  /* Two tetrahedra with a common vertex: V - E + F = 7 - 12 + 8 = 3, impossible for one closed
+   * surface. */
   static const double vertices[21] = {0};
   static const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3,
                                        0, 5, 4, 0, 4, 6, 0, 6, 5, 4, 5, 6};

@@ -3,8 +3,8 @@
 # Check that no command loses data: test_no_data_lost.sh PROGRAM [KILLS [SIGNALS]]
 #
 # An output that is also an input is refused under any name. A missing folder is reported before the inputs are read.
-# A full disk, a size limit or a signal leaves no file: each command that writes a file is ended by each of the SIGNALS
-# (default KILL TERM INT) at KILLS (default 2) random moments.
+# A full disk, a size limit or a signal leaves no incomplete file. Each of the SIGNALS (default KILL TERM INT) ends each
+# command that writes a file at KILLS (default 2) random moments.
 set -u
 export SOURCE_DATE_EPOCH=0 # so that a report made again is the same, even after midnight
 supine=$1
@@ -27,8 +27,8 @@ fail() {
 awk 'BEGIN { print "name,x,y,z"; for (i = 0; i < 300; ++i) printf "p%d,%d,%d,%d\n", i, 60 + i % 50, i % 40, i % 60 }' >points.csv
 "$supine" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1 || exit 1
 
-# refused INPUT ENDING COMMAND...: run the command with -o and each name of its input, a copy of INPUT with this
-# ending; check that it is refused and the input unchanged.
+# refused INPUT ENDING COMMAND...: copy INPUT to "input" with this ending, and run the command with each name of this
+# copy as its output. Check that the command refuses, and that the copy is unchanged.
 refused() {
   input=$1
   ending=$2
@@ -37,9 +37,9 @@ refused() {
   ln -f "input$ending" "hard$ending"
   ln -sf "input$ending" "soft$ending"
   for name in "input$ending" "./input$ending" "hard$ending" "soft$ending" "$work/input$ending"; do
-    "$supine" "$@" -o "$name" >said 2>&1
+    "$supine" "$@" -o "$name" >log 2>&1
     code=$?
-    [ $code -eq 1 ] && grep -q 'is also an input' said || fail "$* -o $name: $code, $(cat said)"
+    [ $code -eq 1 ] && grep -q 'is also an input' log || fail "$* -o $name: $code, $(cat log)"
     cmp -s "before$ending" "input$ending" || fail "$* -o $name: the input has changed"
   done
   rm -f "before$ending" "input$ending" "hard$ending" "soft$ending"
@@ -60,20 +60,20 @@ refused points.csv .safetensors embed lungs.safetensors input.safetensors
 refused points.csv .json fit --landmarks input.json
 refused lungs.ply .png validate lungs.safetensors --state prone:input.png
 printf 'seconds,w,x,y,z\n0,1,0,0,0\n' >poses.csv && cp poses.csv poses.before
-"$supine" stream lungs.safetensors --replay poses.csv --record poses.csv >said 2>&1
-[ $? -eq 1 ] && cmp -s poses.csv poses.before || fail "stream --record replaced the file that it replays: $(cat said)"
-"$supine" precompute lungs.ply -o basis.stl >said 2>&1
-[ $? -eq 1 ] && [ ! -e basis.stl ] || fail "a basis named .stl: $(cat said)"
+"$supine" stream lungs.safetensors --replay poses.csv --record poses.csv >log 2>&1
+[ $? -eq 1 ] && cmp -s poses.csv poses.before || fail "stream --record replaced the file that it replays: $(cat log)"
+"$supine" precompute lungs.ply -o basis.stl >log 2>&1
+[ $? -eq 1 ] && [ ! -e basis.stl ] || fail "precompute -o basis.stl is not refused: $(cat log)"
 
 # A missing output folder is reported before the input is read.
-"$supine" precompute missing.ply -o nowhere/a.safetensors >said 2>&1
-[ $? -eq 4 ] && grep -q 'nowhere/a.safetensors: .*No such file' said || fail "missing folder: $(cat said)"
+"$supine" precompute missing.ply -o nowhere/a.safetensors >log 2>&1
+[ $? -eq 4 ] && grep -q 'nowhere/a.safetensors: .*No such file' log || fail "precompute into a missing folder: $(cat log)"
 
 # A link is kept, and its target is replaced.
 mkdir far
 echo old >far/target.ply
 ln -s far/target.ply link.ply
-"$supine" deform lungs.safetensors --posture prone -o link.ply >/dev/null || fail "through a link"
+"$supine" deform lungs.safetensors --posture prone -o link.ply >/dev/null || fail "deform -o link.ply"
 [ -L link.ply ] && [ "$(head -c 3 far/target.ply)" = ply ] || fail "the link was replaced"
 
 # writer NAME COMMAND...: run "COMMAND -o NAME" once to its end, then with a size limit, a full disk and signals.
@@ -82,27 +82,27 @@ writer() {
   shift
   mkdir out
   began=$(date +%s%N)
-  "$supine" "$@" -o "out/$name" >said 2>&1
+  "$supine" "$@" -o "out/$name" >log 2>&1
   code=$?
   took=$((($(date +%s%N) - began) / 1000000))
   if [ $code -eq 3 ]; then
-    echo "skipped $1: $(cat said)"
+    echo "skipped $1: $(cat log)"
     rm -rf out
     return
   fi
-  [ $code -eq 0 ] || fail "$*: $code, $(cat said)"
+  [ $code -eq 0 ] || fail "$*: $code, $(cat log)"
   mv "out/$name" whole
   rm -rf out && mkdir out
 
-  (ulimit -f 8; "$supine" "$@" -o "out/$name" >said 2>&1)
+  (ulimit -f 8; "$supine" "$@" -o "out/$name" >log 2>&1)
   code=$?
-  [ $code -eq 4 ] && grep -q 'File too large' said || fail "$*: too large: $code, $(cat said)"
+  [ $code -eq 4 ] && grep -q 'File too large' log || fail "$*: too large: $code, $(cat log)"
   [ -z "$(ls -A out)" ] || fail "$*: too large left $(ls -A out)"
 
   if [ -d small ]; then
-    "$supine" "$@" -o "small/$name" >said 2>&1
+    "$supine" "$@" -o "small/$name" >log 2>&1
     code=$?
-    [ $code -eq 4 ] && grep -q 'No space left on device' said || fail "$*: full: $code, $(cat said)"
+    [ $code -eq 4 ] && grep -q 'No space left on device' log || fail "$*: full: $code, $(cat log)"
     [ "$(ls -A small)" = filler ] || fail "$*: a full disk left $(ls -A small)"
   fi
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law from landmarks: held-out errors, recovery of known constants, records, and
+/* A patient's law fitted to landmarks: held-out errors, recovery of known constants, records,
  * refused input. */
 #include "test.h"
 
@@ -12,9 +12,7 @@
 #include "precompute/patient/patient_file.h"
 #include "program/validation.h"
 
-#include "lungs_helpers.h"
-
-/* Fit a law to pairs of points as `supine fit` does. */
+/* Fit a law to pairs of points, like `supine fit`. */
 static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
                       supine_patient_scan_motion moved, supine_patient *patient,
                       supine_patient_fit_report *report) {
@@ -46,13 +44,15 @@ static supine_patient_pairs scatter(size_t count, unsigned long seed) {
   return pairs;
 }
 
-/* Compute the displacement u of a point by a law, mm; the side of the midline selects the lung. */
+/* Compute the displacement u of a point by a law, mm. The point belongs to the lung on its side of
+ * the midline. */
 static void displace(const supine_patient *patient, const double point[3], double u[3]) {
   const supine_patient_place place = supine_patient_find(&patient->frame, point, 0.0);
   supine_patient_displacement(patient, &place, 1.0, u);
 }
 
-/* Move points by a law, and add Gaussian noise of `noise` mm to each coordinate. */
+/* Move points by a law, and add Gaussian noise with a standard deviation of `noise` mm to each
+ * coordinate. */
 static void move(supine_patient_pairs *pairs, const supine_patient *truth, double noise,
                  unsigned long seed) {
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
@@ -90,12 +90,12 @@ static supine_patient_record record_of(const supine_patient *patient) {
   return record;
 }
 
-/* Held-out errors of five public pairs are below those of the quadratic law of commit 220ee0d on
- * the same blocks, from either image. */
-TEST(test_fit_public_pairs_below_quadratic_law) {
+/* Held-out errors of five public pairs of images, fitted from either image, are below those of a
+ * quadratic law (commit 220ee0d) on the same blocks of points. */
+TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   static const struct {
     const char *name;
-    double quadratic[2]; /* held-out RMS, mm, from the inhaled and the exhaled image */
+    double quadratic_rms[2]; /* mm, fitted from the inhaled image and from the exhaled one */
   } cases[] = {{"054", {3.01, 3.30}},
                {"055", {8.07, 9.83}},
                {"056", {3.83, 4.44}},
@@ -128,9 +128,8 @@ TEST(test_fit_public_pairs_below_quadratic_law) {
            held[SUPINE_PATIENT_SCORE_TRANSLATION], held[SUPINE_PATIENT_SCORE_AFFINE],
            held[SUPINE_PATIENT_SCORE_LAW], kept, report.expected_point, report.band,
            report.explained);
-    assert_true(kept < cases[c / 2].quadratic[exhaled]);
+    assert_true(kept < cases[c / 2].quadratic_rms[exhaled]);
     assert_true(kept < held[SUPINE_PATIENT_SCORE_LAW] && kept < held[SUPINE_PATIENT_SCORE_AFFINE]);
-    /* The held-out error is above that of the fitted points. */
     assert_true(kept > report.fitted[SUPINE_PATIENT_SCORE_CORRECTED]);
     assert_true(report.band > 87.0 && report.band < 99.0);
     mean[exhaled] += kept / 5.0;
@@ -142,15 +141,15 @@ TEST(test_fit_public_pairs_below_quadratic_law) {
   assert_true(band > 92.0 && band < 98.0);
 }
 
-/* At the fitted points, the residual of the corrected law is the one that the fit reports. */
-TEST(test_correct_fitted_points_match_prediction) {
+/* At the fitted points, the corrected law leaves the residual that the fit reports. */
+TEST(test_correct_fitted_points_leave_reported_residual) {
   supine_patient_pairs pairs = scatter(150, 8);
   supine_patient truth = known(&pairs);
   supine_patient found;
   supine_patient_fit_report report;
   double square = 0.0;
   move(&pairs, &truth, 0.4, 5);
-  for (size_t i = 0; i < pairs.count; ++i) { /* adds a motion that the law cannot describe */
+  for (size_t i = 0; i < pairs.count; ++i) { /* a motion that the law cannot describe */
     pairs.to[3 * i] += 6.0 * sin(pairs.from[3 * i + 2] / 30.0);
   }
   fit_pairs(&pairs, SUPINE_PATIENT_DEEP, SUPINE_PATIENT_RIGID, &found, &report);
@@ -182,7 +181,7 @@ TEST(test_find_side_given_overrides_midline) {
   assert_true(place.side == 1.0 && place.box[0] < 0.0);
   double u[3];
   supine_patient_displacement(&patient, &place, 1.0, u);
-  assert_true(u[0] == 0.0); /* its x does not change, as on the fixed plane */
+  assert_true(u[0] == 0.0); /* the law fixes x where box[0] <= 0 */
   supine_patient_pairs_free(&pairs);
 }
 
@@ -218,7 +217,6 @@ TEST(test_fit_noisy_landmarks_recover_constants) {
     printf("c%zu: true value %8.4f, found %8.4f +- %.4f\n", k + 1, expected[k], c[k],
            report.error[k]);
     assert_true(fabs(c[k] - expected[k]) <= 3.0 * report.error[k]);
-    /* The stated errors are small, too. */
     assert_true(report.error[k] < 0.2 * (1.0 + fabs(expected[k])));
   }
   double worst = 0.0;
@@ -229,13 +227,13 @@ TEST(test_fit_noisy_landmarks_recover_constants) {
     displace(&found, pairs.from + 3 * i, v);
     worst = fmax(worst, hypot(hypot(u[0] - v[0], u[1] - v[1]), u[2] - v[2]));
   }
-  assert_true(worst < 0.5); /* mm, the noise of one measurement */
+  assert_true(worst < 0.5); /* mm, the noise */
   supine_patient_pairs_free(&pairs);
 }
 
-/* The entries of a row are the derivatives of its displacement with respect to the unknowns,
- * compared here with difference quotients. */
-TEST(test_power_design_each_unknown_matches_difference) {
+/* The entries of a row, which are the derivatives of its displacement with respect to the unknowns,
+ * equal difference quotients. */
+TEST(test_power_design_each_unknown_matches_difference_quotient) {
   supine_patient_pairs pairs = scatter(20, 3);
   const supine_patient truth = known(&pairs);
   supine_patient_row rows[60];
@@ -267,7 +265,7 @@ TEST(test_power_design_each_unknown_matches_difference) {
   supine_patient_pairs_free(&pairs);
 }
 
-TEST(test_fit_motion_between_scans_separated_from_law) {
+TEST(test_fit_shifted_scan_separates_shift_from_law) {
   supine_patient_pairs pairs = scatter(250, 5);
   const supine_patient truth = known(&pairs);
   supine_patient found;
@@ -281,68 +279,6 @@ TEST(test_fit_motion_between_scans_separated_from_law) {
   for (size_t k = 0; k < 3; ++k) {
     assert_true(fabs(found.power.motion[k] - shift[k]) < 0.5);
   }
-  supine_patient_pairs_free(&pairs);
-}
-
-/* --- refused input --------------------------------------------------------------------------- */
-
-static supine_status check(const supine_patient_pairs *pairs, bool moved, char *message) {
-  supine_error error = {0};
-  const supine_status status = supine_patient_pairs_check(pairs, moved, &error);
-  (void)snprintf(message, sizeof error.message, "%s", error.message);
-  return status;
-}
-
-static void refused(const supine_patient_pairs *pairs, bool moved, const char *words) {
-  char message[sizeof((supine_error *)0)->message];
-  assert_int_equal(check(pairs, moved, message), SUPINE_ERROR_FORMAT);
-  assert_says(message, words);
-}
-
-TEST(test_pairs_check_impossible_pairs_refused) {
-  supine_patient_pairs pairs = scatter(60, 99);
-  const supine_patient truth = known(&pairs);
-  char message[sizeof((supine_error *)0)->message];
-  const size_t n = pairs.count;
-  move(&pairs, &truth, 0.3, 1);
-  assert_int_equal(check(&pairs, false, message), SUPINE_OK);
-
-  pairs.count = 11;
-  refused(&pairs, false, "pairs of points: 11, where a law needs at least 12");
-  pairs.count = n;
-  for (size_t i = 0; i < n; ++i) { /* reverses one axis of the second points */
-    pairs.to[3 * i] *= -1.0;
-  }
-  refused(&pairs, false, "differ by a reflection");
-  for (size_t i = 0; i < n; ++i) { /* rotates the second points, as from RAS to LPS */
-    pairs.to[3 * i + 1] *= -1.0;
-  }
-  refused(&pairs, true, "by a rotation of 1");
-  move(&pairs, &truth, 0.3, 1);
-  for (size_t i = 0; i < 3 * n; ++i) {
-    pairs.to[i] += 150.0;
-  }
-  refused(&pairs, false, "mm apart");
-  assert_int_equal(check(&pairs, true, message), SUPINE_OK); /* a shift that --translation fits */
-  for (size_t i = 0; i < 3 * n; ++i) {
-    pairs.to[i] = 0.1 * pairs.from[i];
-  }
-  refused(&pairs, false, "in cm");
-  memcpy(pairs.to, pairs.from, 3 * n * sizeof(double));
-  refused(&pairs, false, "the two states are the same");
-  for (size_t i = 0; i < n; ++i) {
-    pairs.to[3 * i + 2] += 5.0;
-  }
-  refused(&pairs, true, "give a state in which the lungs have moved");
-  for (size_t i = 0; i < n; ++i) { /* exchanges the partners of points */
-    memcpy(pairs.to + 3 * i, pairs.from + 3 * ((i * 7 + 3) % n), 3 * sizeof(double));
-  }
-  refused(&pairs, false, "do not match");
-  for (size_t i = 0; i < n; ++i) {
-    pairs.from[3 * i + 1] = 17.0 + 0.3 * pairs.from[3 * i];
-    pairs.to[3 * i + 1] = pairs.from[3 * i + 1];
-  }
-  refused(&pairs, false, "one plane");
   supine_patient_pairs_free(&pairs);
 }
 
@@ -361,11 +297,7 @@ static supine_status load_text(const char *text, bool reverse, supine_patient_pa
 TEST(test_pairs_load_bad_files_message_names_fault) {
   static const struct {
     const char *text, *words;
-  } bad[] = {{"x,y,z,to_x,to_y\n1,2,3,4,5\n", "no column \"to_z\""},
-             {"im1_x,im1_y,im1_z,im2_x,im2_y\n1,2,3,4,5\n", "no column \"im2_z\""},
-             {"x,y,z,to_x,to_y,to_z\n", "no pairs"},
-             {"x,y,z,to_x,to_y,to_z\n1,2,3,4,nan,6\n", ":2: to_y \"nan\" is not a finite number"},
-             {"", "empty"}};
+  } bad[] = {{"im1_x,im1_y,im1_z,im2_x,im2_y\n1,2,3,4,5\n", "no column \"im2_z\""}, {"", "empty"}};
   supine_patient_pairs pairs = {0};
   supine_error error;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
@@ -377,13 +309,13 @@ TEST(test_pairs_load_bad_files_message_names_fault) {
                    SUPINE_ERROR_READ);
 }
 
-TEST(test_pairs_load_either_order_starts_at_rest) {
+TEST(test_pairs_load_image_columns_start_at_second_image) {
   static const char images[] = "im1_x,im1_y,im1_z,im2_x,im2_y,im2_z\n1,2,3,4,5,6\n";
   static const char plain[] = "x,y,z,to_x,to_y,to_z\n1,2,3,4,5,6\n";
   supine_patient_pairs pairs = {0};
   supine_error error;
   for (int reverse = 0; reverse < 2; ++reverse) {
-    for (int file = 0; file < 2; ++file) { /* image 1 is inhaled, so rest is image 2 */
+    for (int file = 0; file < 2; ++file) { /* image 1 is inhaled, image 2 is at rest */
       assert_int_equal(load_text(file == 0 ? plain : images, reverse == 1, &pairs, &error),
                        SUPINE_OK);
       assert_int_equal((int)pairs.count, 1);
@@ -394,27 +326,7 @@ TEST(test_pairs_load_either_order_starts_at_rest) {
   }
 }
 
-TEST(test_fit_fewer_points_than_unknowns_refused) {
-  supine_patient_pairs pairs = scatter(14, 3);
-  const supine_patient truth = known(&pairs);
-  const supine_patient_fit_options options = {.law = SUPINE_PATIENT_PAPER,
-                                              .scan_motion = SUPINE_PATIENT_RIGID};
-  supine_patient patient = {.frame = truth.frame};
-  supine_patient_fit_report report;
-  supine_patient_row *rows = malloc(3 * pairs.count * sizeof *rows);
-  supine_error error;
-  move(&pairs, &truth, 0.3, 2);
-  supine_patient_rows_of_pairs(&truth.frame, &pairs, rows);
-  assert_int_equal(supine_patient_fit(&options, rows, 0, pairs.count, &patient, &report, &error),
-                   SUPINE_ERROR_FORMAT);
-  assert_says(error.message, "fewer than the 15 unknowns of the paper law");
-  free(rows);
-  supine_patient_pairs_free(&pairs);
-}
-
-/* --- patient.json, and the model of a surface from it ---------------------------------------- */
-
-TEST(test_record_written_and_read_same) {
+TEST(test_record_written_then_read_same) {
   static const char path[] = "test_patient_record.json";
   supine_patient_pairs pairs = scatter(30, 2);
   supine_patient patient = known(&pairs);
@@ -449,7 +361,7 @@ TEST(test_record_written_and_read_same) {
   assert_memory_equal(before.report.error, after.report.error, sizeof before.report.error);
   assert_true(after.report.baseline == 10.5 && after.report.points == 300);
   assert_true(after.expand.fitted[0] == 0.75 && after.applied.blocks == 0.0);
-  /* The message about a missing part names it. */
+  /* A file that lacks one of these parts is refused. */
   static const char *const parts[] = {"frame",      "law",     "force",         "fuller",
                                       "emptier",    "motion",  "format",        "centres",
                                       "correction", "version", "emptier_frame", "c1_to_c9"};
@@ -474,8 +386,7 @@ TEST(test_record_written_and_read_same) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* The volume at rest follows from the two fitted states, and a scan in one of them needs no
- * option. */
+/* The two fitted states give the volume at rest. A scan in one of them needs no --scanned. */
 TEST(test_scan_fitted_states_known_without_option) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
@@ -493,7 +404,7 @@ TEST(test_scan_fitted_states_known_without_option) {
   for (size_t k = 0; k < 3; ++k) { /* gains at full inflation are 0, at rest 1 */
     assert_true(gains[0][k] == 0.0 && fabs(gains[1][k] - 1.0) < 1e-12);
   }
-  /* A state half a litre above rest: full inflation follows from the default share at rest. */
+  /* If the fuller state is rest + 500 mL, the default share at rest gives full inflation. */
   record.state[0].volume = (supine_volume){SUPINE_VOLUME_REST, 500.0};
   record.volume[0] = 2910.25;
   resting = supine_reference_resting_default();
@@ -516,7 +427,7 @@ TEST(test_scan_fitted_states_known_without_option) {
   supine_patient_pairs_free(&pairs);
 }
 
-TEST(test_law_force_centre_in_fitted_posture_is_one) {
+TEST(test_force_in_fitted_posture_linear_in_box) {
   supine_patient_pairs pairs = scatter(30, 2);
   const supine_patient patient = known(&pairs);
   static const double postures[4][3] = {{0, 1, 0}, {0, -1, 0}, {0, 0, -1}, {0, 0, 1}};
@@ -537,17 +448,16 @@ TEST(test_law_force_centre_in_fitted_posture_is_one) {
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* The deep law, written as nine constants, keeps its force: base 0.9, and -0.2 along y of the
-   * box. */
+  /* The nine constants of the deep law give its force: base 0.9, and -0.2 along y of the box. */
   const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   const supine_force_law deep = supine_patient_force(&shape, 0.4, postures[0]);
   assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);
   supine_patient_pairs_free(&pairs);
 }
 
-/* Known gains, and a volume for each lung, are recovered from a third scan, prone or upright,
- * within three standard errors; a scan in the same posture does not determine them. */
-TEST(test_gain_third_scan_recovers_gain) {
+/* A third scan, prone or upright, gives the gain within three standard errors, and the scale of
+ * each lung. A scan in the fitted posture does not determine the gain. */
+TEST(test_gain_fit_third_scan_recovers_gain) {
   static const double postures[2][3] = {{0.0, -1.0, 0.0}, {0.0, 0.0, -1.0}};
   static const double gains[2] = {0.23, 0.71};
   supine_patient_pairs pairs = scatter(200, 55);
@@ -570,13 +480,12 @@ TEST(test_gain_third_scan_recovers_gain) {
       const supine_patient_place at = supine_patient_find(&patient.frame, pairs.from + 3 * i, 0.0);
       const double *b = at.box;
       const double fixed = law.base + law.box[0] * b[0] + law.box[1] * b[1] + law.box[2] * b[2];
-      /* The force in the posture of the fit, supine, then that in the other posture. */
-      const double then = fixed + gain * (1.0 - b[1]);
-      const double now = fixed + gain * (c % 2 == 0 ? b[1] : b[2]);
+      const double supine_force = fixed + gain * (1.0 - b[1]);
+      const double other_force = fixed + gain * (c % 2 == 0 ? b[1] : b[2]);
       displace(&patient, pairs.from + 3 * i, u);
       for (size_t k = 0; k < 3; ++k) {
         pairs.to[3 * i + k] = pairs.from[3 * i + k] +
-                              scale[at.side > 0.0 ? 0 : 1] * now / then * u[k] +
+                              scale[at.side > 0.0 ? 0 : 1] * other_force / supine_force * u[k] +
                               (moved ? 20.0 : 0.0) + gsl_ran_gaussian(random, 0.3);
       }
     }
@@ -597,7 +506,6 @@ TEST(test_gain_third_scan_recovers_gain) {
                 other->residual < other->residual_without_gain);
   }
   gsl_rng_free(random);
-  /* A scan in the fitted posture leaves the gain as it was. */
   const double kept = record.force.gain;
   memcpy(other->state.gravity, record.state[1].gravity, sizeof other->state.gravity);
   assert_int_equal(supine_patient_gain_fit(&record, NULL, &pairs, NULL, false, other, &error),
@@ -608,8 +516,7 @@ TEST(test_gain_third_scan_recovers_gain) {
   supine_patient_pairs_free(&pairs);
 }
 
-/* Each map explains the motions of its class, and no others. */
-TEST(test_maps_fit_explains_motions_of_each_class) {
+TEST(test_compare_points_each_map_explains_its_motions) {
   supine_patient_pairs pairs = scatter(80, 21);
   supine_command_distance distance[SUPINE_PATIENT_MAP_COUNT];
   supine_error error;
@@ -644,7 +551,8 @@ TEST(test_maps_fit_explains_motions_of_each_class) {
   /* A prediction of no motion explains nothing. */
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].rms == distance[SUPINE_PATIENT_MAP_NONE].rms);
   assert_true(distance[SUPINE_PATIENT_MAP_PREDICTED].explained == 0.0);
-  /* From a wrong prediction, only the rigid motion between scans is removed. */
+  /* SUPINE_PATIENT_RIGID removes a rotation and a shift between the scans;
+   * SUPINE_PATIENT_TRANSLATION leaves the rotation. */
   double *turned_by = malloc(3 * pairs.count * sizeof *turned_by);
   for (size_t i = 0; i < pairs.count; ++i) { /* a rotation by 90 degrees about z, and a shift */
     turned_by[3 * i] = -pairs.to[3 * i + 1] + 40.0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability from motion: a lesion and a gradient are recovered from a surface of another mesh
- * with noise, and uniform tissue is found uniform. */
+/* Expandability from motion: a lesion and a gradient are recovered from a noisy surface of another
+ * mesh, and uniform tissue is found uniform. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -37,8 +37,8 @@ static double *gradient_of(const supine_lungs *lungs, const supine_expandability
   return e;
 }
 
-/* Return the vertices moved by the true law with stiffness e [N], with noise of `noise` mm on every
- * coordinate (malloc). */
+/* Return the vertices (malloc), moved by the true law with stiffness e [N], plus Gaussian noise of
+ * `noise` mm in each coordinate. */
 static double *moved_by_truth(const supine_lungs *lungs, const double *e, double noise) {
   supine_model model = truth();
   supine_solution solution = {0};
@@ -58,8 +58,8 @@ static double *moved_by_truth(const supine_lungs *lungs, const double *e, double
   return positions;
 }
 
-/* Return the stiffness found within half the radius of a lesion relative to that outside the
- * lesion, from means of log E. */
+/* Return the stiffness found within half the radius of a lesion, relative to that outside the
+ * lesion. Both are geometric means. */
 static double contrast(const supine_lungs *lungs, const supine_patient_stiffness *found,
                        const supine_lesion *lesion) {
   const size_t n = lungs->mesh.vertex_count;
@@ -81,8 +81,7 @@ static double contrast(const supine_lungs *lungs, const supine_patient_stiffness
   return exp(sum[1] / count[1] - sum[0] / count[0]);
 }
 
-/* Fit the lungs at rest to lungs of the same shape that are moved by the true law with stiffness e;
- * free e. */
+/* Fit `rest` to `other`, the same shape moved by the true law with stiffness e; free e. */
 static void fit_uneven(const supine_lungs *rest, const supine_lungs *other, double *e,
                        supine_patient_record *found) {
   supine_mesh state = other->mesh;
@@ -116,11 +115,11 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(fabs(times / lesion->factor - 1.0) < 0.2);
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.5 * found.expand.held_out[0]);
-  /* The reported held-out error is that of the final fit, with its regions. */
+  /* The report has the error of the final fit, with regions. */
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
-TEST(test_fit_lesion_of_real_lung_recovered) {
+TEST(test_fit_real_lung_with_lesion_recovers_stiffness) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -132,9 +131,8 @@ TEST(test_fit_lesion_of_real_lung_recovered) {
   supine_lungs_free(&other);
 }
 
-/* Make synthetic lungs of this number of vertices; the shape is the same for any number within 0.2
- * mm. */
-static void made(size_t vertices, supine_lungs *lungs) {
+/* Make synthetic lungs. The number of vertices changes their shape by at most 0.2 mm. */
+static void make_lungs(size_t vertices, supine_lungs *lungs) {
   supine_mesh mesh = {0};
   supine_error error;
   assert_int_equal(supine_phantom_create(vertices, 6000.0, &mesh, &error), SUPINE_OK);
@@ -142,23 +140,23 @@ static void made(size_t vertices, supine_lungs *lungs) {
   supine_mesh_free(&mesh);
 }
 
-TEST(test_fit_lesion_of_synthetic_lungs_recovered) {
+TEST(test_fit_synthetic_lungs_with_lesion_recovers_stiffness) {
   const supine_lesion lesion = {{-108.0, -139.0, -195.0}, 64.0, 3.0};
   supine_lungs rest = {0};
   supine_lungs other = {0};
-  made(1600, &rest);
-  made(6000, &other);
+  make_lungs(1600, &rest);
+  make_lungs(6000, &other);
   expect_lesion(&rest, &other, &lesion);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
 }
 
-TEST(test_fit_uniform_lungs_no_stiffness_kept) {
+TEST(test_fit_uniform_lungs_keeps_no_region) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   static supine_patient_record found;
-  made(1600, &rest);
-  made(6000, &other);
+  make_lungs(1600, &rest);
+  make_lungs(6000, &other);
   fit(&rest, &other, NULL, &found);
   assert_false(found.expand.kept);
   assert_true(found.stiffness.count == 0);
@@ -167,24 +165,23 @@ TEST(test_fit_uniform_lungs_no_stiffness_kept) {
   supine_lungs_free(&other);
 }
 
-/* Check that an expandability that triples from apex to base is recovered where the motion shows
- * it. */
+/* Check that an expandability that triples from apex to base is recovered where motion shows it. */
 static void check_gradient(const supine_lungs *rest, const supine_lungs *other) {
   const supine_expandability_law law = {SUPINE_EXPANDABILITY_LINEAR, 2, 0.5, 1.5};
   const size_t n = rest->mesh.vertex_count;
   static supine_patient_record found;
-  double *should = gradient_of(rest, &law);
-  double *is = malloc(n * sizeof *is);
+  double *true_stiffness = gradient_of(rest, &law);
+  double *found_stiffness = malloc(n * sizeof *found_stiffness);
   double mean[2] = {0.0, 0.0};
   double squares = 0.0;
   size_t seen = 0;
   size_t close = 0;
   fit_uneven(rest, other, gradient_of(other, &law), &found);
   assert_true(found.expand.kept);
-  supine_patient_stiffness_of(&found.stiffness, rest, is);
+  supine_patient_stiffness_of(&found.stiffness, rest, found_stiffness);
   for (size_t i = 0; i < n; ++i) {
-    mean[0] += log(should[i]) / (double)n;
-    mean[1] += log(is[i]) / (double)n;
+    mean[0] += log(true_stiffness[i]) / (double)n;
+    mean[1] += log(found_stiffness[i]) / (double)n;
   }
   for (size_t i = 0; i < n; ++i) {
     double shares[SUPINE_PATIENT_REGIONS_MAX];
@@ -194,34 +191,33 @@ static void check_gradient(const supine_lungs *rest, const supine_lungs *other) 
       share += shares[k] * found.stiffness.region[k].seen;
     }
     if (share >= SUPINE_PATIENT_SEEN) {
-      const double miss = log(is[i]) - mean[1] - log(should[i]) + mean[0];
+      const double miss = log(found_stiffness[i]) - mean[1] - log(true_stiffness[i]) + mean[0];
       ++seen;
       squares += miss * miss;
       close += fabs(miss) < log(1.15);
     }
   }
-  printf("%.0f of %zu regions unseen; E within 15 %% at %.0f %% of the seen vertices (%.0f %% of "
-         "all), "
-         "error %.0f %% RMS\n",
+  printf("%.0f of %zu regions unseen; stiffness within 15 %% at %.0f %% of the seen vertices "
+         "(%.0f %% of all), error %.0f %% RMS\n",
          found.expand.unseen, found.stiffness.count, 100.0 * (double)close / (double)seen,
          100.0 * (double)seen / (double)n, 100.0 * sqrt(squares / (double)seen));
   assert_true(seen > n / 2);
   assert_true(sqrt(squares / (double)seen) < 0.15);
-  free(should);
-  free(is);
+  free(true_stiffness);
+  free(found_stiffness);
 }
 
-TEST(test_fit_gradient_of_synthetic_lungs_recovered) {
+TEST(test_fit_synthetic_lungs_with_gradient_recovers_stiffness) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
-  made(1600, &rest);
-  made(6000, &other);
+  make_lungs(1600, &rest);
+  make_lungs(6000, &other);
   check_gradient(&rest, &other);
   supine_lungs_free(&rest);
   supine_lungs_free(&other);
 }
 
-TEST(test_fit_gradient_of_real_lung_recovered) {
+TEST(test_fit_real_lung_with_gradient_recovers_stiffness) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {

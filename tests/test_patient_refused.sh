@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Check the messages and exit codes of 'supine fit' for refused input: test_patient_refused.sh PROGRAM
 #
-# Landmarks and surfaces are refused if they are in different frames, units or sides, without overlap, mirrored,
-# shuffled, too few, or not numbers.
+# Landmarks and surfaces are refused if the two states differ in their frame, their unit or their side, if they do not
+# overlap, are mirrored or shuffled, or if values are too few or not numbers.
 set -u
 supine=$1
 work=$(mktemp -d) || exit 1
@@ -25,7 +25,7 @@ refused() {
   [ ! -e law.json ] || fail "fit $* left a file"
 }
 
-# Landmarks: sixty points in two lungs, moved as by a breath.
+# Landmarks: sixty points in two lungs, moved as in a breath.
 awk 'BEGIN {
   srand(11)
   print "x,y,z,to_x,to_y,to_z"
@@ -36,14 +36,14 @@ awk 'BEGIN {
     printf "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f\n", x, y, z, x + side * 6 * X * X, y - 9 * Y, z - 20 * Z
   }
 }' >good.csv
-"$supine" fit --landmarks good.csv -o good.json >/dev/null || fail "good landmarks"
+"$supine" fit --landmarks good.csv -o good.json >/dev/null || fail "fit refuses good landmarks"
 # changed NAME AWK: write NAME.csv from good.csv with each row changed by an awk statement.
 changed() {
   awk -F, -v OFS=, "NR == 1 { print; next } { $2; print }" good.csv >"$1.csv"
 }
 changed apart '$4 += 150; $5 += 150; $6 += 150'
 refused 2 'mm apart: give both in one frame, or fit the motion between the scans with --translation' --landmarks apart.csv
-"$supine" fit --landmarks apart.csv --translation >/dev/null || fail "--translation does not help"
+"$supine" fit --landmarks apart.csv --translation >/dev/null || fail "fit --translation refuses shifted landmarks"
 changed beyond '$6 += 5000'
 refused 2 'mm apart: give both in one frame' --landmarks beyond.csv
 changed centimetres '$4 /= 10; $5 /= 10; $6 /= 10'
@@ -82,7 +82,7 @@ refused 1 'nothing to fit to' --name nobody
 refused 1 'give --translation or --rigid, not both' --landmarks good.csv --translation --rigid
 
 # Surfaces: synthetic lungs, one in each file, and the same lungs after a breath.
-"$supine" phantom -o pair.obj --vertices 700 >/dev/null || fail phantom
+"$supine" phantom -o pair.obj --vertices 700 >/dev/null || fail "phantom"
 # half NAME 0|1: write NAME.obj with the first or the second lung of the pair.
 half() {
   awk -v second="$2" '/^v / { v[++n] = $0 } /^f / { f[++m] = $0 }
@@ -101,7 +101,7 @@ moved() {
   awk "/^v / { x = \$2; y = \$3; z = \$4; $2; print \"v\", x, y, z; next } { print }" rest.obj >"$1.obj"
 }
 moved state 'y *= 1.05; z *= 1.08'
-"$supine" fit rest.obj state.obj -o good.json >/dev/null || fail "good surfaces"
+"$supine" fit rest.obj state.obj -o good.json >/dev/null || fail "fit refuses good surfaces"
 refused 2 'the two surfaces are the same' rest.obj rest.obj
 moved far 'z += 400'
 refused 2 'do not overlap along z' rest.obj far.obj
@@ -118,7 +118,7 @@ changed_pair() {
   awk "/^v / { x = \$2; y = \$3; z = \$4; $2; print \"v\", x, y, z; next } { print }" pair.obj >"$1.obj"
 }
 changed_pair breath 'y *= 1.05; z *= 1.08'
-"$supine" fit pair.obj breath.obj -o good.json >/dev/null || fail "a good pair"
+"$supine" fit pair.obj breath.obj -o good.json >/dev/null || fail "fit refuses a good pair of lungs"
 sed '5s/[-0-9.e]*$/nan/' state.obj >broken.obj
 refused 2 'broken.obj' rest.obj broken.obj
 refused 2 'No such file' rest.obj absent.obj

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* A patient's law from surfaces: recovery of a known law, and refused input. */
+/* A patient's law fitted to surfaces: recovery of a known law, and refused input. */
 #include "test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -17,8 +17,7 @@
 
 static const supine_patient_pairs no_landmarks;
 
-/* Return the vertices moved by the true law, [N, 3] (malloc), and set the largest displacement,
- * mm. */
+/* Return the vertices (malloc), moved by the true law; set the largest displacement, mm. */
 static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   const supine_model model = truth();
   supine_solution solution = {0};
@@ -60,7 +59,7 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   }
   const supine_patient patient = fit.patient;
   const supine_patient_surface_report surface = fit.surface;
-  /* The scale is -1, as the model measures displacement from the emptier state. */
+  /* The model measures displacement from the emptier state, so the scale below is -1. */
   supine_patient_record record = {.patient = patient, .from_surface = true};
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
@@ -88,7 +87,8 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   }
   printf("\n");
   assert_true(sqrt(square) <= 0.15);
-  /* The force is recovered without use of (18). Supine, the height is 1 - Y. */
+  /* The fit computes the force from the motion. Supine, height is 1 - Y, so the gain 0.4 and the
+   * term -0.2 Y give the slope -0.6. */
   const supine_patient_applied *applied = &fit.applied;
   printf(
       "force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, spread %.3f, residual %.3f, "
@@ -111,9 +111,9 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   supine_lungs_free(&other);
 }
 
-/* Surfaces of different meshes, moved by a law far from `deep`, are fitted by `deep` and kriging:
- * the surface reaches the other state and has its volume, as the change of volume is the integral
- * of the displacement along the normal, which the fit matches. */
+/* Another law than `deep` moves a surface of another mesh. The fit by `deep` and kriging still
+ * reaches the moved surface, and its volume: the change of volume is the integral of the
+ * displacement along the normal, which the fit matches. */
 TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_mesh coarse = helper_lump(9, 70.3, 5);
   supine_mesh fine = helper_lump(15, 70.3, 5);
@@ -130,8 +130,8 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   assert_int_equal(
       supine_patient_fit_surface(&rest, &moved, &no_landmarks, &options, false, &fit, &error),
       SUPINE_OK);
-  printf("largest displacement %.1f mm; distance %.2f mm, fitted %.3f; held out: deep %.2f, with "
-         "kriging %.3f mm\n",
+  printf("largest displacement %.1f mm; distance of the surfaces %.2f mm, after the fit %.3f; held "
+         "out: deep %.2f, with kriging %.3f mm\n",
          largest, fit.surface.before, fit.surface.after,
          fit.report.held_out[SUPINE_PATIENT_SCORE_LAW],
          fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
@@ -150,7 +150,7 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
     }
   }
   const double share = (supine_mesh_volume(&rest.mesh) - before) / change;
-  printf("volume change %.0f mL, of which the fit shows %.3f\n", 1e-3 * change, share);
+  printf("volume change %.0f mL; the change by the fit is %.3f of it\n", 1e-3 * change, share);
   assert_true(fabs(share - 1.0) < 0.03);
   free(moved.vertices);
   supine_mesh_free(&coarse);
@@ -159,7 +159,7 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_lungs_free(&other);
 }
 
-/* Draw a correction g of the law, and add its part along the surface to the positions. */
+/* Draw a random correction g of the law; add its component along the surface to the positions. */
 static void slide(const supine_lungs *lungs, const supine_patient_power *law, unsigned long seed,
                   double *positions) {
   const size_t n = lungs->mesh.vertex_count;
@@ -203,8 +203,8 @@ static void slide(const supine_lungs *lungs, const supine_patient_power *law, un
   free(normals);
 }
 
-/* Surfaces do not show motion along them. Here the deep law moves them, and a random field makes
- * them slide. The fit reaches them to a fraction of a millimetre, but points err by millimetres,
+/* A surface does not show motion along itself. Here a random field adds such motion to the deep
+ * law. The fit matches the surface to a fraction of a millimetre, but points err by millimetres,
  * which the expected error must state. */
 TEST(test_fit_surface_alone_expected_error_includes_sliding) {
   enum { SEEDS = 5 };
@@ -243,10 +243,10 @@ TEST(test_fit_surface_alone_expected_error_includes_sliding) {
       square += supine_dot(u, u) / (double)n;
     }
     ratio[seed] = fit.report.expected_point / sqrt(square);
-    printf(
-        "true error %.2f mm, expected %.2f; surface %.2f mm, after the fit %.3f, held out %.3f\n",
-        sqrt(square), fit.report.expected_point, fit.surface.before, fit.surface.after,
-        fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
+    printf("true error %.2f mm, expected %.2f mm; distance of the surfaces %.2f mm, after the fit "
+           "%.3f mm, held out %.3f mm\n",
+           sqrt(square), fit.report.expected_point, fit.surface.before, fit.surface.after,
+           fit.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED]);
   }
   gsl_sort(ratio, 1, SEEDS);
   printf("expected error over true error: median %.2f, range %.2f to %.2f\n", ratio[SEEDS / 2],
@@ -257,8 +257,8 @@ TEST(test_fit_surface_alone_expected_error_includes_sliding) {
   supine_lungs_free(&rest);
 }
 
-/* The correlation with height is low for a force fixed to the body, high for one along gravity, and
- * reversed if gravity is reversed. */
+/* The correlation of the force with height is low for a force fixed to the body, high for a force
+ * along gravity, and negative if gravity is reversed. */
 TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
   supine_mesh lump = helper_lump(9, 70.3, 5);
   supine_lungs rest = {0};
@@ -298,13 +298,13 @@ TEST(test_fit_surface_force_fixed_to_body_low_correlation) {
   supine_lungs_free(&rest);
 }
 
-/* Weights are Tukey's biweight, which vanishes at 4.685 standard deviations (95 % efficiency). The
- * standard deviation is 1.4826 times the median distance, which outliers hardly change. */
-TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
-  enum { NORMAL = 2000, LOOK = 4, OUTLIERS = 100, COUNT = NORMAL + LOOK + OUTLIERS };
+/* The weights are Tukey's biweight, which is 0 beyond 4.685 standard deviations (95 % efficiency).
+ * The standard deviation is estimated as 1.4826 times the median distance, which outliers hardly
+ * change. */
+TEST(test_matching_weigh_beyond_4_685_sigma_no_weight) {
+  enum { NORMAL = 2000, CHECKED = 4, OUTLIERS = 100, COUNT = NORMAL + CHECKED + OUTLIERS };
   static const double sigma = 0.37;
-  /* Distances to check, in standard deviations. */
-  static const double look[LOOK] = {1.5, -3.0, 4.5, -4.9};
+  static const double checked_sigmas[CHECKED] = {1.5, -3.0, 4.5, -4.9};
   supine_patient_matching m = {.count = COUNT};
   m.rows = calloc(COUNT, sizeof *m.rows);
   m.match = malloc(COUNT * sizeof *m.match);
@@ -312,13 +312,13 @@ TEST(test_matching_weigh_outliers_vanish_at_4_685_sigma) {
   for (size_t i = 0; i < COUNT; ++i) {
     m.rows[i].weight = 1.0;
     m.match[i].distance = i < NORMAL ? sigma * gsl_cdf_ugaussian_Pinv(((double)i + 0.5) / NORMAL)
-                          : i < NORMAL + LOOK ? sigma * look[i - NORMAL]
-                                              : 40.0 + 0.1 * (double)i;
+                          : i < NORMAL + CHECKED ? sigma * checked_sigmas[i - NORMAL]
+                                                 : 40.0 + 0.1 * (double)i;
   }
   assert_int_equal(supine_patient_matching_weigh(&m, 0.0, NULL), SUPINE_OK);
   assert_true(m.matched == 1.0);
-  for (size_t k = 0; k < LOOK; ++k) {
-    const double t = look[k] / 4.685;
+  for (size_t k = 0; k < CHECKED; ++k) {
+    const double t = checked_sigmas[k] / 4.685;
     const double expected = fabs(t) < 1.0 ? pow(1.0 - t * t, 2.0) : 0.0;
     /* The outliers, 5 % of all rows, raise the median by 6 %. */
     assert_true(fabs(m.rows[NORMAL + k].weight - expected) < 0.07);
@@ -360,7 +360,7 @@ TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
     moved.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
   }
   refused(&rest, &moved, "do not overlap along z");
-  for (size_t i = 0; i < n; ++i) { /* moves the lung to the other side of the chest */
+  for (size_t i = 0; i < n; ++i) { /* move to the other side of the chest */
     moved.vertices[i] = rest.mesh.vertices[i] - (i % 3 == 0 ? 150.0 : 0.0);
   }
   refused(&rest, &moved, "do not overlap along x");

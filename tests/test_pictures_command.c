@@ -7,7 +7,7 @@
 #include <cairo.h>
 #include <webp/demux.h>
 
-/* Basis of an open surface, made by a version that accepted open surfaces. */
+/* A basis of an open surface, which an earlier version made. */
 #define OPEN "\"" SUPINE_GOLDEN "/open_surface.safetensors\""
 
 static size_t count_words(const char *text, const char *word) {
@@ -68,9 +68,9 @@ static void check_posture(const json_t *posture) {
     share += json_number_value(json_object_get(slab, "share"));
     volume += json_number_value(json_object_get(slab, "volume_ml"));
   }
-  assert_true(fabs(gain - 400) < 0.05); /* tolerance of float positions, mL */
+  assert_true(fabs(gain - 400) < 0.05); /* mL, the rounding of float positions */
   assert_true(fabs(share - 1) < 1e-4);
-  /* The volumes of the slabs sum to the volume at rest in the posture. */
+  /* The slabs hold the volume of both lungs. */
   assert_true(fabs(volume - number(posture, "volume_ml", "left") -
                    number(posture, "volume_ml", "right")) < 0.05);
   const json_t *top = json_array_get(slabs, 1);
@@ -94,7 +94,7 @@ TEST(test_compare_json_has_stated_values) {
     const json_t *posture = json_array_get(postures, i);
     check_posture(posture);
     assert_true(number(posture, "displacement_mm", "rms") <=
-                farthest * (1 + 1e-3)); /* tolerance: directions are sampled 4.5 degrees apart */
+                farthest * (1 + 1e-3)); /* 1e-3, as the directions are 4.5 degrees apart */
   }
   const json_t *tilted = json_object_get(json_array_get(postures, 2), "gravity");
   assert_true(fabs(json_number_value(json_array_get(tilted, 2)) - 0.258819045) < 1e-8);
@@ -153,7 +153,7 @@ static void check_report(const char *name) {
   free(text);
 }
 
-TEST(test_compare_without_breath_no_difference) {
+TEST(test_compare_scan_with_itself_all_zero) {
   EXPECT(0, "  supine         0    0     0        0",
          "compare lungs.safetensors --volume scan --from scan -o still.html");
   assert_null(strstr(printed, "nan"));
@@ -234,7 +234,7 @@ static bool render(const char *format, ...) {
   return true;
 }
 
-/* Return the mean difference of red, green and blue of two pictures of one size, 0 to 255. */
+/* Return the mean difference of the colours of two pictures of one size, 0 to 255. */
 static double png_difference(const char *a, const char *b) {
   cairo_surface_t *image[2] = {cairo_image_surface_create_from_png(a),
                                cairo_image_surface_create_from_png(b)};
@@ -261,22 +261,17 @@ static double png_difference(const char *a, const char *b) {
   return sum / (3.0 * width * height);
 }
 
-/* The picture is near the golden one: versions of fonts change it by less than another posture
- * does. */
+/* Other versions of fonts change the picture less than another posture does. */
 TEST(test_render_same_as_golden_picture) {
   static const double tolerance = 1.5;
-  char path[256];
   if (!render("lungs.safetensors --posture prone --largest 40 --size 240x180 -o golden.png")) {
     skip();
   }
-  (void)snprintf(path, sizeof path, "%s/golden.png", folder);
-  const double same = png_difference(path, SUPINE_GOLDEN "/render_prone.png");
+  const double same = png_difference(in_folder("golden.png"), SUPINE_GOLDEN "/render_prone.png");
   assert_true(render("lungs.safetensors --posture left --largest 40 --size 240x180 -o other.png"));
-  (void)snprintf(path, sizeof path, "%s/other.png", folder);
-  const double other = png_difference(path, SUPINE_GOLDEN "/render_prone.png");
-  print_message(
-      "difference from the golden picture: %.3f of 255, of a picture on the left side: %.3f\n",
-      same, other);
+  const double other = png_difference(in_folder("other.png"), SUPINE_GOLDEN "/render_prone.png");
+  print_message("difference from the golden picture: prone %.3f, left side %.3f of 255\n", same,
+                other);
   assert_true(same < tolerance);
   assert_true(other > 2 * tolerance);
 }
@@ -292,7 +287,7 @@ static void find_arrow(const char *path, double place[2]) {
   double count = 0;
   int low[2] = {width, width};
   int high[2] = {0, 0};
-  /* Inside the frame of the ball, left of the title. */
+  /* the area of the ball, which is left of the title */
   for (int y = width / 24; y < width / 5; ++y) {
     const unsigned char *row = cairo_image_surface_get_data(image) + (ptrdiff_t)y * stride;
     for (int x = width / 24; x < width / 5; ++x) {
@@ -314,8 +309,8 @@ static void find_arrow(const char *path, double place[2]) {
   }
 }
 
-/* Seen from the front, the patient's left is on the right and the feet are below. Supine and prone,
- * gravity is along the view. */
+/* Seen from the front, the left lung is on the right and the feet are below. Gravity is along the
+ * view if the patient is supine or prone. */
 TEST(test_render_arrow_points_along_gravity) {
   static const struct {
     const char *posture;
@@ -323,13 +318,11 @@ TEST(test_render_arrow_points_along_gravity) {
   } cases[] = {{"supine", {0, 0}}, {"prone", {0, 0}},   {"left", {1, 0}},
                {"right", {-1, 0}}, {"upright", {0, 1}}, {"inverted", {0, -1}}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
-    char path[256];
     double place[2];
     if (!render("lungs.safetensors --posture %s --size 480x360 -o arrow.png", cases[i].posture)) {
       skip();
     }
-    (void)snprintf(path, sizeof path, "%s/arrow.png", folder);
-    find_arrow(path, place);
+    find_arrow(in_folder("arrow.png"), place);
     print_message("%s: arrow %.1f right, %.1f down\n", cases[i].posture, place[0], place[1]);
     for (int k = 0; k < 2; ++k) {
       assert_true(cases[i].toward[k] == 0 ? fabs(place[k]) < 1.5
@@ -340,22 +333,16 @@ TEST(test_render_arrow_points_along_gravity) {
 
 /* A picture shows even a single point inside the lungs. */
 TEST(test_render_one_point_inside_visible) {
-  char path[2][256];
-  (void)snprintf(path[0], sizeof path[0], "%s/one.csv", folder);
-  FILE *points = fopen(path[0], "w");
-  assert_non_null(points);
-  assert_true(fputs("name,x,y,z\nnodule,-80,-120,-90\n", points) >= 0);
-  assert_int_equal(fclose(points), 0);
+  test_write(in_folder("one.csv"), "name,x,y,z\nnodule,-80,-120,-90\n");
   EXPECT(0, "", "embed lungs.safetensors one.csv -o one.safetensors");
   for (int i = 0; i < 2; ++i) {
-    (void)snprintf(path[i], sizeof path[i], "%s/inside%d.png", folder, i);
     if (!render(
             "lungs.safetensors %s --opacity 0.5 --posture supine --size 240x180 -o inside%d.png",
             i == 0 ? "" : "--inside one.safetensors", i)) {
       skip();
     }
   }
-  assert_true(png_difference(path[0], path[1]) > 0.02);
+  assert_true(png_difference(in_folder("inside0.png"), in_folder("inside1.png")) > 0.02);
 }
 
 /* Opaque lungs are coloured; transparent lungs are a grey shell, fainter at lower opacity. */
@@ -365,13 +352,11 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
   size_t coloured = 0;
   int most = 0;
   for (int i = 0; i < 3; ++i) {
-    char path[256];
     if (!render("lungs.safetensors --posture supine --size 240x180 --opacity %s -o share.png",
                 shares[i])) {
       skip();
     }
-    (void)snprintf(path, sizeof path, "%s/share.png", folder);
-    image[i] = cairo_image_surface_create_from_png(path);
+    image[i] = cairo_image_surface_create_from_png(in_folder("share.png"));
     assert_int_equal(cairo_surface_status(image[i]), CAIRO_STATUS_SUCCESS);
   }
   for (int y = 70; y < 110; ++y) { /* rows between the ball and the colour bar */
@@ -399,8 +384,8 @@ TEST(test_render_opacity_below_one_draws_a_grey_shell) {
   }
 }
 
-/* Return frame `wanted` of an animation, RGBA (malloc), its time in ms, and the size of the
- * animation. */
+/* Return frame `wanted` of an animation as RGBA (malloc). Set the time at which it ends, ms, and
+ * the properties of the animation. */
 static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo *info, int *time) {
   size_t size = 0;
   char *bytes = test_read(in_folder(name), &size);
@@ -421,7 +406,7 @@ static unsigned char *read_frame(const char *name, unsigned wanted, WebPAnimInfo
   return copy;
 }
 
-/* Return the mean difference of red, green and blue of two frames, 0 to 255. */
+/* Return the mean difference of the colours of two frames, 0 to 255. */
 static double frame_difference(const unsigned char *a, const unsigned char *b, size_t area) {
   double sum = 0;
   for (size_t i = 0; i < 4 * area; ++i) {
@@ -430,12 +415,11 @@ static double frame_difference(const unsigned char *a, const unsigned char *b, s
   return sum / (3.0 * (double)area);
 }
 
-/* All frames of an animation differ, the last is shown for a second, and an animation back begins
- * where the other ends. */
+/* Successive frames differ, and the last is shown for a second. The animation back begins where
+ * this one ends. */
 TEST(test_render_turn_animates_between_postures) {
   enum { FRAMES = 7, WIDTH = 240, HEIGHT = 180 };
-  /* Largest difference between frames of equal postures, which is due to the codec and to the text
-   * of the angle. */
+  /* Largest difference of two frames of one posture, due to the codec and the text of the angle. */
   static const double loss = 2.5;
   WebPAnimInfo info;
   int time = 0;
@@ -452,7 +436,7 @@ TEST(test_render_turn_animates_between_postures) {
   assert_int_equal(info.canvas_width, WIDTH);
   assert_int_equal(info.canvas_height, HEIGHT);
   assert_int_equal(info.frame_count, FRAMES);
-  assert_int_equal(info.loop_count, 0); /* 0: repeat for ever */
+  assert_int_equal(info.loop_count, 0); /* repeats for ever */
   unsigned char *first = read_frame("back.webp", 0, &info, &time);
   unsigned char *last = read_frame("back.webp", FRAMES - 1, &info, &time);
   assert_true(frame_difference(frame[0], last, WIDTH * HEIGHT) < loss);
@@ -472,11 +456,9 @@ TEST(test_render_turn_animates_between_postures) {
          "nothere.safetensors");
 }
 
-/* Compute red, green and blue of the upper left corner of a picture, 0 to 255. */
+/* Read red, green and blue of the upper left corner of a picture, 0 to 255. */
 static void corner_of(const char *name, int rgb[3]) {
-  char path[256];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  cairo_surface_t *image = cairo_image_surface_create_from_png(path);
+  cairo_surface_t *image = cairo_image_surface_create_from_png(in_folder(name));
   uint32_t pixel;
   assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
   memcpy(&pixel, cairo_image_surface_get_data(image), sizeof pixel);
@@ -486,7 +468,6 @@ static void corner_of(const char *name, int rgb[3]) {
   cairo_surface_destroy(image);
 }
 
-/* The background is nearly white, with nearly equal red, green and blue. */
 TEST(test_render_background_nearly_white) {
   int rgb[3];
   if (!render("lungs.safetensors --posture supine --size 260x380 -o light.png")) {
@@ -526,7 +507,7 @@ TEST(test_render_options_change_the_picture) {
   }
 }
 
-TEST(test_render_many_postures_accepted) {
+TEST(test_render_seven_postures_drawn_bad_output_refused) {
   if (!render("lungs.safetensors --posture supine,prone,left,right,upright,inverted,0.6:0:-0.8 "
               "--size 1400x260 -o row.png")) {
     skip();

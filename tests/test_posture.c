@@ -39,7 +39,7 @@ TEST(test_gravity_named_postures_literal) {
   }
 }
 
-TEST(test_gravity_unknown_name_untouched) {
+TEST(test_gravity_unknown_name_refused_output_unchanged) {
   static const char *const names[] = {"", "supin", "supines", "HF", "left_lateral", " prone"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     double g[3] = {9, 8, 7};
@@ -92,14 +92,14 @@ TEST(test_quaternion_known_orientations_literal) {
   assert_int_equal(supine_posture_quaternion((double[]){h, h, 0, 0}, g), SUPINE_OK);
   assert_vector(g, 0, -1, 0);
   assert_int_equal(supine_posture_quaternion((double[]){-3 * h, 3 * h, 0, 0}, g), SUPINE_OK);
-  /* Supine: -90 degrees; sign and length of the quaternion do not matter. */
+  /* Supine: -90 degrees about x. Sign and length of the quaternion do not matter. */
   assert_vector(g, 0, 1, 0);
   /* On the left side: +90 degrees about y rotates the head (z of the body) to x of the world, and
    * left (x) to -z. */
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, h, 0}, g), SUPINE_OK);
   assert_vector(g, 1, 0, 0);
   assert_int_equal(supine_posture_quaternion((double[]){h, 0, 0, h}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* the body's own axis z points up: upright, however it is turned */
+  assert_vector(g, 0, 0, -1); /* a turn about the body's axis z: still upright */
 }
 
 /* Rotate v by the quaternion q: out = q v q*, written with cross products. */
@@ -111,7 +111,7 @@ static void rotate(const double q[4], const double v[3], double out[3]) {
   out[2] = v[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
 }
 
-TEST(test_quaternion_random_rotates_to_world_down) {
+TEST(test_quaternion_random_maps_gravity_to_world_down) {
   uint64_t random = 20080321;
   for (int i = 0; i < 1000; ++i) {
     double q[4];

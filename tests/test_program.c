@@ -5,16 +5,10 @@
 #include <ftw.h>
 
 static void write_file(const char *name, const void *bytes, size_t size) {
-  char path[256];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "wb");
+  FILE *file = fopen(in_folder(name), "wb");
   assert_non_null(file);
   assert_int_equal(fwrite(bytes, 1, size, file), size);
   assert_int_equal(fclose(file), 0);
-}
-
-static void write_text(const char *name, const char *text) {
-  write_file(name, text, strlen(text));
 }
 
 /* Read the beginning of a file of the folder into bytes [size]; return the number of bytes read. */
@@ -100,7 +94,7 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
   EXPECT(5, "prone: 9000 mL are 150 % of full inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
-  EXPECT(5, "left: 7915 mL are 132 % of", /* limit exceeded at the end of the breath */
+  EXPECT(5, "left: 7915 mL are 132 % of", /* only the end of the breath is above the limit */
          "compare lungs.safetensors --postures left --volume rest --breath 5000 -o b.html");
   EXPECT(5, "7692 mL are 128 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 -o b.vtp");
@@ -114,8 +108,8 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left --volume scan-5500 --allow-folds -o a.ply");
 }
 
-/* Volumes at rest and at full inflation are those of the shares in resting.h, for synthetic lungs
- * of 2714.1 and 3285.9 mL. */
+/* The volumes at rest and at full inflation follow from the shares in resting.h and from the
+ * volumes of the synthetic lungs, 2714.1 and 3285.9 mL. */
 TEST(test_deform_rest_and_full_volumes_by_posture) {
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture supine -o a.ply");
   EXPECT(0, "-3419.71 mL", "deform lungs.safetensors --posture inverted --volume rest -o a.ply");
@@ -185,11 +179,11 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   char head[256] = "";
   (void)take_file("ras.ply", head, sizeof head - 1);
   assert_says(head, "SPACE=RAS cm\n");
-  /* The file has the left lung first, so its order does not change. */
+  /* ras.ply has the left lung first, so loading keeps the order of its vertices. */
   EXPECT(0, "the file's tag", "precompute ras.ply --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "again.ply",
          "deform ras.safetensors --posture left --volume scan --as-scanned -o again.ply");
-  /* The tolerance, mm, is the rounding of float32 at 200 mm. */
+  /* mm, the rounding of float32 at 200 mm */
   assert_true(positions_apart("ras.ply", "again.ply") < 2e-5);
   EXPECT(0, "breath",
          "breathe ras.safetensors --posture left --as-scanned --fps 0.2 -o breath.vtp");
@@ -223,7 +217,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(1, "deep or paper", "precompute low.ply --law shallow -o b.safetensors");
   EXPECT(1, "leave --scanned out",
          "precompute low.ply --law paper --scanned supine:rest -o b.safetensors");
-  /* Rest is the state of the scan. */
+  /* The scan was taken at rest. */
   EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply");
   assert_true(positions_apart("low.ply", "rested.ply") < 0.005);
   EXPECT(0, "paper law\n  scan taken as the reference",
@@ -243,7 +237,7 @@ TEST(test_orientation_bad_values_refused) {
   EXPECT(0, "gravity 0,0.6,0.8", "deform lungs.safetensors --gravity 0,3,4 -o d.ply");
 }
 
-TEST(test_output_impossible_exit_4_no_file_left) {
+TEST(test_output_impossible_refused) {
   EXPECT(4, "nowhere/out", "deform lungs.safetensors --posture prone -o nowhere/out.ply");
   EXPECT(4, "nowhere/out", "precompute lungs.ply -o nowhere/out.safetensors");
   EXPECT(4, "/dev/full", "precompute lungs.ply -o /dev/full");
@@ -265,7 +259,7 @@ TEST(test_basis_damaged_or_foreign_refused) {
   EXPECT(2, "bad.safetensors", "deform bad.safetensors --posture prone -o e.ply");
   EXPECT(2, "lungs.ply", "deform lungs.ply --posture prone -o e.ply");
   EXPECT(2, "missing.safetensors", "deform missing.safetensors --posture prone -o e.ply");
-  write_text("empty", "");
+  test_write(in_folder("empty"), "");
   EXPECT(2, "empty", "info empty");
   assert_int_equal(count_files("e."), 0);
 }
@@ -273,18 +267,18 @@ TEST(test_basis_damaged_or_foreign_refused) {
 TEST(test_mesh_bad_input_named_and_no_file_left) {
   static char bytes[1 << 20];
   EXPECT(2, "missing.ply", "precompute missing.ply -o f.safetensors");
-  write_text("empty.ply", "");
+  test_write(in_folder("empty.ply"), "");
   EXPECT(2, "empty.ply", "precompute empty.ply -o f.safetensors");
   const size_t size = take_file("lungs.ply", bytes, sizeof bytes);
   write_file("cut.ply", bytes, size / 2);
   EXPECT(2, "cut.ply", "precompute cut.ply -o f.safetensors");
-  write_text("nan.obj",
+  test_write(in_folder("nan.obj"),
              "v 0 0 0\nv 1 0 0\nv 0 nan 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   EXPECT(2, "nan.obj", "precompute nan.obj -o f.safetensors");
-  write_text("inf.obj",
+  test_write(in_folder("inf.obj"),
              "v 0 0 0\nv 1 0 0\nv 0 inf 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   EXPECT(2, "inf.obj", "precompute inf.obj -o f.safetensors");
-  write_text("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  test_write(in_folder("points.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
   EXPECT(2, "points.obj", "solve points.obj --posture prone -o f.ply");
   EXPECT(2, ".", "precompute . -o f.safetensors");
   EXPECT(1, "name one or more mesh files", "precompute -o f.safetensors");
@@ -294,14 +288,15 @@ TEST(test_mesh_bad_input_named_and_no_file_left) {
 }
 
 TEST(test_mesh_open_surface_refused) {
-  write_text("open.obj", "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
+  test_write(in_folder("open.obj"),
+             "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
   EXPECT(2, "3 boundary", "precompute open.obj -o g.safetensors --band 2");
   EXPECT(2, "close its holes", "solve open.obj --posture prone -o g.ply");
   assert_int_equal(count_files("g."), 0);
 }
 
 TEST(test_mesh_wrong_units_refused) {
-  write_text("metres.obj",
+  test_write(in_folder("metres.obj"),
              "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.25\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   EXPECT(2, "--units m", "solve metres.obj --posture prone -o h.ply");
   EXPECT(0, "largest displacement", "solve metres.obj --units m --posture prone -o h.ply");
@@ -309,7 +304,7 @@ TEST(test_mesh_wrong_units_refused) {
 }
 
 TEST(test_mesh_inward_lung_flipped_and_reported) {
-  write_text("in.obj",
+  test_write(in_folder("in.obj"),
              "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n");
   EXPECT(0, "note: the triangles of the left lung faced inwards: reversed",
          "solve in.obj --posture prone -o h.ply");
@@ -339,14 +334,12 @@ static int sweep(const char *path, const struct stat *status, int type, struct F
       printf("%s: exit code %d: %s\n", path, code, printed);
       ++sweep_failures;
     }
-    char file[256];
-    (void)snprintf(file, sizeof file, "%s/swept.safetensors", folder);
-    (void)unlink(file);
+    (void)unlink(in_folder("swept.safetensors"));
   }
   return 0;
 }
 
-TEST(test_mesh_hostile_files_never_crash) {
+TEST(test_precompute_hostile_files_never_crash) {
   char defects[] = SUPINE_TEST_DATA "/defects";
   char *real = realpath(defects, NULL);
   if (real == NULL) {

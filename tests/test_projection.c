@@ -1,18 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The projection onto harmonics against full solves and plain quadrature, and modes against a dense
- * singular value decomposition. */
+/* The projection onto harmonics, compared with full solves and plain quadrature, and modes,
+ * compared with a dense singular value decomposition. */
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/solve.h"
-#include "precompute/precompute.h"
+#include "precompute/projection/accuracy.h"
 #include "precompute/projection/tally.h"
 #include "sh/grid.h"
 #include <supine/sh.h>
-
-#include "lungs_helpers.h"
 
 static int setup(void **state) {
   supine_mesh mesh = {0};
@@ -45,7 +43,8 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
-/* Return the weights of the span in `count` directions, [count, rank] (malloc). */
+/* Return the weights of the columns of a projection in `count` directions, [count, rank] (malloc).
+ */
 static double *weights_at(const supine_lungs *lungs, const supine_model *model,
                           const supine_span *span, size_t count, const double *g) {
   double *range = malloc(2 * count * sizeof *range);
@@ -60,8 +59,8 @@ static double *weights_at(const supine_lungs *lungs, const supine_model *model,
   return weights;
 }
 
-/* A grid of many times as many directions gives the same functions, far below any stated error,
- * although heights have kinks where the lowest or highest vertex changes. */
+/* A much finer grid of directions gives nearly the same functions, although heights have kinks
+ * where the lowest or the highest vertex changes. */
 TEST(test_projection_finer_grid_same_functions) {
   enum { LATITUDES = 512, LONGITUDES = 513 };
   static const size_t bands[] = {1, 15};
@@ -106,8 +105,8 @@ TEST(test_projection_finer_grid_same_functions) {
   }
 }
 
-/* Check that a sum of at most `rank_most` solves gives the solve for any direction, as the transfer
- * does not depend on gravity, with a relative error below `most`. */
+/* Check that a weighted sum of at most `rank_most` solves gives the solve for any direction, with a
+ * relative error below `most`: the transfer does not depend on gravity. */
 static void check_superposition(const supine_lungs *lungs, const supine_model *model,
                                 size_t rank_most, double most) {
   enum { COUNT = 20 };
@@ -212,21 +211,22 @@ static void check_modes(const supine_projection *projection, const double *weigh
   assert_close(total, energy, 1e-12 * energy);
   double tail = 0.0;
   for (size_t k = 0; k < terms; ++k) {
-    const double should = gsl_vector_get(s, k);
-    if (k < modes.mode_count) { /* a Gram matrix gives small values half the digits */
-      assert_close(singular[k], should, 1e-7 * gsl_vector_get(s, 0));
+    const double expected = gsl_vector_get(s, k);
+    if (k < modes.mode_count) { /* the Gram matrix loses half the digits of small values */
+      assert_close(singular[k], expected, 1e-7 * gsl_vector_get(s, 0));
     } else {
-      tail += should * should;
+      tail += expected * expected;
     }
   }
   double error = 0.0; /* squared error of the best approximation of this rank */
   for (size_t i = 0; i < n; ++i) {
     for (size_t t = 0; t < terms; ++t) {
-      double is = 0.0;
+      double approximation = 0.0;
       for (size_t k = 0; k < modes.mode_count; ++k) {
-        is += (double)modes.coefficients[i * modes.mode_count + k] * modes.modes[k * terms + t];
+        approximation +=
+            (double)modes.coefficients[i * modes.mode_count + k] * modes.modes[k * terms + t];
       }
-      error += weight[i] * (is - c[i * terms + t]) * (is - c[i * terms + t]);
+      error += weight[i] * (approximation - c[i * terms + t]) * (approximation - c[i * terms + t]);
     }
   }
   assert_close(sqrt(error / energy), sqrt(tail / energy), 1e-6);
@@ -268,8 +268,8 @@ TEST(test_modes_equal_dense_decomposition) {
   free(weight);
 }
 
-/* A mode is kept if its singular value is 3e-7 of the first, and dropped if it is 3e-8, below the
- * rounding of the Gram matrix. */
+/* A mode is kept if its singular value is 3e-7 times the first, and dropped if it is 3e-8 times the
+ * first, below the rounding of the Gram matrix. */
 TEST(test_modes_below_rounding_dropped) {
   enum { ROWS = 7, TERMS = 4 };
   static const double sizes[TERMS] = {2.0, 0.5, 2.0 * 3e-7, 2.0 * 3e-8};
@@ -293,7 +293,7 @@ TEST(test_modes_below_rounding_dropped) {
   supine_projection_compression_free(&modes);
 }
 
-/* A percentile is the upper edge of its bin; bins are 1/256 of a power of two wide. */
+/* A percentile is the upper edge of its bin. From 2^k to 2^(k + 1), bins are 2^k / 256 wide. */
 TEST(test_tally_percentile_is_upper_edge_of_bin) {
   supine_tally *tally = calloc(1, sizeof *tally);
   supine_tally *other = calloc(1, sizeof *other);

@@ -4,12 +4,12 @@
 
 #include "test.h"
 
-#include "program/options/pv.h"
+#include <supine/breath.h>
 
 enum { FRAMES = 401 };
 
-/* Relative tolerance of volumes: a phase of about 10 breaths is rounded to a few epsilon, and the
- * volume changes by a few tidal volumes per breath. */
+/* Tolerance of volumes, relative to the tidal volume: a time of up to about 10 breaths is rounded
+ * by a few epsilon, and the volume changes by a few tidal volumes per breath. */
 static const double rounding = 256.0 * DBL_EPSILON;
 
 static supine_pv_breath breath_of(supine_pv_course course) {
@@ -34,12 +34,12 @@ TEST(test_breath_each_course_starts_at_rest_and_reaches_tidal_volume) {
       assert_close(volumes[0], 0.0, rounding * breath.tidal);
       assert_close(volumes[1], breath.tidal, rounding * breath.tidal);
       assert_close(pressures[0], breath.rest_pressure, 1e-9);
-      double held[2]; /* on the inhale limb, the peak pressure gives the tidal volume */
+      double limb_volumes[2];
       const double limb[2] = {breath.rest_pressure, pressures[1]};
-      assert_int_equal(
-          supine_breath_curve_evaluate(&supine_breath_normal()->limb[0], 2, limb, held, NULL, NULL),
-          SUPINE_OK);
-      assert_close(held[1] - held[0], breath.tidal, 1e-6);
+      assert_int_equal(supine_breath_curve_evaluate(&supine_breath_normal()->limb[0], 2, limb,
+                                                    limb_volumes, NULL, NULL),
+                       SUPINE_OK);
+      assert_close(limb_volumes[1] - limb_volumes[0], breath.tidal, 1e-6);
     }
   }
 }
@@ -107,7 +107,8 @@ TEST(test_breath_volume_follows_scaled_limbs) {
   }
 }
 
-/* At constant flow, a limb has the breath's volumes at its pressures, even with two steep parts. */
+/* At constant flow, the pressures of a breath give its volumes on the limb, even on a limb with two
+ * steep parts. */
 TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   enum { COUNT = 61 };
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};

@@ -4,11 +4,11 @@
 
 #include "test.h"
 
-#include "program/options/pv.h"
+#include <supine/breath.h>
 
 enum { COUNT = 61 };
 
-/* Tolerance of quadrature and rounding relative to the volume range, some 400 epsilon. */
+/* Tolerance of quadrature and rounding, relative to the range of volumes: about 450 epsilon. */
 static const double integration = 1e-13;
 
 static const supine_pv_curve sigmoid = {
@@ -22,7 +22,7 @@ static void spread(double low, double high, double *at) {
 }
 
 TEST(test_evaluate_constant_control_gives_salazar_knowles) {
-  /* V = Vmax (1 - exp(-k P)), k per cmH2O from emphysema to fibrosis */
+  /* k per cmH2O, from emphysema to fibrosis, in V = Vmax (1 - exp(-k P)) */
   static const double k[] = {0.31, 0.0914, 0.043};
   for (size_t i = 0; i < sizeof k / sizeof *k; ++i) {
     const double most = 6413.0;
@@ -46,7 +46,8 @@ TEST(test_evaluate_constant_control_gives_salazar_knowles) {
 }
 
 TEST(test_evaluate_second_control_gives_gaussian_compliance) {
-  /* With u = c_2 x, compliance is exp(c_2 (x^2 - 1) / 2), and its integral is an error function. */
+  /* With u = c_2 x, compliance is proportional to exp(c_2 (x^2 - 1) / 2), and its integral to an
+   * error function. */
   const double c2 = -7.3;
   const double root = sqrt(-c2 / 2.0);
   const supine_pv_curve curve = {{0.0, 40.0}, {0.0, 1000.0}, {0.0, c2, 0.0, 0.0, 0.0}};
@@ -82,7 +83,7 @@ TEST(test_evaluate_any_controls_satisfy_equation) {
   }
 }
 
-TEST(test_evaluate_ends_and_order_exact) {
+TEST(test_evaluate_limb_ends_exact_in_any_order) {
   const double middle = 11.3;
   const double pressures[5] = {sigmoid.pressure[1], middle, sigmoid.pressure[0], middle,
                                sigmoid.pressure[1]};
@@ -97,7 +98,7 @@ TEST(test_evaluate_ends_and_order_exact) {
   assert_int_equal(supine_breath_curve_evaluate(&sigmoid, 0, NULL, NULL, NULL, NULL), SUPINE_OK);
 }
 
-TEST(test_evaluate_extreme_controls_still_rise) {
+TEST(test_evaluate_extreme_controls_volume_rises) {
   const supine_pv_curve wild = {{0.0, 20.0}, {0.0, 1.0}, {9.1, -17.3, 21.7, 14.9, -11.3}};
   double pressures[COUNT];
   double volumes[COUNT];

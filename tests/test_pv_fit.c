@@ -18,11 +18,11 @@ typedef struct truth {
   double a, b, c, d; /* a, b in mL; c, d in cmH2O, or c per cmH2O if d is 0 */
 } truth;
 
-/* Salazar and Knowles: c = ln 2 / h with h = 7.58 (SD 2.53) cmH2O over 20 normal subjects
- * [Salazar1964], at the mean and at one and two deviations from it; then two and three times c
- * (lost recoil) and half of it (fibrosis). Venegas: b d between 10^3.3 and 10^5 mL cmH2O, about the
- * range that Narusawa (J. Appl. Physiol. 91, 2001) found over published curves; ARDS has a small b
- * and d and a large c. */
+/* Salazar and Knowles: c = ln 2 / h, where h is 7.58 (SD 2.53) cmH2O in 20 normal subjects
+ * [Salazar1964]. The first rows take the mean of h, and one or two deviations from it; then come
+ * two and three times c (lost recoil) and half of c (fibrosis). Venegas: b d is between 10^3.3 and
+ * 10^5 mL cmH2O, about the range of published curves (Narusawa, J. Appl. Physiol. 91, 2001). ARDS
+ * has a small b and d and a large c. */
 static const truth truths[] = {
     {"Salazar-Knowles, normal mean", 0.0, 30.0, 0.0, 6413.0, 0.0914, 0.0},
     {"Salazar-Knowles, normal +1 SD", 0.0, 30.0, 0.0, 6413.0, 0.0686, 0.0},
@@ -90,7 +90,7 @@ static supine_status fit(size_t count, const double *pressures, const double *vo
                            report != NULL ? report : &ignored, error);
 }
 
-TEST(test_fit_published_curves_under_one_percent) {
+TEST(test_fit_published_curves_error_below_one_percent) {
   for (size_t i = 0; i < TRUTHS; ++i) {
     double pressures[SAMPLES];
     double volumes[SAMPLES];
@@ -102,8 +102,7 @@ TEST(test_fit_published_curves_under_one_percent) {
     print_message("%-34s error %.4f %% RMS, held out %.4f %%\n", truths[i].name, report.rms_percent,
                   held_out);
     assert_true(report.rms_percent < 1.0);
-    assert_true(held_out < 1.0);
-    assert_true(held_out < 0.3); /* %, the limit of this form of curves */
+    assert_true(held_out < 0.3);
     assert_close(report.rms, 0.01 * report.rms_percent * truth_range(&truths[i]),
                  1e-9 * report.rms + 1e-12);
     assert_true(curve.pressure[0] == truths[i].low && curve.pressure[1] == truths[i].high);
@@ -117,7 +116,7 @@ TEST(test_fit_published_curves_under_one_percent) {
   }
 }
 
-TEST(test_fit_one_percent_noise_near_truth) {
+TEST(test_fit_one_percent_noise_error_below_one_percent) {
   enum { SEEDS = 20 };
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   assert_non_null(random);
@@ -223,7 +222,7 @@ TEST(test_fit_intervals_cover_truth_at_nominal_rate) {
   for (size_t level = 0; level < 2; ++level) {
     const double deviation = sqrt(SEEDS * levels[level] * (1.0 - levels[level]));
     for (size_t i = 0; i < SUPINE_PV_UNKNOWNS; ++i) {
-      print_message("unknown %zu: %.1f %% of the intervals of %.0f %% hold the true value\n", i,
+      print_message("unknown %zu: %.1f %% of the %.0f %% intervals contain the true value\n", i,
                     100.0 * covered[level][i] / SEEDS, 100.0 * levels[level]);
       assert_close(covered[level][i], SEEDS * levels[level], 5.0 * deviation);
     }
@@ -273,7 +272,7 @@ TEST(test_fit_bad_samples_message_names_line) {
   model_sample(SAMPLES, p, v);
   expect_format(0, p, v, "0 samples", "at least 8");
   expect_format(7, p, v, "7 samples", "at least 8");
-  for (size_t count = 8; count <= SAMPLES; count += 25) { /* few samples and many */
+  for (size_t count = 8; count <= SAMPLES; count += 25) { /* 8 and 33 samples */
     model_sample(count, p, v);
     p[5] = p[4];
     expect_format(count, p, v, "s.csv:105", "repeats the one before");

@@ -60,7 +60,7 @@ with tempfile.TemporaryDirectory() as folder:
     run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
     print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors"))
 
-    # Run the examples of README.md, that with VTK only if VTK is installed.
+    # Run the examples of runtime/python/README.md; the one with VTK needs VTK.
     with open(f"{source}/runtime/python/README.md", encoding="utf-8") as readme:
         text = readme.read()
     if importlib.util.find_spec("vtk") is None:

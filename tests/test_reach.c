@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The reach, mm: its definition, the balance of forces, and its independence of the mesh. */
-#include <float.h>
-
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
 
-#include "precompute/lungs/disease.h"
 #include "precompute/physics/equilibrium.h"
 #include "precompute/physics/model.h"
 #include <supine/sh.h>
@@ -15,7 +12,7 @@
 
 static supine_model model; /* the paper's law with the reach of the current test */
 
-/* Return the catch [N] of a force [N] for stiffness [N] (malloc). */
+/* Return the catch [N], the solution for a force [N] and stiffness [N] (malloc). */
 static double *solve(const supine_lungs *lungs, const double *stiffness, const double *force) {
   const size_t n = lungs->mesh.vertex_count;
   supine_equilibrium *equilibrium = NULL;
@@ -56,9 +53,9 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 3.0 * area[one.triangles[0]];
 }
 
-/* The solution equals a dense one over all nodes, masses and springs, from the link weights in
- * equilibrium.h. */
-TEST(test_reach_equals_dense_definition) {
+/* The solution equals that of a dense matrix over all nodes, which are masses and then springs,
+ * with the link weights of equilibrium.h. */
+TEST(test_reach_solution_equals_dense_solution) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);
   const supine_mesh *mesh = &lungs.mesh;
@@ -76,13 +73,13 @@ TEST(test_reach_equals_dense_definition) {
   for (size_t i = 0; i < n; ++i) {
     mean += area[i] / (double)n;
   }
-  gsl_matrix *weight = gsl_matrix_calloc(nodes, nodes); /* link weights */
+  gsl_matrix *link_weight = gsl_matrix_calloc(nodes, nodes);
   double *s = calloc(nodes, sizeof *s);
   double *a = calloc(n, sizeof *a);
   for (size_t i = 0; i < n; ++i) {
     a[i] = 1.0 / (e[i] / exp(mean_log)); /* expandability, which multiplies the force */
     s[i] = 1.0;
-    gsl_matrix_set(weight, i, i, area[i] / mean);
+    gsl_matrix_set(link_weight, i, i, area[i] / mean);
   }
   for (size_t k = 0; k < lungs.topology.edge_count; ++k) {
     const uint32_t *edge = lungs.topology.edges + 2 * k;
@@ -104,21 +101,22 @@ TEST(test_reach_equals_dense_definition) {
     s[n + k] = 1.0;
     for (size_t c = 0; c < 2; ++c) {
       const double w = 4.0 * reach * reach / mean * own / h2;
-      gsl_matrix_set(weight, edge[c], n + k, w);
-      gsl_matrix_set(weight, n + k, edge[c], w);
+      gsl_matrix_set(link_weight, edge[c], n + k, w);
+      gsl_matrix_set(link_weight, n + k, edge[c], w);
     }
   }
-  /* The matrix I - A, with A[i, j] = S_i w_ij / Z_j for link weights w. */
+  /* The matrix I - A, where A[i, j] = S_i w_ij / Z_j for link weights w, and Z_j is the sum of S_l
+   * w_lj over l. */
   gsl_matrix *matrix = gsl_matrix_alloc(nodes, nodes);
   gsl_vector *b = gsl_vector_calloc(nodes);
   gsl_vector *x = gsl_vector_alloc(nodes);
   double *z = calloc(nodes, sizeof *z);
   for (size_t j = 0; j < nodes; ++j) {
     for (size_t l = 0; l < nodes; ++l) {
-      z[j] += s[l] * gsl_matrix_get(weight, l, j);
+      z[j] += s[l] * gsl_matrix_get(link_weight, l, j);
     }
     for (size_t i = 0; i < nodes; ++i) {
-      gsl_matrix_set(matrix, i, j, i == j ? 1.0 : -s[i] * gsl_matrix_get(weight, i, j) / z[j]);
+      gsl_matrix_set(matrix, i, j, i == j ? 1.0 : -s[i] * gsl_matrix_get(link_weight, i, j) / z[j]);
     }
   }
   for (size_t i = 0; i < n; ++i) {
@@ -143,7 +141,7 @@ TEST(test_reach_equals_dense_definition) {
   assert_true(fabs(balance - given) < 1e-10 * given);
   gsl_permutation_free(p);
   gsl_matrix_free(matrix);
-  gsl_matrix_free(weight);
+  gsl_matrix_free(link_weight);
   gsl_vector_free(b);
   gsl_vector_free(x);
   free(e);
@@ -156,7 +154,7 @@ TEST(test_reach_equals_dense_definition) {
   supine_lungs_free(&lungs);
 }
 
-TEST(test_reach_constant_force_stays_constant) {
+TEST(test_reach_constant_force_gives_constant_catch) {
   supine_lungs lungs = lungs_of(helper_lump(12, 60.0, 5), 25.0);
   double *force = irregular(lungs.mesh.vertex_count, 0.7, 0.0, 1);
   double *found = solve(&lungs, NULL, force);
@@ -190,8 +188,8 @@ static supine_mesh sphere(size_t frequency, double irregularity) {
   return mesh;
 }
 
-/* Return the relative error of the damping of a harmonic on a sphere of radius r. The solution of
- * (1 - R^2 Laplacian) F = Y_lm is F = Y_lm / (1 + l (l + 1) R^2 / r^2). */
+/* Return the relative error of the damping of a harmonic on a sphere of radius r. For the reach R,
+ * the solution of (1 - R^2 Laplacian) F = Y_lm is F = Y_lm / (1 + l (l + 1) R^2 / r^2). */
 static double harmonic_error(size_t frequency, double irregularity, double reach, size_t l, int m) {
   supine_lungs lungs = lungs_of(sphere(frequency, irregularity), reach);
   const size_t n = lungs.mesh.vertex_count;
@@ -262,9 +260,9 @@ static double spread(size_t frequency, double reach) {
   return sqrt(square / sum);
 }
 
-/* A force spreads twice the reach R in any mesh, as the response K_0(r / R) to a point in the plane
- * has the RMS radius 2 R. */
-TEST(test_reach_finer_mesh_same_length) {
+/* A point force spreads by twice the reach R (RMS distance) in any mesh: the response in the plane,
+ * K_0(r / R), has the RMS radius 2 R. */
+TEST(test_reach_finer_mesh_spreads_same_distance) {
   double with[3];
   double without[3];
   static const size_t frequencies[] = {12, 24, 48};

@@ -14,8 +14,6 @@
 
 #include "lungs_helpers.h"
 
-#include "tests/poses.h"
-
 static const double promised = 0.005; /* documented error of a reproduced scan, mm */
 
 static char path[] = "/tmp/supine-reference-XXXXXX";
@@ -122,8 +120,8 @@ TEST(test_resting_options_override_defaults) {
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
-  /* One share for both lungs keeps the proportion of their shares, and is their mean for lungs of
-   * usual size. */
+  /* One share for both lungs keeps the ratio of their shares, and is their mean if the lungs have
+   * the usual sizes. */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
@@ -143,8 +141,8 @@ TEST(test_resting_options_override_defaults) {
   }
 }
 
-/* Volumes in mL become shares of the full volumes of these lungs. Postures without a given volume
- * keep their proportion to the others. */
+/* A volume in mL becomes a share of the full volume of each lung. Postures without a given volume
+ * or share change by the same factor. */
 TEST(test_resting_volumes_become_shares) {
   static const int side[2] = {1, -1};
   static const double full[2] = {2500.0, 3100.0};
@@ -210,7 +208,7 @@ TEST(test_scan_parse_states_accepted_or_refused) {
 }
 
 /* Between rest and full inflation, both lungs have gained the same fraction of their whole gain
- * (Milic-Emili). Below rest, their volumes have the proportion that they have at rest. */
+ * (Milic-Emili). Below rest, their volumes keep the ratio that they have at rest. */
 TEST(test_share_out_any_volume_divided_along_straight_lines) {
   static const double left_side[3] = {1.0, 0.0, 0.0};
   static const double upright[3] = {0.0, 0.0, -1.0};
@@ -252,11 +250,11 @@ TEST(test_law_constants_equal_table) {
   }
 }
 
-/* The surface at full inflation is the same from scans of a person in any state. */
+/* A scan in any state gives the same surface at full inflation. */
 TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   static const struct {
     const char *scanned;
-    double volume; /* volume of the scan, mL; relative to rest if the state is */
+    double volume; /* mL; above rest if `scanned` names rest */
   } scans[] = {
       {"supine:full-3000", 3000.0},    {"supine+15:full-2200", 3800.0}, {"prone:rest", 0.0},
       {"left:full-900", 5100.0},       {"right:rest+800", 800.0},       {"supine:rest-150", -150.0},
@@ -300,8 +298,8 @@ TEST(test_reference_scan_of_any_state_recovers_full_lungs) {
   supine_lungs_free(&full);
 }
 
-/* By the equations of ECSC 1993 a man of 1.78 m has 7.1422 L, 6.4402 L supine; tissue adds 0.86
- * L. */
+/* By the equations of ECSC 1993, a man of 1.78 m has a total lung capacity of 7.1422 L, and
+ * of 6.4402 L supine; tissue adds 0.86 L. */
 TEST(test_capacity_height_and_sex_literal) {
   static const struct {
     supine_person person;
@@ -358,7 +356,7 @@ TEST(test_doubt_implausible_volume_names_option) {
   }
 }
 
-/* Real lungs, even at rest at 0.35 of full inflation, reach full inflation in at most 30 solves. */
+/* Real lungs that rest at 0.35 of full inflation reach full inflation in at most 30 solves. */
 TEST(test_reference_real_scans_reach_full_inflation) {
   static const char *const pairs[][2] = {{"lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj"},
                                          {"covid/covid001_left.ply", "covid/covid001_right.ply"}};
@@ -388,7 +386,7 @@ TEST(test_reference_real_scans_reach_full_inflation) {
   }
 }
 
-/* Make a basis of lungs scanned in a state; return its RMS error, mm, in rms_mm. */
+/* Make a basis of lungs scanned in a state; set its RMS error, mm. */
 static supine_basis *basis_of(supine_lungs *lungs, const supine_scan *scan, double *rms_mm) {
   const supine_resting resting = supine_reference_resting_default();
   supine_precompute_options options = {
@@ -431,7 +429,7 @@ static double *positions_in(const supine_basis *basis, const supine_state *state
 
 /* A basis from a scan in any state reproduces the scan, and has the right surface and volumes at
  * rest. */
-TEST(test_basis_reproduces_scan_and_volumes_at_rest) {
+TEST(test_basis_of_any_scan_reproduces_scan_and_rest) {
   static const char *const scans[] = {"supine-20:full-2500", "supine:rest", "left:rest",
                                       "upright:rest+300", "upright:full"};
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -459,7 +457,7 @@ TEST(test_basis_reproduces_scan_and_volumes_at_rest) {
     printf("%s: scan reproduced within %.4f and %.4f mm; error of the basis %.4f mm RMS\n",
            scans[s], farthest(placed, scanned, n), farthest(posed, scanned, n), rms);
     assert_true(farthest(placed, scanned, n) < promised);
-    /* Full inflation in the file is that of the compressed field, a few mL from the true one. */
+    /* The file computes full inflation from the compressed field, a few mL off. */
     assert_true(farthest(posed, scanned, n) <
                 (rests && scan.state.volume.ml == 0.0 ? promised : 0.15));
     free(placed);
@@ -516,8 +514,7 @@ TEST(test_reference_impossible_states_refused) {
   supine_lungs_free(&lungs);
 }
 
-/* A lung alone moves nearly as it does in the pair. */
-TEST(test_reference_single_lung_moves_as_in_pair) {
+TEST(test_solve_single_lung_moves_nearly_as_in_pair) {
   static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
   static const double postures[][3] = {{0, 1, 0},  {0, -1, 0}, {1, 0, 0},
                                        {-1, 0, 0}, {0, 0, -1}, {0, 0, 1}};

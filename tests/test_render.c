@@ -2,8 +2,6 @@
 /* Pictures: views, colours, colour bars and drawings. */
 #include "test.h"
 
-#include <supine/compare.h>
-
 #include "program/render/render.h"
 #include "runtime_fixture.h"
 
@@ -28,7 +26,7 @@ TEST(test_view_axes_any_view_right_handed_orthonormal) {
   assert_null(supine_render_view_name(SUPINE_VIEW_COUNT));
 }
 
-/* The axis `towards` of each view points from the lungs to the viewer. */
+/* The third axis of each view points from the lungs to the viewer. */
 TEST(test_view_axes_each_view_points_to_viewer) {
   static const struct {
     supine_view view;
@@ -47,7 +45,7 @@ static double linear(double encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
 }
 
-/* Return the lightness L* of CIE 1976 of an sRGB colour. The colour maps were made by another
+/* Return the lightness L* of CIE 1976 of an sRGB colour. The colour maps were designed by another
  * measure. */
 static double lightness(const double rgb[3]) {
   const double y = 0.2126 * linear(rgb[0]) + 0.7152 * linear(rgb[1]) + 0.0722 * linear(rgb[2]);
@@ -95,18 +93,18 @@ TEST(test_bar_any_range_ends_at_round_tick) {
   }
 }
 
-/* An open synthetic basis with a renderer and a value for each vertex. */
-typedef struct made {
+/* A synthetic basis, its renderer, and a value for each vertex. */
+typedef struct drawing {
   fixture *f;
   unsigned char *bytes;
   supine_basis *basis;
   supine_renderer *renderer;
   float *value;
-} made;
+} drawing;
 
 enum { WIDTH = 120, HEIGHT = 100, PIXELS = WIDTH * HEIGHT };
 
-static void unmake(made *m) {
+static void drawing_destroy(drawing *m) {
   supine_render_destroy(m->renderer);
   supine_basis_close(m->basis);
   free(m->bytes);
@@ -114,8 +112,8 @@ static void unmake(made *m) {
   fixture_destroy(m->f);
 }
 
-static made make(fixture *f) {
-  made m = {.f = f};
+static drawing drawing_create(fixture *f) {
+  drawing m = {.f = f};
   size_t size = 0;
   supine_error error;
   m.bytes = fixture_bytes(f, &size);
@@ -129,7 +127,7 @@ static made make(fixture *f) {
   return m;
 }
 
-static void draw(const made *m, supine_view view, const double *weights, double scale,
+static void draw(const drawing *m, supine_view view, const double *weights, double scale,
                  uint32_t *pixels) {
   const double scales[2] = {scale, scale};
   const supine_scene scene = {.pose = POSED(m->basis, weights, scales),
@@ -154,7 +152,7 @@ static size_t covered(const uint32_t *pixels) {
 
 TEST(test_draw_lungs_background_transparent) {
   static uint32_t pixels[PIXELS];
-  made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
+  drawing m = drawing_create(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const double weights[5] = {0};
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     draw(&m, view, weights, 1, pixels);
@@ -168,14 +166,14 @@ TEST(test_draw_lungs_background_transparent) {
       }
     }
   }
-  unmake(&m);
+  drawing_destroy(&m);
 }
 
 /* Seen from the front, the head is at the top: values increase with z, so the upper half is
  * lighter. */
 TEST(test_draw_anterior_head_on_top) {
   static uint32_t pixels[PIXELS];
-  made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
+  drawing m = drawing_create(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const double weights[5] = {0};
   double half[2] = {0, 0};
   double count[2] = {0, 0};
@@ -187,13 +185,13 @@ TEST(test_draw_anterior_head_on_top) {
     }
   }
   assert_true(half[0] / count[0] > half[1] / count[1] + 20);
-  unmake(&m);
+  drawing_destroy(&m);
 }
 
 /* The outermost vertices are projected near the outermost pixels that are drawn. */
 TEST(test_project_outer_vertices_match_drawing) {
   static uint32_t pixels[PIXELS];
-  made m = make(fixture_create(900, 5, 2, 2, false, true, 1, 61));
+  drawing m = drawing_create(fixture_create(900, 5, 2, 2, false, true, 1, 61));
   const supine_basis_info *info = supine_basis_get_info(m.basis);
   const double weights[5] = {0};
   const double scales[2] = {1, 1};
@@ -206,14 +204,14 @@ TEST(test_project_outer_vertices_match_drawing) {
   for (supine_view view = 0; view < SUPINE_VIEW_COUNT; ++view) {
     const supine_scene scene = {
         .pose = POSED(m.basis, weights, scales), .view = view, .width = WIDTH, .height = HEIGHT};
-    double is[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
+    double projected[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     double drawn[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     draw(&m, view, weights, 1, pixels);
     supine_render_project(m.renderer, &scene, &marks, at);
     for (size_t i = 0; i < info->vertex_count; ++i) {
       for (int side = 0; side < 2; ++side) {
-        is[2 * side] = fmin(is[2 * side], at[i][side]);
-        is[2 * side + 1] = fmax(is[2 * side + 1], at[i][side]);
+        projected[2 * side] = fmin(projected[2 * side], at[i][side]);
+        projected[2 * side + 1] = fmax(projected[2 * side + 1], at[i][side]);
       }
     }
     for (size_t i = 0; i < PIXELS; ++i) {
@@ -223,18 +221,18 @@ TEST(test_project_outer_vertices_match_drawing) {
         drawn[2 * side + 1] = fmax(drawn[2 * side + 1], place[side] + 1);
       }
     }
-    for (int end = 0; end < 4; ++end) { /* a corner of a triangle covers no pixel */
-      assert_true(fabs(is[end] - drawn[end]) < 3);
+    for (int end = 0; end < 4; ++end) { /* the tip of a triangle may cover no pixel */
+      assert_true(fabs(projected[end] - drawn[end]) < 3);
     }
   }
   free(mark);
   free(at);
-  unmake(&m);
+  drawing_destroy(&m);
 }
 
 TEST(test_draw_impossible_size_refused) {
   uint32_t pixel = 0;
-  made m = make(fixture_create(100, 3, 2, 1, false, false, 1, 65));
+  drawing m = drawing_create(fixture_create(100, 3, 2, 1, false, false, 1, 65));
   const double weights[3] = {0};
   const double scales[1] = {1};
   supine_scene scene = {
@@ -243,5 +241,5 @@ TEST(test_draw_impossible_size_refused) {
   assert_int_equal(supine_render_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
   scene.width = (size_t)1 << 30;
   assert_int_equal(supine_render_draw(m.renderer, &scene, &pixel, &error), SUPINE_ERROR_ARGUMENT);
-  unmake(&m);
+  drawing_destroy(&m);
 }

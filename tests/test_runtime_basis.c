@@ -148,7 +148,7 @@ TEST(test_open_every_flipped_bit_refused_or_same) {
   fixture_destroy(f);
 }
 
-/* Assert that the file of a fixture that `spoil` has changed is refused for this reason. */
+/* Change a fixture by `spoil`, and assert that its file is refused for this reason. */
 static void expect_refused(void (*spoil)(fixture *), const char *reason) {
   fixture *f = fixture_create(12, 3, 1, 2, false, true, 9, 4);
   spoil(f);
@@ -177,7 +177,7 @@ static void spoil_mode(fixture *f) {
   f->mode[11] = (double)NAN;
 }
 
-/* Make coefficients of modes finite, but so large that positions would overflow. */
+/* Make a coefficient finite, but so large that positions would overflow. */
 static void spoil_mode_size(fixture *f) {
   f->mode[11] = 1e277;
 }
@@ -318,7 +318,7 @@ TEST(test_open_wrong_structure_refused) {
     p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {terms}, zeros64};
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
-  /* Volumes at rest have one row for each lung. */
+  /* Volumes at rest may have one row for each lung. */
   p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {1, 9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9] = (supine_tensor){"resting_volume", SUPINE_F64, 2, {2, 9}, zeros64};
@@ -396,7 +396,6 @@ TEST(test_open_foreign_files_refused) {
   assert_int_equal(supine_basis_open("/tmp", &basis, &error), SUPINE_ERROR_READ);
 }
 
-/* Assert that the accessors of a basis return the numbers of the file. */
 static void check_view(bool vector, bool volume) {
   fixture *f = fixture_create(26, 3, 1, 2, vector, volume, 9, 41);
   size_t size = 0;
@@ -444,7 +443,7 @@ static void check_view(bool vector, bool volume) {
   fixture_destroy(f);
 }
 
-TEST(test_view_open_basis_equals_file) {
+TEST(test_accessors_open_basis_equal_file) {
   check_view(false, true);
   check_view(true, true);
   check_view(false, false);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* System calls of the library: for memory and files when a basis is opened, none afterwards; and
- * failing allocations. The linker option --wrap redirects these calls to this file. */
+/* The library calls memory and file functions only while it opens or closes a basis, and reports
+ * each failing allocation. The linker option --wrap redirects the calls to this file. */
 #include <sys/types.h>
 
 #include "test.h"
@@ -13,10 +13,10 @@
 
 #include "tests/poses.h"
 
-static size_t calls;    /* calls of wrapped functions while counting */
+static size_t calls;    /* calls of the wrapped functions */
 static size_t live;     /* blocks allocated and not yet freed */
-static size_t fail_at;  /* number of the allocation to refuse, from 1; 0: none */
-static size_t attempts; /* calls so far that may be refused */
+static size_t fail_at;  /* which allocation to refuse, from 1; 0 refuses none */
+static size_t attempts; /* allocations so far */
 static bool counting;
 
 static bool refuse(void) {
@@ -121,7 +121,7 @@ static void use_all(const supine_basis *basis, float *xyz) {
   (void)supine_basis_pose(basis, &state, &pose, &error);
   state = supine_basis_scan(basis);
   for (state.volume.ml = 3; state.volume.ml < 1e10;
-       state.volume.ml *= 1e9) { /* mL; the last is out of reach */
+       state.volume.ml *= 1e9) { /* 3 mL is in reach, 3e9 mL is not */
     if (supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK &&
         supine_basis_get_info(basis)->has_volume) {
       supine_basis_volumes(basis, &pose, scales);

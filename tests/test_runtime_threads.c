@@ -15,7 +15,7 @@ enum { THREADS = 4, VERTICES = 1003 };
 typedef struct job {
   const supine_basis *basis;
   size_t number;
-  /* [N, 3] positions in the shared orientation, of which each thread writes a range */
+  /* [N, 3] positions in the shared orientation; each thread writes a range of them */
   float *shared;
   float own[3 * VERTICES];       /* positions in the thread's own orientation */
   float batch[3 * 2 * VERTICES]; /* positions in the shared orientation, then in the thread's own */

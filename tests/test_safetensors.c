@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Safetensors files: round trips, refused files and checksums. */
-#include <inttypes.h>
-
 #include "test.h"
 
 #include <supine/safetensors.h>
@@ -328,7 +326,7 @@ TEST(test_open_memory_any_alignment_same_content) {
 }
 
 TEST(test_checksum_any_changed_bit_or_order_differs) {
-  /* Change each bit of data whose sizes include those near blocks of 64 bytes. */
+  /* Change each bit of data of several sizes, some near multiples of 64 bytes. */
   for (size_t size = 1; size <= 200; size += size < 130 ? 43 : 7) {
     unsigned char data[256] = {0};
     uint64_t random = size;

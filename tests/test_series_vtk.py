@@ -48,12 +48,12 @@ def check_surface(surface, points, triangles, rest, lung):
     assert np.abs(found - points).max() <= HALF_STEP * 1.01
     assert (vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3) == triangles).all()
     moved = vtk_to_numpy(data.GetArray("displacement"))
-    # The evaluator's reference positions differ from those in the file by at most 0.0005 mm.
+    # The evaluator rounds reference positions by at most 0.0005 mm.
     assert np.abs(moved - (points - rest)).max() <= HALF_STEP * 1.01 + 0.0006
     normals = vtk_to_numpy(data.GetNormals()).astype(float)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 0.01
     cosine = (normals * normals_of(points, triangles)).sum(1) / np.linalg.norm(normals, axis=1)
-    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.3  # degrees; steps of 1/256 rotate a normal by up to 0.2
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.3  # degrees; the steps rotate normals by up to 0.2
     assert (vtk_to_numpy(data.GetArray("lung")) == lung).all()
     fields = surface.GetFieldData()
     assert fields.GetAbstractArray("SPACE").GetValue(0) == "LPS"
@@ -87,7 +87,7 @@ with tempfile.TemporaryDirectory() as folder:
     frames = len(points)
     assert frames == 11 and np.ptp(exact["volume"].sum(1)) > 50  # volumes vary by more than 50 mL
 
-    # Frames have the same triangles, which the file holds once.
+    # All frames have the same triangles; the file holds them once.
     for step in (0, 7, 3, 10):
         steps, surface = read("breath.vtp", step)
         fields = check_surface(surface, points[step], triangles, rest, lung)
@@ -125,4 +125,4 @@ with tempfile.TemporaryDirectory() as folder:
     measured.Update()
     held = sum(fields.GetArray("volume_mL").GetTuple(0))  # mL of gas and tissue
     assert abs(measured.GetVolume() / 1000 - held) < 0.05, held
-    print("all arrays equal those computed")
+    print("all arrays have the expected values")

@@ -76,8 +76,8 @@ TEST(test_evaluate_to_band_4_matches_closed_forms) {
   }
 }
 
-/* Return the largest deviation from the identity of the Gram matrix of all harmonics, integrated by
- * the quadrature rule. */
+/* Integrate the Gram matrix of all harmonics by the quadrature rule; return its largest deviation
+ * from the identity. */
 static double gram_error(size_t band) {
   const size_t count = supine_sh_count(band);
   supine_sh_grid *grid = NULL;
@@ -113,7 +113,7 @@ static double gram_error(size_t band) {
   return worst;
 }
 
-TEST(test_evaluate_under_rule_orthonormal) {
+TEST(test_evaluate_under_quadrature_rule_orthonormal) {
   static const size_t bands[] = {0, 1, 3, 7, 15, 20};
   for (size_t i = 0; i < sizeof bands / sizeof *bands; ++i) {
     const double worst = gram_error(bands[i]);
@@ -183,7 +183,7 @@ TEST(test_evaluate_two_directions_obey_addition_theorem) {
   }
 }
 
-TEST(test_evaluate_poles_only_zonal) {
+TEST(test_evaluate_poles_only_zonal_not_zero) {
   static double y[COUNT_MAX];
   for (int south = 0; south < 2; ++south) {
     const double d[3] = {0, 0, south ? -1 : 1};

@@ -5,8 +5,6 @@
 #include "sh/grid.h"
 #include "test.h"
 
-#include "sh_helpers.h"
-
 /* The nodes and weights are those of M. Abramowitz and I. A. Stegun, Handbook of Mathematical
  * Functions, table 25.4, n = 5. */
 TEST(test_grid_five_latitudes_match_table) {

@@ -70,7 +70,7 @@ TEST(test_state_parse_volumes_by_lung_keeps_each_name) {
   assert_string_equal(text, "right side, left lung at rest + 100 mL, right lung at 2600 mL");
 }
 
-TEST(test_state_parse_bare_number_lists_meanings) {
+TEST(test_state_parse_bare_number_refused_with_meanings) {
   static const char *const numbers[] = {"500", "+500", "supine:500", "left=500,right=rest"};
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     supine_state parsed = unset;

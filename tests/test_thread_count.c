@@ -15,7 +15,7 @@ static supine_lungs phantom(void) {
   return lungs;
 }
 
-/* Return the bytes of a basis computed with `threads` threads (malloc), and set their number. */
+/* Return the bytes (malloc) and the size of a basis file computed with `threads` threads. */
 static unsigned char *bytes_of(const supine_lungs *lungs, const supine_precompute_options *options,
                                const char *threads, size_t *size) {
   char path[] = "/tmp/supine-threads-XXXXXX";

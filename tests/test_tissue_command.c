@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Options for tissue of `solve` and `precompute`: accepted and refused values, warnings and
- * output. */
+/* Options of `solve` and `precompute` for tissue: accepted and refused values, warnings, output. */
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "test.h"
@@ -59,7 +58,7 @@ static bool same_bytes(const char *first, const char *second) {
   return x == y;
 }
 
-TEST(test_solve_lesion_factor_one_writes_the_same_bytes) {
+TEST(test_solve_neutral_tissue_options_same_bytes) {
   char ply[80];
   (void)snprintf(ply, sizeof ply, "%s.ply", other);
   assert_int_equal(solve(NULL, NULL, out), SUPINE_EXIT_OK);
@@ -129,7 +128,6 @@ TEST(test_solve_bad_expandability_file_message_names_vertex) {
   assert_int_equal(solve("--expandability", "/nowhere/a.csv", out), SUPINE_EXIT_INPUT);
 }
 
-/* A file of expandability 1 gives the same bytes as uniform tissue. */
 TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   char ply[80];
   (void)snprintf(ply, sizeof ply, "%s.ply", other);
@@ -149,10 +147,10 @@ TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   (void)unlink(ply);
 }
 
-/* In a basis with a collapsed lung, the volumes measured on the surface are exact for each lung and
- * in total. */
+/* If a lung is collapsed, the deformed surface still has the stated volume of each lung and of
+ * both. */
 TEST(test_precompute_collapsed_lung_volumes_exact) {
-  double volumes[2][2]; /* [healthy, collapsed][lung] volume gained, mL */
+  double volumes[2][2]; /* mL gained; first index 0 healthy, 1 collapsed left lung */
   double rests[2][2];
   supine_basis *healthy = NULL;
   static const char *const shares[] = {"left:1", "left:0.3"};
@@ -196,11 +194,11 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
                          6000.0;
         }
       }
-      const double said = posed_lung_volume(basis, lung, weights, scales[lung]);
+      const double stated = posed_lung_volume(basis, lung, weights, scales[lung]);
       rests[ill][lung] = measured[0];
-      volumes[ill][lung] = said;
+      volumes[ill][lung] = stated;
       whole += measured[1] - measured[0];
-      assert_true(fabs(measured[1] - measured[0] - said) < 0.05);
+      assert_true(fabs(measured[1] - measured[0] - stated) < 0.05);
     }
     assert_true(fabs(whole - 400.0) < 0.05);
     if (ill == 1) {
@@ -211,16 +209,16 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
     free(xyz);
     if (ill == 0) {
       healthy = basis;
-    } else { /* the collapsed lung gains 0.3 of a healthy one at equal scale */
-      const double was = posed_lung_volume(healthy, 0, weights, scales[0]);
-      assert_true(fabs(volumes[1][0] - 0.3 * was) < 1e-4);
+    } else { /* at equal scale, a collapsed lung gains 0.3 of a healthy one */
+      const double healthy_gain = posed_lung_volume(healthy, 0, weights, scales[0]);
+      assert_true(fabs(volumes[1][0] - 0.3 * healthy_gain) < 1e-4);
       supine_basis_close(basis);
     }
   }
   supine_basis_close(healthy);
   assert_true(fabs(rests[1][0] - 0.3 * rests[0][0]) < 0.05);
   assert_true(fabs(rests[1][1] - rests[0][1]) < 0.05);
-  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the healthy lung gains over 50 mL more */
+  assert_true(volumes[1][1] > volumes[0][1] + 50.0); /* the other lung gains over 50 mL more */
   assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
 }
 
@@ -231,7 +229,7 @@ TEST(test_solve_missing_lung_refused) {
   (void)snprintf(one, sizeof one, "%s.ply", other);
   assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
   left = mesh;
-  left.vertex_count = mesh.vertex_count / 2; /* both lungs of the phantom have as many vertices */
+  left.vertex_count = mesh.vertex_count / 2; /* both lungs have equally many vertices */
   left.triangle_count = mesh.triangle_count / 2;
   assert_int_equal(supine_mesh_save(one, &left, NULL, NULL), SUPINE_OK);
   supine_mesh_free(&mesh);

@@ -12,9 +12,9 @@ static supine_mesh phantom(void) {
   return mesh;
 }
 
-/* Return the largest difference between the force of a solution and the applied force, relative to
- * the largest force. With a reach, compare forces divided by the stiffness, the right-hand sides of
- * the equilibrium. */
+/* Return the largest difference between the force that a solution implies and the applied force,
+ * relative to the largest force. With a reach, compare forces divided by the stiffness, which are
+ * the right-hand sides of the equilibrium. */
 static double residual(const supine_lungs *lungs, const supine_model *model, const double g[3],
                        const supine_solution *solution) {
   const size_t n = solution->vertex_count;
@@ -34,8 +34,8 @@ static double residual(const supine_lungs *lungs, const supine_model *model, con
   return relative;
 }
 
-/* Solve with and without a reach. Assert that the catch is finite with the required residual and,
- * without a reach, positive, as it is a sum over paths. */
+/* Solve with and without a reach. Assert the residual, and a finite catch. Without a reach, the
+ * catch is a sum over paths, so assert that it is not negative. */
 static void check(const char *what, supine_mesh *mesh, const double *stiffness) {
   static const double g[3] = {0.48, 0.64, -0.6};
   supine_lungs lungs = {0};

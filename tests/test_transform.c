@@ -52,7 +52,7 @@ static double largest_difference(const double *a, const double *b, size_t count)
   double worst = 0;
   for (size_t i = 0; i < count; ++i) {
     const double off = fabs(a[i] - b[i]);
-    worst = off <= worst ? worst : off; /* false for NaN, which is kept */
+    worst = off <= worst ? worst : off; /* any NaN makes the result NaN */
   }
   return worst;
 }

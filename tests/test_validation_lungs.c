@@ -19,7 +19,7 @@ static bool load(const char *left, const char *right, supine_lungs *lungs) {
 }
 
 /* In one orientation every vertex moves along a line, nearly in proportion to the volume
- * ([Santhanam2008] III-C), as computed by the run-time library from a basis file. */
+ * ([Santhanam2008] III-C). The run-time library deforms the lungs from a basis file. */
 TEST(test_deform_one_orientation_linear_in_volume) {
   char path[] = "/tmp/supine-validation-XXXXXX";
   supine_lungs lungs = {0};
@@ -69,8 +69,8 @@ TEST(test_deform_one_orientation_linear_in_volume) {
         }
       }
     }
-    printf("%s: displacement deviates by at most %.2f %% from proportional to the volume up to 500 "
-           "mL; displacements within %.1e of one line (1 - cosine)\n",
+    printf("%s: up to 500 mL, displacements deviate from proportionality to the volume by at most "
+           "%.2f %%, and from one line by %.1e (1 - cosine)\n",
            posture_names[p], 100.0 * bend, turn);
     assert_true(bend < 0.02);
     assert_true(turn < 1e-6);
@@ -99,7 +99,7 @@ TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
       printf(" %.2f", found.index[z]);
       assert_true(z == 0 || found.index[z] > found.index[z - 1]);
     }
-    printf("; slope %.2f over the height, %.3f per cm\n       swept:", found.slope,
+    printf("; slope %.2f over the height, %.3f per cm\n       swept volume:", found.slope,
            10.0 * found.slope / found.height);
     for (size_t z = 0; z < ZONES; ++z) {
       printf(" %.2f", found.swept[z]);
@@ -136,8 +136,8 @@ TEST(test_solve_reach_reduces_change_with_resolution) {
     drift[with] = drift_of(&coarse.mesh, moves[0], &fine.mesh, moves[1]);
     assert_int_equal(spread_of(&coarse, reach, vertex, &spread[with][0]), SUPINE_OK);
     assert_int_equal(spread_of(&fine, reach, same, &spread[with][1]), SUPINE_OK);
-    printf("reach %2.0f mm, 5k to 20k: displacements change by %.2f %% RMS; a unit force spreads "
-           "%.2f, then %.2f mm\n",
+    printf("reach %2.0f mm, 5,000 to 20,000 vertices: displacements change by %.2f %% RMS; a unit "
+           "force spreads %.2f, then %.2f mm\n",
            reach, 100.0 * drift[with], spread[with][0], spread[with][1]);
   }
   assert_true(drift[1] < 0.5 * drift[0]);

@@ -4,7 +4,7 @@
 #include "test.h"
 #include "validation.h"
 
-/* A plane sheet moves as a mass-spring-damper system does ([Santhanam2008] Fig. 8). */
+/* A plane sheet moves like a mass-spring-damper system ([Santhanam2008] Fig. 8). */
 TEST(test_solve_plane_equals_mass_spring_damper) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -18,7 +18,6 @@ TEST(test_solve_plane_equals_mass_spring_damper) {
   const double difference = relative_rms(n, ours, theirs);
   printf("sheet of %zu masses: difference from a mass-spring-damper system at rest %.2e %% RMS\n",
          n, 100.0 * difference);
-  assert_true(difference < 1e-3);
   assert_true(difference < 1e-6); /* tolerance of the integration */
   double middle = 0.0;
   double corner = ours[0];
@@ -34,7 +33,7 @@ TEST(test_solve_plane_equals_mass_spring_damper) {
   free(theirs);
 }
 
-/* The same holds with stiffness that varies fourfold and links of unequal length. */
+/* The sheet may also have unequal links and stiffness that varies fourfold. */
 TEST(test_solve_irregular_plane_equals_mass_spring_damper) {
   frame f = frame_plane(15, 7.0);
   const size_t n = f.mesh.vertex_count;
@@ -69,19 +68,19 @@ TEST(test_solve_uniform_ring_stays_circle) {
   double *force = ones(COUNT);
   double catch_[COUNT] = {0.0};
   assert_int_equal(frame_solve(&f, NULL, force, catch_), SUPINE_OK);
-  double low = INFINITY;
-  double high = 0.0;
-  for (size_t i = 0; i < COUNT; ++i) { /* radius of the expanded ring at each mass */
+  double least_radius = INFINITY;
+  double largest_radius = 0.0;
+  for (size_t i = 0; i < COUNT; ++i) {
     const double *p = f.mesh.vertices + 3 * i;
     const double scale = 10.0;
-    const double radius = hypot(p[0], p[1]);
-    const double x = p[0] + scale * catch_[i] * p[0] / radius;
-    const double y = p[1] + scale * catch_[i] * p[1] / radius;
-    low = fmin(low, hypot(x, y));
-    high = fmax(high, hypot(x, y));
+    const double before = hypot(p[0], p[1]);
+    const double x = p[0] + scale * catch_[i] * p[0] / before;
+    const double y = p[1] + scale * catch_[i] * p[1] / before;
+    least_radius = fmin(least_radius, hypot(x, y));
+    largest_radius = fmax(largest_radius, hypot(x, y));
   }
-  assert_true(low > 51.0); /* larger than the radius before, 50 mm */
-  assert_true(high - low <= 1e-10);
+  assert_true(least_radius > 51.0); /* the radius was 50 mm */
+  assert_true(largest_radius - least_radius <= 1e-10);
   free(force);
   frame_free(&f);
 }
@@ -118,8 +117,8 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Pitcher/Catcher needs fewer visits of a link from one of its ends to reach an error of 1e-6
- * ([Santhanam2008] Fig. 7). */
+/* To reach an error of 1e-6, Pitcher/Catcher visits link ends less often than the
+ * mass-spring-damper system ([Santhanam2008] Fig. 7). */
 TEST(test_pitcher_catcher_converges_before_mass_spring_damper) {
   frame f = frame_plane(15, 10.0);
   const size_t n = f.mesh.vertex_count;

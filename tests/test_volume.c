@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volumes by volume forms against volumes of the surface, and the scale or the gains for a given
- * volume. */
+/* Volumes computed from volume forms, compared with those of the surface, and the scale or the
+ * gains for a given volume. */
 #include <float.h>
 
 #include "test.h"
 
 #include <supine/runtime.h>
-#include <supine/safetensors.h>
 
 #include "runtime_fixture.h"
 
@@ -105,28 +104,28 @@ static supine_basis *open_cubic(double a, double b, double c, unsigned char **by
   return basis;
 }
 
-TEST(test_scale_cubic_root_on_branch_of_rest) {
+TEST(test_scale_cubic_volume_gives_root_connected_to_zero) {
   static const struct {
-    /* Volume in mL; the expected scale, NAN if it cannot be reached. */
+    /* volume in mL; expected scale, NAN if the volume is refused */
     double a, b, c, volume, scale;
   } cases[] = {
-      {2, 0, 0, 10, 5}, /* linear */
+      {2, 0, 0, 10, 5},
       {2, 0, 0, -10, -5},
       {-2, 0, 0, 10, -5}, /* the field shrinks the lung */
       {0, 0, 0, 1, NAN},  /* nothing moves */
       {0, 0, 1, 8, NAN},  /* the slope is 0 at s = 0 */
       {0, 0, 0, 0, 0},
       {2, 1, 0, 8, 2},        /* 2 s + s^2 = 8: s = 2, not -4 */
-      {2, 1, 0, -0.75, -0.5}, /* has its minimum V = -1 at s = -1 */
-      {2, 1, 0, -1, -1},      /* the minimum itself */
+      {2, 1, 0, -0.75, -0.5}, /* minimum V = -1 at s = -1 */
+      {2, 1, 0, -1, -1},      /* the minimum V = -1 */
       {2, 1, 0, -1.0001, NAN},
       {1, 0, 1, 10, 2}, /* s + s^3 */
       {1, 0, 1, -30, -3},
       {3, 0, -1, 2, 1},       /* 3 s - s^3 has a maximum V = 2 at s = 1; s = -2 also gives 2 */
-      {3, 0, -1, 2.001, NAN}, /* only s near -2 gives it, beyond the minimum */
+      {3, 0, -1, 2.001, NAN}, /* only s near -2, beyond the minimum, gives it */
       {3, 0, -1, 1.375, 0.5},
       {6, -4.5, 1, 2.5, 1},       /* maximum V = 2.5 at s = 1, minimum at s = 2 */
-      {6, -4.5, 1, 2.6, NAN},     /* reached only beyond both extremes */
+      {6, -4.5, 1, 2.6, NAN},     /* only s > 2, beyond the minimum, gives it */
       {1e-300, 0, 0, 1e300, NAN}, /* overflows */
       {1e-3, 0, 0, 1e3, 1e6},
   };
@@ -181,8 +180,8 @@ TEST(test_pose_open_surface_refused) {
   fixture_destroy(f);
 }
 
-/* Volume form of a box of 3000 mL at full inflation, whose axes are shorter by 20 to 30 % at gains
- * of -1. */
+/* Volume form of a box of 3000 mL at full inflation. At gains of -1, its sides are shorter by 20,
+ * 25 and 30 %. */
 static const supine_volume_form box_form = {{3000 * 0.2, 3000 * 0.25, 3000 * 0.3, 3000 * 0.25 * 0.3,
                                              3000 * 0.2 * 0.3, 3000 * 0.2 * 0.25,
                                              3000 * 0.2 * 0.25 * 0.3}};
@@ -219,7 +218,8 @@ TEST(test_volume_form_gains_at_rest_equal_on_all_axes) {
   }
 }
 
-/* The path has the slopes 1, 0.1, 1.9 at rest and 1, 1.45, 0.55 at full inflation. */
+/* On the three axes, the path has the slopes 1, 0.1, 1.9 at rest and 1, 1.45, 0.55 at full
+ * inflation. */
 TEST(test_volume_bend_path_has_stated_slopes) {
   static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
   for (size_t end = 0; end < 2; ++end) {
@@ -249,7 +249,7 @@ TEST(test_volume_bend_path_has_stated_values) {
   }
 }
 
-TEST(test_volume_form_gains_straight_path_one_scale) {
+TEST(test_volume_form_gains_straight_path_equal_on_all_axes) {
   static const double straight[3] = {0, 0, 0};
   double gains[3];
   assert_int_equal(supine_volume_form_gains(&box_form, straight, 0, -900, gains, NULL), SUPINE_OK);

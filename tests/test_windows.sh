@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Build the run-time library for Windows by Debian's gcc-mingw-w64-x86-64-win32, without warnings. Check that it
-# exports what the headers declare and needs only system libraries, and that under wine (wine64) its results have the
-# same bits as here.
+# exports what the headers declare and needs only system libraries, and that its results under wine (wine64) have
+# the same bits as those of this system.
 #
 #     test_windows.sh CMAKE SOURCE_FOLDER LIBRARY CC
 set -eu
@@ -27,7 +27,7 @@ done >"$work/all.c"
 include="-I$source/runtime/include"
 # shellcheck disable=SC2086
 "$cc" -std=c17 -E -P $include "$work/all.c" | grep -o 'supine_[a-z0-9_]*(' | tr -d '(' | sort -u >"$work/declared"
-diff "$work/declared" "$work/shown" || { echo "headers and library disagree"; exit 1; }
+diff "$work/declared" "$work/shown" || { echo "the headers (<) and the library (>) have different functions"; exit 1; }
 
 wine=$(command -v wine64 || ls /usr/lib/wine/wine64 2>/dev/null) || { echo "built; not run: no wine64"; exit 0; }
 # shellcheck disable=SC2086
@@ -37,7 +37,7 @@ x86_64-w64-mingw32-gcc -O2 $include "$source/tests/python/reference.c" "$dll.a" 
 cp "$dll" "$source/tests/golden/basis_2.safetensors" "$work"
 cd "$work"
 export WINEPREFIX="$work/wine" WINEDEBUG=-all
-# Wine's server runs on after the programs, and writes files when it ends.
+# Wine's server outlives the programs, and writes files when it ends.
 trap '{ wineserver -k; wineserver -w; } >/dev/null 2>&1 || true; rm -rf "$work"' EXIT
 run() {
   timeout 400 "$wine" "$@"
@@ -53,4 +53,4 @@ run ./reference.exe cut prone 0.5 2>log && exit 1
 grep -q '^cut: truncated' log || { cat log; exit 1; }
 run ./reference.exe nowhere prone 0.5 2>log && exit 1
 grep -q '^nowhere: cannot read' log || { cat log; exit 1; }
-echo "built, and run under wine: same bits as here"
+echo "built, and run under wine: same bits as on this system"
