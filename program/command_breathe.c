@@ -84,7 +84,7 @@ static const supine_option table[] = {
 static supine_status complete(request *wanted, size_t *count, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
   supine_pv_breath *breath = &wanted->breath;
-  if (wanted->as_scanned && supine_text_ends_in_any_case(wanted->path, ".safetensors")) {
+  if (wanted->as_scanned && supine_text_ends_in(wanted->path, ".safetensors")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--as-scanned is for VTP files only: leave it out, as safetensors "
                             "files are always in LPS and mm");
@@ -321,7 +321,7 @@ static supine_status check_ends(const playing *p, supine_error *error) {
 
 static supine_status play(playing *p, size_t count, const char *made_by, supine_error *error) {
   const request *wanted = p->wanted;
-  const bool tensors = supine_text_ends_in_any_case(wanted->path, ".safetensors");
+  const bool tensors = supine_text_ends_in(wanted->path, ".safetensors");
   supine_mesh_save_options save = {.comment = p->vtp_comment};
   supine_pv pv = *supine_breath_normal();
   supine_reference_pose from;

@@ -169,8 +169,7 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   }
   const bool voxels = supine_image_supports(output);
   const bool image = row->content.image != NULL || row->content.labels != NULL;
-  if (!voxels && !supine_mesh_save_supports(output) &&
-      !supine_text_ends_in_any_case(output, ".csv")) {
+  if (!voxels && !supine_mesh_save_supports(output) && !supine_text_ends_in(output, ".csv")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s",
                             csv->path, csv->line, output, ENDINGS);
   }

@@ -111,7 +111,7 @@ static supine_status write_page(const export_source *source, const request *want
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
-  const bool page = supine_text_ends_in_any_case(wanted->path, ".html");
+  const bool page = supine_text_ends_in(wanted->path, ".html");
   export_source source = {0};
   if (page && wanted->glb_only) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

@@ -251,7 +251,7 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
                                  supine_error *error) {
   const bool moved = wanted->landmarks.translation || wanted->landmarks.rigid;
   const char *path = wanted->further_path[which];
-  const bool landmarks = supine_text_ends_in_any_case(path, ".csv");
+  const bool landmarks = supine_text_ends_in(path, ".csv");
   supine_patient_pairs pairs = {0};
   supine_lungs lungs = {0};
   supine_patient_further *further = &record->further[record->further_count++];
@@ -401,8 +401,7 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
   wanted->first_path = given->count > 0 ? given->operand[0] : NULL;
   wanted->second_path = given->count > 1 ? given->operand[1] : NULL;
   for (size_t k = 0; k < wanted->further_count; ++k) {
-    further_surfaces =
-        further_surfaces || !supine_text_ends_in_any_case(wanted->further_path[k], ".csv");
+    further_surfaces = further_surfaces || !supine_text_ends_in(wanted->further_path[k], ".csv");
   }
   const char *wrong =
       wanted->landmarks.path == NULL && wanted->second_path == NULL

@@ -353,7 +353,7 @@ static void print(const request *wanted, const supine_command_names *names,
 static supine_status locate(const request *wanted, const supine_basis *lungs,
                             const supine_basis *inside, const supine_command_names *names,
                             const observations *observed, supine_error *error) {
-  const bool csv = supine_text_ends_in_any_case(wanted->output, ".csv");
+  const bool csv = supine_text_ends_in(wanted->output, ".csv");
   const supine_basis *shown = csv ? inside : lungs;
   lungs_found located = {0};
   const supine_locate_task task = {.inside = inside,

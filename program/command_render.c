@@ -345,7 +345,7 @@ static const supine_option table[] = {
 
 static supine_status check(const request *wanted, supine_posture_list *postures,
                            supine_error *error) {
-  const bool animation = supine_text_ends_in_any_case(wanted->output, ".webp");
+  const bool animation = supine_text_ends_in(wanted->output, ".webp");
   if (wanted->turns ? wanted->postures != NULL : wanted->postures == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             wanted->turns ? "give --posture or --turn, not both"

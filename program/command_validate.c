@@ -78,7 +78,7 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 static bool draws(const char *path) {
-  return supine_text_ends_in_any_case(path, ".png");
+  return supine_text_ends_in(path, ".png");
 }
 
 static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]) {
@@ -206,7 +206,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       return status;
     }
   }
-  if (supine_text_ends_in_any_case(path, ".json")) {
+  if (supine_text_ends_in(path, ".json")) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s is a patient model without a surface: make a basis from it first "
                             "with 'supine precompute --patient'",

@@ -93,7 +93,7 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
 
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted) {
   return wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL ||
-         supine_text_ends_in_any_case(wanted->path, ".csv");
+         supine_text_ends_in(wanted->path, ".csv");
 }
 
 /* Convert a vector from LPS and mm to other axes and another unit. */
@@ -312,8 +312,7 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
   if (wanted->field != NULL || wanted->image != NULL || wanted->labels != NULL) {
     status = move_grid(wanted, basis, moved, error);
   }
-  if (status == SUPINE_OK && wanted->path != NULL &&
-      supine_text_ends_in_any_case(wanted->path, ".csv")) {
+  if (status == SUPINE_OK && wanted->path != NULL && supine_text_ends_in(wanted->path, ".csv")) {
     status = write_points(wanted->path, basis, moved, error);
     if (status == SUPINE_OK) {
       supine_options_expected_print(&moved->expected, stdout);

@@ -25,7 +25,7 @@ enum { FORMATS = sizeof formats / sizeof *formats };
 /* Return the index of the format with the path's ending, or FORMATS if there is none. */
 static size_t format_of(const char *path) {
   size_t f = 0;
-  while (f < FORMATS && !supine_text_ends_in_any_case(path, formats[f].ending)) {
+  while (f < FORMATS && !supine_text_ends_in(path, formats[f].ending)) {
     ++f;
   }
   return f;
@@ -39,7 +39,7 @@ bool supine_image_is_named(const char *path) {
   static const char *const others[] = {".mhd", ".nhdr", ".mgz", ".dcm", ".hdr", ".img"};
   bool is = supine_image_supports(path);
   for (size_t i = 0; i < sizeof others / sizeof *others; ++i) {
-    is = is || supine_text_ends_in_any_case(path, others[i]);
+    is = is || supine_text_ends_in(path, others[i]);
   }
   return is;
 }

@@ -27,7 +27,7 @@ static mesh_reader *find_reader(const char *path) {
                {".stl", supine_mesh_read_stl},
                {".obj", supine_mesh_read_obj}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
-    if (supine_text_ends_in_any_case(path, known[i].ending)) {
+    if (supine_text_ends_in(path, known[i].ending)) {
       return known[i].read;
     }
   }

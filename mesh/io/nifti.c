@@ -170,7 +170,7 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
   supine_status status = SUPINE_OK;
   const void *values = vectors ? planar : image->values;
   make_header(image, note, header);
-  if (supine_text_ends_in_any_case(path, ".gz")) {
+  if (supine_text_ends_in(path, ".gz")) {
     status = supine_image_pack(IMAGE_GZIP, header, sizeof header, image, values, file);
   } else {
     (void)fwrite(header, 1, sizeof header, file);

@@ -132,14 +132,13 @@ static supine_status read_markups(reading *r) {
 }
 
 bool supine_mesh_points_named(const char *path) {
-  return supine_text_ends_in_any_case(path, ".csv") || supine_text_ends_in_any_case(path, ".json");
+  return supine_text_ends_in(path, ".csv") || supine_text_ends_in(path, ".json");
 }
 
 supine_status supine_mesh_points_read(const char *path, const supine_mesh_load_options *options,
                                       supine_mesh_points *points, supine_error *error) {
   reading r = {.path = path, .options = options, .error = error};
-  supine_status status =
-      supine_text_ends_in_any_case(path, ".json") ? read_markups(&r) : read_csv(&r);
+  supine_status status = supine_text_ends_in(path, ".json") ? read_markups(&r) : read_csv(&r);
   if (status == SUPINE_OK && r.points.count == 0) {
     status = supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: no points: give at least one", path);
   }

@@ -13,7 +13,7 @@ static save_function *find_function(const char *path) {
   } known[] = {SUPINE_MESH_FORMATS(ROW, ROW)};
 #undef ROW
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
-    if (supine_text_ends_in_any_case(path, known[i].ending)) {
+    if (supine_text_ends_in(path, known[i].ending)) {
       return known[i].function;
     }
   }

@@ -174,7 +174,7 @@ static void write_label(const char *parent, const char *key, char text[TEXT_MAX]
   size_t length = strlen(key);
   const char *unit = "";
   for (size_t i = 0; i < sizeof units / sizeof *units; ++i) {
-    if (supine_text_ends_in_any_case(key, units[i][0])) {
+    if (supine_text_ends_in(key, units[i][0])) {
       unit = units[i][1];
       length -= strlen(units[i][0]);
     }

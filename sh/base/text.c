@@ -16,19 +16,10 @@ void supine_text_add(char *text, size_t size, const char *format, ...) {
   va_end(arguments);
 }
 
-/* Return the last characters of `name`, as many as `ending` has; "" if `name` is not longer. */
-static const char *tail_of(const char *name, const char *ending) {
+bool supine_text_ends_in(const char *name, const char *ending) {
   const size_t length = strlen(name);
   const size_t tail = strlen(ending);
-  return length > tail ? name + length - tail : "";
-}
-
-bool supine_text_ends_in(const char *name, const char *ending) {
-  return strcmp(tail_of(name, ending), ending) == 0;
-}
-
-bool supine_text_ends_in_any_case(const char *name, const char *ending) {
-  return strcasecmp(tail_of(name, ending), ending) == 0;
+  return length > tail && strcasecmp(name + length - tail, ending) == 0;
 }
 
 char *supine_text_make_utf8(char *text) {

@@ -15,9 +15,7 @@ void supine_text_add(char *text, size_t size, const char *format, ...);
 /** Replace bytes that are not UTF-8, which file names may contain, by '?'. Return `text`. */
 char *supine_text_make_utf8(char *text);
 
-/** Return whether a name ends in `ending` (".csv") with at least one character before it. */
+/** Return whether a name ends in `ending` (".csv"), ignoring case, after at least one character. */
 bool supine_text_ends_in(const char *name, const char *ending);
-/** Return whether a name ends in `ending`, ignoring case, with at least one character before it. */
-bool supine_text_ends_in_any_case(const char *name, const char *ending);
 
 #endif
