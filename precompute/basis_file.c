@@ -18,11 +18,11 @@
 
 enum { ENTRIES_MAX = 64 };
 
-/* Metadata under construction; entries_free frees the values. */
+/* Metadata of a basis file. entries_free releases their values. */
 typedef struct entries {
   size_t count;
   supine_metadata metadata[ENTRIES_MAX];
-  bool failed; /* out of memory, or more than ENTRIES_MAX entries */
+  bool failed; /* memory ran out, or there are more than ENTRIES_MAX entries */
 } entries;
 
 SUPINE_PRINTF(3, 4)
@@ -60,7 +60,7 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   }
 }
 
-/* Add the number of vertices whose stiffness lesions change, and the range of the factors. */
+/* Add the number of vertices in lesions, and the range of the factors on the stiffness. */
 static void add_lesions(entries *list, size_t count, const double *factors) {
   size_t changed = 0;
   double low = 1.0;
@@ -106,7 +106,7 @@ static void add_by_lung(entries *list, const char *key, size_t count, const doub
   }
 }
 
-/* Add the state and volumes of the scan, the full volume and the volumes at rest as shares. */
+/* Add the scan's state and volumes, the full volume, and the volumes at rest as shares of it. */
 static void add_reference(entries *list, const supine_reference *reference, const double share[2]) {
   const double *g = reference->scan.state.gravity;
   const bool full = reference->scan.state.volume.kind == SUPINE_VOLUME_FULL;
@@ -130,7 +130,7 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* Add the constant of the expected error, and whether volumes at rest were given. */
+/* Add the constant of the expected error, and whether volumes at rest differ from the default. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
@@ -168,7 +168,7 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
 }
 
-/* Convert doubles to floats. The caller frees them. Return NULL if out of memory. */
+/* Convert doubles to an array of floats, which the caller frees. Return NULL if out of memory. */
 static float *to_float(const double *values, size_t count) {
   float *out = malloc(count * sizeof *out);
   for (size_t i = 0; out != NULL && i < count; ++i) {
@@ -177,7 +177,7 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Compute the modes of the normals from the vertices and directions as written to the file. */
+/* Compute the modes of the normals from the single-precision numbers that the file will hold. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {
@@ -207,7 +207,7 @@ static void add_normals(entries *list, const supine_normals_modes *normals, bool
   }
 }
 
-/* All metadata and tensors, in the order of the file, need more than 60 lines of code. */
+/* This function has more than 60 lines: it lists all metadata and tensors in the file's order. */
 supine_status supine_writer_basis_write(const char *path, const supine_basis_content *content,
                                         supine_error *error) {
   const supine_lungs *lungs = content->lungs;
@@ -225,16 +225,16 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
   const double *share = model != NULL ? model->share : healthy;
   float *vertices = NULL;
   float *directions = NULL;
-  double *rest = malloc(3 * n * sizeof *rest);
+  double *collapsed = malloc(3 * n * sizeof *collapsed);
   unsigned char *lung = malloc(n);
-  if (rest != NULL) { /* positions of collapsed lungs, then their directions */
-    supine_tissue_collapse(lungs, share, rest);
-    vertices = to_float(rest, 3 * n);
+  if (collapsed != NULL) {
+    supine_tissue_collapse(lungs, share, collapsed);
+    vertices = to_float(collapsed, 3 * n);
   }
-  if (rest != NULL && !vector) {
-    memcpy(rest, content->directions, 3 * n * sizeof *rest);
-    supine_tissue_collapse_directions(lungs, share, rest);
-    directions = to_float(rest, 3 * n);
+  if (collapsed != NULL && !vector) {
+    memcpy(collapsed, content->directions, 3 * n * sizeof *collapsed);
+    supine_tissue_collapse_directions(lungs, share, collapsed);
+    directions = to_float(collapsed, 3 * n);
   }
   if (vertices == NULL || (directions == NULL && !vector) || lung == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "%s: no memory to write %zu vertices",
@@ -333,7 +333,7 @@ supine_status supine_writer_basis_write(const char *path, const supine_basis_con
 cleanup:
   entries_free(&list);
   supine_normals_modes_free(&normals);
-  free(rest);
+  free(collapsed);
   free(vertices);
   free(directions);
   free(lung);

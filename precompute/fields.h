@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Fit harmonics to another simulator's fields, the displacements of one surface for several
- * directions of gravity, and compress them. With u(g_j) the field for direction j and Y the
- * harmonics, the coefficients C minimise
+ * Fit harmonics to another simulator's fields, and compress the fit. A field u(g_j) holds the
+ * displacements of one surface for the direction of gravity g_j. With the harmonics Y, the
+ * coefficients C minimise
  *
  *     sum over j of |u(g_j) - C Y(g_j)|^2
  *
- * By default, a higher band that the directions determine is chosen if it reduces the leave-one-out
- * error by more than 1 %. */
+ * By default, bands are tried in rising order. A higher band is chosen if it reduces the
+ * leave-one-out error by more than 1 %. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
@@ -29,8 +29,8 @@ typedef struct supine_fields {
  * @param options  axes and unit of the displacements
  * @param fields   release with supine_fields_free
  * @retval SUPINE_ERROR_READ    the file is missing
- * @retval SUPINE_ERROR_FORMAT  malformed; a direction that is zero or not finite, or a displacement
- * that is not finite
+ * @retval SUPINE_ERROR_FORMAT  malformed; a direction that is zero, repeated or not finite, or a
+ * displacement that is not finite
  * @retval SUPINE_ERROR_MESH    the number of vertices differs from that of the lungs
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
@@ -40,23 +40,19 @@ void supine_fields_free(supine_fields *fields);
 
 enum { SUPINE_FIT_BAND_MAX = 11 };
 
-/** Result of fitting fields. */
 typedef struct supine_fit_report {
-  size_t band_highest; /**< highest band that the directions determine */
-  size_t band;         /**< chosen band */
-  double condition;    /**< condition number of the band's harmonics at the directions */
-  size_t mode_count;   /**< number of modes of the basis; supine_precompute_fields sets it */
-  double error[SUPINE_FIT_BAND_MAX + 1]; /**< leave-one-out error of each band up to band_highest,
-                                          * relative RMS */
-  supine_accuracy accuracy; /**< leave-one-out error of the basis, at the given displacements;
-                             * `volume` is 0 */
+  size_t band_highest;                   /**< highest band that the directions determine */
+  size_t band;                           /**< band of the fit */
+  double condition;                      /**< condition number of the matrix Y(g_j) of this band */
+  size_t mode_count;                     /**< set only by supine_precompute_fields */
+  double error[SUPINE_FIT_BAND_MAX + 1]; /**< leave-one-out error of each band, relative RMS */
+  supine_accuracy accuracy;              /**< leave-one-out error; its `volume` is 0 */
 } supine_fit_report;
 
-/** Options of fitting fields. */
 typedef struct supine_fit_options {
-  int band;             /**< degree of the harmonics; negative: chosen by the leave-one-out error */
-  size_t modes;         /**< largest number of modes; 0: the harmonics themselves */
-  const char *findings; /**< notes on the surface for the metadata, one a line, or NULL */
+  int band;             /**< highest degree of the harmonics, or negative to choose it by error */
+  size_t modes;         /**< largest number of modes, or 0 to keep the harmonics */
+  const char *findings; /**< notes on the surface for the metadata, one per line, or NULL */
   const char *made_by;  /**< command line for the metadata, or NULL */
 } supine_fit_options;
 

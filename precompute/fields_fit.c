@@ -12,35 +12,37 @@
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
-/* Directions determine a band if the condition number of its harmonics, and the leverage of every
- * direction, are at most these. At a leverage of 1, a direction alone determines a coefficient. */
+/* The directions determine a band if neither the condition number of its harmonics nor the leverage
+ * of a direction exceeds its limit. With leverage 1, one direction alone determines a
+ * coefficient. */
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
-/* A higher band is chosen only if its error is below `worthwhile` times the error of the
- * band chosen before, and if that error exceeds `exact`, the rounding error of single precision. */
+/* A higher band is chosen only if its error is below `worthwhile` times the error of the band
+ * chosen before. If that error is at most `exact`, it is rounding error, and the band is kept. */
 static const double worthwhile = 0.99;
 static const double exact = 1e-6; /* relative RMS */
 
-/* A least-squares fit of a band to fields F: coefficients A F with A = V S^-1 U', harmonics Y = U S
- * V'. */
+/* A least-squares fit of P harmonics to the fields of M directions. With the harmonics Y = U S V^T
+ * at the directions, the coefficients are A times the fields, where A = V S^-1 U^T. */
 typedef struct fit {
-  size_t count, terms;
-  double *y;        /* [M, P] harmonics at the directions */
-  double *analysis; /* [P, M] A */
-  double condition; /* condition number of Y */
+  size_t count; /* M */
+  size_t terms; /* P */
+  double *y;    /* [M, P] */
+  double *a;    /* [P, M] */
+  double condition;
 } fit;
 
-/* Work space to predict one direction from the others. */
+/* Work space of predict(). */
 typedef struct prediction {
-  double *analysis; /* [P, M] A without the direction */
-  double *part;     /* [P, M] work space */
+  double *a;        /* [P, M] matrix A of the fit without one direction */
+  double *part;     /* [P, M] */
   double *gram;     /* [P, P] scalar products of the coefficients, mm^2 */
-  double *values;   /* [P] eigenvalues */
-  double *vectors;  /* [P, P] eigenvectors */
-  double *target;   /* [P] harmonics at the direction, projected onto the modes */
-  double *residual; /* [M] residual as a linear combination of the fields */
-  double *product;  /* [M] work space */
+  double *values;   /* [P] eigenvalues of `gram` */
+  double *vectors;  /* [P, P] eigenvectors of `gram` */
+  double *target;   /* [P] harmonics at the predicted direction, projected onto the modes */
+  double *residual; /* [M] weights with which the fields sum to the residual */
+  double *product;  /* [M] */
 } prediction;
 
 typedef struct fitting {
@@ -53,7 +55,7 @@ typedef struct fitting {
 
 static void fit_free(fit *f) {
   free(f->y);
-  free(f->analysis);
+  free(f->a);
   *f = (fit){0};
 }
 
@@ -68,13 +70,13 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
   const int p = (int)terms;
   *f = (fit){.count = count, .terms = terms};
   f->y = calloc(count * terms, sizeof *f->y);
-  f->analysis = malloc(terms * count * sizeof *f->analysis);
+  f->a = malloc(terms * count * sizeof *f->a);
   double *a = malloc(count * terms * sizeof *a);
   double *u = malloc(count * terms * sizeof *u);
   double *vt = malloc(terms * terms * sizeof *vt);
   double *s = calloc(terms, sizeof *s);
   supine_status status = SUPINE_ERROR_MEMORY;
-  if (f->y != NULL && f->analysis != NULL && a != NULL && u != NULL && vt != NULL && s != NULL) {
+  if (f->y != NULL && f->a != NULL && a != NULL && u != NULL && vt != NULL && s != NULL) {
     status = supine_sh_evaluate_many(band, count, directions, f->y);
   }
   if (status == SUPINE_OK) {
@@ -87,8 +89,7 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
     for (size_t t = 0; t < terms; ++t) {
       cblas_dscal(p, 1.0 / s[t], vt + t * terms, 1);
     }
-    cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, p, m, p, 1.0, vt, p, u, p, 0.0, f->analysis,
-                m);
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasTrans, p, m, p, 1.0, vt, p, u, p, 0.0, f->a, m);
   } else {
     fit_free(f);
   }
@@ -100,7 +101,7 @@ static supine_status fit_create(size_t band, size_t count, const double *directi
 }
 
 static double leverage(const fit *f, size_t d) {
-  return cblas_ddot((int)f->terms, f->y + d * f->terms, 1, f->analysis + d, (int)f->count);
+  return cblas_ddot((int)f->terms, f->y + d * f->terms, 1, f->a + d, (int)f->count);
 }
 
 static bool fit_is_determined(const fit *f) {
@@ -111,14 +112,15 @@ static bool fit_is_determined(const fit *f) {
   return determined;
 }
 
-/* Allocate the Gram matrix and the work space together; every band has fewer terms than M. */
+/* Allocate all arrays in one block. Matrices have room for M x M numbers, as P < M in every
+ * band. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
   double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
   if (next == NULL) {
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu fields", m);
   }
-  double **const squares[] = {&w->work.analysis, &w->work.part, &w->work.gram, &w->work.vectors};
+  double **const squares[] = {&w->work.a, &w->work.part, &w->work.gram, &w->work.vectors};
   double **const lists[] = {&w->work.values, &w->work.target, &w->work.residual, &w->work.product};
   for (size_t i = 0; i < 4; ++i) {
     *squares[i] = next += m * m;
@@ -130,11 +132,12 @@ static supine_status allocate(fitting *w, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Predict the field of direction d from the others, by the harmonics (modes 0) or by the leading
- * modes of their coefficients. Write the residual, as a linear combination of the fields, to
- * work.residual, and its square, mm^2. With h row d of Y A, the fit without direction d is
+/* Predict the field of direction d from all other fields, and find the residual's square, mm^2. The
+ * residual is the sum of all fields, weighted by work.residual. If `modes` is 0, the prediction
+ * uses the harmonics, otherwise the leading modes of their coefficients. The fit without direction
+ * d is A_d, where e_d is the unit vector d, and h is row d of Y A:
  *
- *     A_d = A - a (e_d - h)',    a = A e_d / (1 - h_d) */
+ *     A_d = A - A e_d (e_d - h)^T / (1 - h_d) */
 static supine_status predict(const fitting *w, const fit *f, size_t d, size_t modes,
                              double *square) {
   const prediction *o = &w->work;
@@ -142,17 +145,16 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
   const int p = (int)f->terms;
   const double *y = f->y + d * f->terms;
   supine_status status = SUPINE_OK;
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->analysis, m, y, 1, 0.0, o->residual, 1);
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, f->a, m, y, 1, 0.0, o->residual, 1);
   o->residual[d] += 1.0;
-  memcpy(o->analysis, f->analysis, f->terms * f->count * sizeof *o->analysis);
-  cblas_dger(CblasRowMajor, p, m, -1.0 / o->residual[d], f->analysis + d, m, o->residual, 1,
-             o->analysis, m);
+  memcpy(o->a, f->a, f->terms * f->count * sizeof *o->a);
+  cblas_dger(CblasRowMajor, p, m, -1.0 / o->residual[d], f->a + d, m, o->residual, 1, o->a, m);
   memcpy(o->target, y, f->terms * sizeof *o->target);
   if (modes > 0) {
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->analysis, m, w->gram, m,
-                0.0, o->part, m);
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->part, m, o->analysis, m,
-                0.0, o->gram, p);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, p, m, m, 1.0, o->a, m, w->gram, m, 0.0,
+                o->part, m);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, p, p, m, 1.0, o->part, m, o->a, m, 0.0,
+                o->gram, p);
     status = supine_projection_leading_eigenpairs(f->terms, o->gram, modes, o->values, o->vectors);
     memset(o->target, 0, f->terms * sizeof *o->target);
     for (size_t k = 0; k < modes && status == SUPINE_OK; ++k) {
@@ -160,8 +162,7 @@ static supine_status predict(const fitting *w, const fit *f, size_t d, size_t mo
       cblas_daxpy(p, cblas_ddot(p, mode, 1, y, 1), mode, 1, o->target, 1);
     }
   }
-  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->analysis, m, o->target, 1, 0.0, o->residual,
-              1);
+  cblas_dgemv(CblasRowMajor, CblasTrans, p, m, -1.0, o->a, m, o->target, 1, 0.0, o->residual, 1);
   o->residual[d] += 1.0;
   cblas_dsymv(CblasRowMajor, CblasUpper, m, 1.0, w->gram, m, o->residual, 1, 0.0, o->product, 1);
   *square = fmax(cblas_ddot(m, o->product, 1, o->residual, 1), 0.0);
@@ -188,13 +189,13 @@ static double leave_one_out(const fitting *w, const fit *f) {
   return sqrt(sum / square_sum(w));
 }
 
-/* Fit the bands that the directions determine. Choose band `wanted`, or if that is negative, the
- * highest band that is worthwhile. */
+/* Fit the bands that the directions determine. Choose band `wanted` or, if `wanted` is negative, a
+ * band with a small leave-one-out error. */
 static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
                                  supine_error *error) {
   const size_t m = w->fields->direction_count;
   double least = INFINITY;
-  size_t determined = 0; /* number of bands that the directions determine */
+  size_t determined_count = 0;
   for (size_t band = 0; band <= SUPINE_FIT_BAND_MAX && supine_sh_count(band) < m; ++band) {
     fit trial;
     const supine_status status = fit_create(band, m, w->fields->directions, &trial);
@@ -207,7 +208,7 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
       break;
     }
     report->error[band] = leave_one_out(w, &trial);
-    determined = band + 1;
+    determined_count = band + 1;
     if (wanted < 0 ? report->error[band] < worthwhile * least && least > exact
                    : (size_t)wanted == band) {
       least = report->error[band];
@@ -222,15 +223,15 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%zu directions do not determine band %d (%d harmonics), only bands up "
                             "to %d: give more directions, or leave --band out",
-                            m, wanted, (wanted + 1) * (wanted + 1), (int)determined - 1);
+                            m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   }
-  report->band_highest = determined - 1;
+  report->band_highest = determined_count - 1;
   report->condition = w->chosen.condition;
   return SUPINE_OK;
 }
 
 /* Make a projection whose columns [rows, M] are the fields, and whose functions [M, P] are the
- * transposed analysis of the chosen band. */
+ * transpose of the chosen fit's A. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;
@@ -246,13 +247,12 @@ static supine_status project(const fitting *w, size_t band, supine_projection *m
       made->columns[i * m + d] = w->fields->displacement[d * w->rows + i];
     }
     for (size_t t = 0; t < terms; ++t) {
-      made->functions[d * terms + t] = w->chosen.analysis[t * m + d];
+      made->functions[d * terms + t] = w->chosen.a[t * m + d];
     }
   }
   return SUPINE_OK;
 }
 
-/* Measure the leave-one-out error of the basis. */
 static supine_status cross_validate(const fitting *w, size_t modes, supine_accuracy *accuracy,
                                     supine_error *error) {
   const size_t m = w->fields->direction_count;
@@ -298,16 +298,17 @@ supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_op
   supine_fit_report found = {0};
   if (m < 2) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "too few directions of gravity (%d): give fields of at least two", m);
+                            "too few directions of gravity (%d): give fields for at least two", m);
   }
   supine_status status = allocate(&w, error);
   if (status == SUPINE_OK) {
     cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, m, m, rows, 1.0, fields->displacement,
                 rows, fields->displacement, rows, 0.0, w.gram, m);
-    status = square_sum(&w) > 0.0
-                 ? choose_band(&w, options->band, &found, error)
-                 : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                                    "all displacements are zero: give deformed surfaces");
+    status =
+        square_sum(&w) > 0.0
+            ? choose_band(&w, options->band, &found, error)
+            : supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                               "all displacements are zero: give fields that move the surface");
   }
   if (status == SUPINE_OK) {
     status = project(&w, found.band, &projection, error);

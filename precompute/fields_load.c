@@ -8,13 +8,15 @@
 #include "precompute/fields.h"
 #include "sh/base/vec3.h"
 
+/* Largest distance between unit vectors that count as the same direction. */
+static const double same_direction = 1e-6;
+
 void supine_fields_free(supine_fields *fields) {
   free(fields->directions);
   free(fields->displacement);
   *fields = (supine_fields){0};
 }
 
-/* Allocate fields of `count` directions. */
 static supine_status allocate(size_t count, supine_fields *fields, supine_error *error) {
   fields->directions = malloc((3 * count + 1) * sizeof *fields->directions);
   fields->displacement =
@@ -27,9 +29,10 @@ static supine_status allocate(size_t count, supine_fields *fields, supine_error 
                                 fields->vertex_count);
 }
 
-/* Normalise direction `at`, or fail if it is zero or not finite. */
-static supine_status normalise(const supine_fields *fields, size_t at, const char *path,
-                               supine_error *error) {
+/* Normalise direction `at`. Refuse a repeated direction: when held out, it would be predicted from
+ * its duplicate, and the leave-one-out error would be too small. */
+static supine_status check_direction(const supine_fields *fields, size_t at, const char *path,
+                                     supine_error *error) {
   double *g = fields->directions + 3 * at;
   const double length = supine_length(g);
   if (!(length > 0.0) || !isfinite(length)) {
@@ -41,10 +44,17 @@ static supine_status normalise(const supine_fields *fields, size_t at, const cha
   for (size_t k = 0; k < 3; ++k) {
     g[k] /= length;
   }
+  for (size_t earlier = 0; earlier < at; ++earlier) {
+    if (supine_distance(g, fields->directions + 3 * earlier) < same_direction) {
+      return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: rows %zu and %zu have the same direction of gravity: keep one "
+                              "of them",
+                              path, earlier, at);
+    }
+  }
   return SUPINE_OK;
 }
 
-/* Read an element of an F32 or F64 tensor. */
 static double element(const supine_tensor *tensor, size_t at) {
   return tensor->dtype == SUPINE_F64 ? ((const double *)tensor->data)[at]
                                      : (double)((const float *)tensor->data)[at];
@@ -70,8 +80,8 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
   if (displacement->shape[1] != n) {
     return supine_error_set(
         error, SUPINE_ERROR_MESH,
-        "%s: displacement of %zu vertices, where the reference surface has %zu: "
-        "give one for each vertex",
+        "%s: displacements of %zu vertices, but the reference surface has %zu: give one for each "
+        "vertex",
         path, displacement->shape[1], n);
   }
   const size_t count = gravity->shape[0];
@@ -83,7 +93,7 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
     for (size_t k = 0; k < 3; ++k) {
       fields->directions[3 * d + k] = element(gravity, 3 * d + k);
     }
-    status = normalise(fields, d, path, error);
+    status = check_direction(fields, d, path, error);
     for (size_t i = 0; i < n && status == SUPINE_OK; ++i) {
       double *u = fields->displacement + 3 * (n * d + i);
       for (size_t k = 0; k < 3; ++k) {

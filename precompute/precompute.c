@@ -12,15 +12,16 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/projection.h"
 
-/* The default number of held-out directions is HELD_OUT_WORK over the number of vertices, within
- * these bounds. 100 directions give the error to about 5 %, 1000 to 1 or 2 %. */
+/* The default number of held-out directions is HELD_OUT_WORK over the number of vertices, but at
+ * least HELD_OUT_MIN and at most HELD_OUT_MAX. With 100 directions, the measured error is accurate
+ * to about 5 %, with 1000 to 1 or 2 %. */
 enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 
-/* Volume beyond the reference at which errors in mm are measured if rest is unknown, mL. */
+/* If rest is unknown, errors in mm are measured at this volume beyond the reference surface, mL. */
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
-/* Modes are dropped while the error stays below this multiple of the error with all modes. */
+/* Modes are dropped as long as the error stays below this multiple of the error with all modes. */
 static const double same_error = 1.01;
 
 /* Input and results of the steps of supine_precompute. */
@@ -30,9 +31,9 @@ typedef struct pipeline {
   const supine_precompute_options *options;
   supine_lungs anchored; /* `given` with vertices moved by anchor(), or empty */
   supine_reference reference;
-  double *directions; /* [N, 3] d, mm */
-  double *weight; /* [N] |d|^2, so that modes minimise the error of displacement: a left lung had
-                     0.34 % RMS with 16 modes, and 0.40 % without weights */
+  double *directions; /* [N, 3] mm */
+  double *weight; /* [N] squared length of each direction, so that the modes minimise the error of
+                     displacement: 0.34 % RMS for a left lung, without weights 0.40 % */
   supine_projection projection;
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];
@@ -41,7 +42,7 @@ typedef struct pipeline {
   supine_truth truth;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[2][9]; /* harmonics of the volume of each lung at rest, mL beyond the reference */
+  double resting[2][9]; /* harmonics of each lung's volume at rest, mL beyond the reference */
   /* Harmonics of the volume at which errors in mm are measured, mL beyond the reference. */
   double volume[9];
   supine_error_table table;
@@ -85,10 +86,12 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 &p->compression, p->singular, &p->energy, error);
 }
 
-/* Move the surface p at full inflation so that the compressed field F' takes it exactly to the
- * scan. This cancels the error of F' at the scan's gravity and the residual of the fixed point.
+/* Correct the surface p at full inflation, so that the compressed field F takes it exactly to the
+ * scan. For the scan's gravity, this cancels the error of compression:
  *
- *     p_j = scan_j - A_j F' d_j       with gains A that keep the volumes */
+ *     p_j = scan_j - A_j F d_j
+ *
+ * d are the directions. The gains A keep the volumes. */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -127,7 +130,7 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
 }
 
 /* Check that the field takes each lung to its volume at rest with gravity along the unit vector g.
- * @param volume  [lungs] mL beyond the reference */
+ * @param volume  [lungs] volume at rest, mL beyond the reference surface */
 static supine_status check_rest(const supine_compression *compression,
                                 const supine_volume_forms *forms, const double g[3],
                                 const double *volume, supine_error *error) {
@@ -152,7 +155,7 @@ static supine_status check_rest(const supine_compression *compression,
 
 /* Find the volume of each lung at rest, mL beyond the reference surface, as real harmonics of bands
  * 0 to 2 that interpolate the volumes along the axes.
- * @param share  each lung's share of its healthy volume
+ * @param share  volume of each lung divided by its healthy volume
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before a lung has its volume at rest */
 static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
                                     const supine_compression *compression,
@@ -210,7 +213,7 @@ static supine_status measure(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Find from the singular values the smallest number of modes with nearly the same error. */
+/* Find the smallest number of modes with an error below `same_error` times the present error. */
 static size_t modes_needed(const pipeline *p) {
   const size_t most = p->compression.mode_count;
   const double limit = pow(same_error, 2.0) - 1.0;
@@ -289,7 +292,6 @@ supine_status supine_precompute(const supine_lungs *lungs, const supine_precompu
   }
   if (status == SUPINE_OK && report != NULL) {
     *report = (supine_precompute_report){.mode_count = p.compression.mode_count,
-                                         .solve_count = p.projection.rank,
                                          .accuracy = p.accuracy,
                                          .turned_over = p.turned_over};
   }

@@ -10,30 +10,27 @@
 #include "precompute/projection/accuracy.h"
 #include "precompute/projection/projection.h"
 
-/** Options of a basis. */
 typedef struct supine_precompute_options {
   supine_model model;
-  const supine_reference *reference; /**< volumes of the lungs; NULL: rest and full are unknown */
+  const supine_reference *reference; /**< NULL if the volume at rest is unknown */
   size_t band;                       /**< highest degree of the harmonics */
-  size_t modes;          /**< largest number of modes; 0: keep the (band + 1)^2 harmonics */
-  size_t held_out;       /**< number of directions to measure the error at; 0: 100 to 1000 */
-  double expected_error; /**< c of supine/locate.h, mm, at most the default; 0: the default */
+  size_t modes;                      /**< largest number of modes, or 0 to keep the harmonics */
+  size_t held_out;                   /**< number of held-out directions, or 0 for the default */
+  double expected_error; /**< c of supine/locate.h, mm, at most the default; 0 is the default */
   supine_scan_frame frame;
-  /** @{ Metadata of the file, or NULL. */
+  /** @{ Metadata of the file. Each may be NULL. */
   const char *made_by;         /**< command line */
-  const char *patient;         /**< patient's law, as JSON */
-  const char *patient_summary; /**< with `patient`: its name and held-out error */
+  const char *patient;         /**< patient's law as JSON */
+  const char *patient_summary; /**< name and held-out error of the patient's law */
   const char *assumed;         /**< assumptions about the scan */
-  const char *findings;        /**< notes and warnings, one a line */
+  const char *findings;        /**< notes and warnings, one per line */
   /** @} */
 } supine_precompute_options;
 
-/** Result of making a basis. */
 typedef struct supine_precompute_report {
   size_t mode_count;
-  size_t solve_count; /**< number of directions solved for */
   supine_accuracy accuracy;
-  double turned_over; /**< share of triangles (supine_accuracy_turned_over) */
+  double turned_over; /**< share of triangles that turn over (supine_accuracy_turned_over) */
 } supine_precompute_report;
 
 /** Make a basis of a model of lungs, measure its error, and write the file, whole or not at all.

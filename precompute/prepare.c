@@ -18,7 +18,7 @@ supine_model_choice supine_precompute_choice_default(void) {
   return choice;
 }
 
-/* Select the law and its constants; constants that the user gives override them. */
+/* Select the law. Constants that the user gives override those of the law. */
 static supine_model choose_law(const supine_model_choice *choice) {
   const bool none = choice->has_scan && !choice->scan.known;
   const supine_model law = supine_physics_model(choice->law != SUPINE_LAW_COUNT
@@ -59,7 +59,7 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
                      choice->expandability_law.shape != SUPINE_EXPANDABILITY_UNIFORM;
   if (choice->stiffness != NULL && given) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the patient's law brings its own stiffness: leave --expandability "
+                            "the patient's law has its own stiffness: leave --expandability "
                             "out");
   }
   if (choice->stiffness == NULL && !given) {
@@ -82,7 +82,7 @@ static supine_status set_expandability(const supine_lungs *lungs, const supine_m
   return status;
 }
 
-/* Warn of a lesion that reaches no vertex and so changes no stiffness. */
+/* Warn of a lesion that contains no vertex and therefore changes no stiffness. */
 static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                            supine_findings *findings) {
   const double *c = lesion->centre;
@@ -140,7 +140,7 @@ static supine_status set_shares(const supine_lungs *lungs, const supine_model_ch
   return status;
 }
 
-/* Summarise the assumptions, so that the user can check them. */
+/* Describe the assumptions, so that the user can check them. */
 static void summarize(const supine_model_choice *choice, supine_prepared *p) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   const supine_resting usual = supine_reference_resting_default();

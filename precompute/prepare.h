@@ -14,36 +14,35 @@ enum { SUPINE_LESIONS_MAX = 64 };
 
 /** The user's choices for the model and the scan. */
 typedef struct supine_model_choice {
-  int law; /**< a supine_law; SUPINE_LAW_COUNT: `paper` with --scanned none, else `deep` */
-  supine_model model;      /**< constants; NAN: as in the law */
-  const char *patient_law; /**< name of a patient's law, which `model` contains; NULL: none */
+  int law; /**< a supine_law; if SUPINE_LAW_COUNT, `paper` with --scanned none, otherwise `deep` */
+  supine_model model;      /**< a constant that is NAN is taken from the law */
+  const char *patient_law; /**< name of the patient's law in `model`, or NULL if there is none */
   const double *stiffness; /**< [N] stiffness E of the patient's law, or NULL */
-  bool has_scan; /**< `scan` was given; false: it is full or, with the paper's law, none */
+  bool has_scan; /**< whether the user gave `scan`; otherwise, the deep law assumes full */
   supine_scan scan;
   supine_resting resting;
   supine_person person;
-  const char *expandability; /**< path of a CSV file; NULL: `expandability_law` */
+  const char *expandability; /**< path of a CSV file, or NULL to use `expandability_law` */
   supine_expandability_law expandability_law;
   size_t lesion_count;
   supine_lesion lesions[SUPINE_LESIONS_MAX];
-  double share[2]; /**< volume of a collapsed left or right lung over its healthy volume; 0:
-                      the lung is healthy */
+  double share[2]; /**< volume of the collapsed left or right lung divided by its healthy
+                      volume; 0 if the lung is healthy */
 } supine_model_choice;
 
-/** Return the default choices. */
 supine_model_choice supine_precompute_choice_default(void);
 
 /** A model, the volumes of its lungs, and the assumptions about both. */
 typedef struct supine_prepared {
-  supine_model model; /**< refers to the arrays below */
+  supine_model model; /**< points to `stiffness` and `lesions` */
   supine_reference reference;
-  char summary[512]; /**< assumptions in words: law, scan, volumes */
+  char summary[512]; /**< the assumed law, scan and volumes in words */
   double *stiffness; /**< [N] stiffness E, or NULL */
   double *lesions;   /**< [N] factors on the stiffness, or NULL */
 } supine_prepared;
 
 /** Select the law, set stiffness and lesions, and move the lungs to the reference.
- * @param lungs     as scanned; moved to the reference
+ * @param lungs     in: the scan; out: the reference surface
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
  * @param findings  warnings are added
  * @retval SUPINE_ERROR_ARGUMENT  the paper's law with a scan state, or a share of a missing lung

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -128,7 +127,7 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
                                 folder);
 }
 
-/* Load label maps. The default midline of a single lung is the face of its box towards the other
+/* Load label maps. The default midline of a single lung is its box's face towards the other
  * lung. */
 static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
                                supine_error *error) {
@@ -167,7 +166,7 @@ static supine_status load_maps(reading *r, supine_source *source, supine_finding
   return SUPINE_OK;
 }
 
-/* Return the axes and unit of the files; zeros if their axes differ. */
+/* Return the axes and unit of the files, or zeros if the axes differ between files. */
 static supine_scan_frame frame_of(const reading *r) {
   for (size_t i = 1; i < r->count; ++i) {
     if (r->reports[i].axes != r->reports[0].axes) {
@@ -178,7 +177,7 @@ static supine_scan_frame frame_of(const reading *r) {
   return (supine_scan_frame){r->reports[0].axes, unit == 0.0 ? 1.0 : unit};
 }
 
-/* Summarise how the files were read, so that the user can check it. */
+/* Describe how the files were read, so that the user can check it. */
 static void summarize(const reading *r, supine_source *source) {
   const supine_mesh_load_options *load = &r->options->load;
   const supine_mesh_report *report = &r->reports[0];
@@ -218,7 +217,7 @@ static supine_status check_kinds(const supine_source_options *options, char **pa
   *is_map = images == count;
   if (images > 0 && images < count) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "label maps and surfaces: give only one kind");
+                            "label maps and surfaces were given together: give only one kind");
   }
   if (images == 0 && (labels->labels != NULL || labels->edge > 0.0 || labels->close > 0.0 ||
                       options->surfaces_out != NULL)) {

@@ -10,21 +10,19 @@
 #include "precompute/lungs/lungs.h"
 #include "precompute/physics/reference.h"
 
-/** Options of loading. */
 typedef struct supine_source_options {
   supine_mesh_load_options load;
   supine_labels_options labels; /**< options of label maps; the axes are those of `load` */
   const char *surfaces_out;     /**< path to save the surfaces of a label map to, or NULL */
-  bool has_midline;             /**< `midline` was given */
-  double midline;               /**< x of the plane between the lungs, mm */
+  bool has_midline;
+  double midline; /**< x of the plane between the lungs, mm */
 } supine_source_options;
 
-/** Result of loading. */
 typedef struct supine_source {
   supine_lungs lungs;
   supine_scan_frame frame;
-  bool is_map;    /**< the files are label maps, and `report` is set */
-  bool axes_hold; /**< the shape of the lungs agrees with the axes */
+  bool is_map;    /**< whether the files are label maps; if so, `report` is set */
+  bool axes_hold; /**< whether the lungs' shape agrees with the axes */
   supine_labels_report report;
   char summary[256]; /**< axes, unit and boxes of the lungs, in words */
 } supine_source;

@@ -365,7 +365,7 @@ TEST(test_fields_load_bad_tensors_refused) {
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "row 1: the displacement of vertex 1");
   tensors[1].shape[1] = n / 2;
   assert_int_equal(supine_writer_safetensors_write(path, tensors, 2, NULL, 0, NULL), SUPINE_OK);
-  expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "where the reference surface has");
+  expect_failure("fields.safetensors", SUPINE_ERROR_MESH, "but the reference surface has");
   assert_int_equal(supine_writer_safetensors_write(path, tensors, 1, NULL, 0, NULL), SUPINE_OK);
   expect_failure("fields.safetensors", SUPINE_ERROR_FORMAT, "displacement [M,N,3]");
   expect_failure("nothing.safetensors", SUPINE_ERROR_READ, "nothing.safetensors");
@@ -373,7 +373,8 @@ TEST(test_fields_load_bad_tensors_refused) {
   static const struct {
     double gravity[3];
     const char *words;
-  } bad[] = {{{0, 0, 0}, "row 1: gravity 0,0,0 has no direction"},
+  } bad[] = {{{0, 3, 0}, "rows 0 and 1 have the same direction of gravity: keep one"},
+             {{0, 0, 0}, "row 1: gravity 0,0,0 has no direction"},
              {{0, NAN, 0}, "has no direction"}};
   tensors[1].shape[1] = n;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {

@@ -14,36 +14,37 @@
 #include "sh/base/lapack.h"
 #include "sh/base/parallel.h"
 
-/* ROWS: largest number of vertices of a lung from which modes are found, or at which they are
- * measured. STATES, HELD_OUT: number of states from which modes are found, and at which they are
- * measured; with twice as many of each, the errors change in the second digit. STEP: number of
- * modes that are added at a time. */
-enum { ROWS = 4096, STATES = 192, HELD_OUT = 256, STEP = 3 };
+enum {
+  ROWS = 4096,    /* modes are found from at most this many vertices of a lung */
+  STATES = 192,   /* modes are found from this many states */
+  HELD_OUT = 256, /* errors are measured in this many other states */
+  STEP = 3        /* number of modes that are added at a time */
+};
 
-/* Modes are weighted sums of the normals in at most SNAPSHOTS states. LANES states are computed at
- * a time; the first lane of all is the reference surface, which is not a snapshot. */
+/* Modes are weighted sums of the normals in at most SNAPSHOTS states. LANES states are computed
+ * together. Lane 0 of the first batch is the reference surface, which is not a snapshot. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
-/* Largest mean and 99.9th percentile of the angle, degrees, between the normals of the modes and
- * the exact normals. They are a fifth below the goals of 0.1 and 1, because the errors at other
- * vertices and states differ slightly from those measured. */
+/* Largest accepted mean and 99.9th percentile of the angle, degrees, between exact normals and
+ * their approximation. These limits are a fifth below the goals of 0.1 and 1, because the errors at
+ * other vertices and states are slightly different. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
-static const double degrees = 57.29577951308232; /* degrees per radian */
+static const double degrees_per_radian = 57.29577951308232;
 
-/* Smallest squared residual, relative to a state's squared normals, at which the state becomes
- * another snapshot. */
+/* A state can become a snapshot if more than this share of its squared normals is still
+ * unexplained. */
 static const double least_new = 1e-7;
 
-/* One lung's modes before they are rounded; A, n and V as in normal_modes.h. */
+/* The modes of one lung before they are rounded. normal_modes.h defines N, n and V. */
 typedef struct fit {
-  size_t count;                     /* number of modes, at most MOST */
-  size_t snapshots;                 /* number of snapshots, R */
-  size_t state[SNAPSHOTS];          /* [R] indices of the snapshots' states */
+  size_t count;                     /* at most MOST */
+  size_t snapshot_count;            /* R */
+  size_t state[SNAPSHOTS];          /* [R] state of each snapshot */
   float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share[1 + r][j] N(state_r) */
-  double *weights;                  /* [MOST, 3, terms] weights V */
+  double *weights;                  /* [MOST, 3, terms] V */
   supine_normals_rows rows;         /* polynomials of held-out vertices */
-  float *modes;                     /* [rows, 3, MOST] modes n of the held-out vertices */
+  float *modes;                     /* [rows, 3, MOST] modes of the held-out vertices */
 } fit;
 
 typedef struct normals_work {
@@ -55,8 +56,8 @@ typedef struct normals_work {
   fit fits[SUPINE_LUNGS_MAX];
 } normals_work;
 
-/* Compute out [count, 3, n] = in_c [count, 3, terms] times the transpose of matrix_c [n, 3, terms],
- * for each component c. */
+/* Compute out_c = in_c matrix_c^T for each component c, with in [count, 3, terms], matrix [n, 3,
+ * terms] and out [count, 3, n]. */
 static void apply_rows(const double *in, size_t count, size_t terms, const double *matrix, size_t n,
                        double *out) {
   for (size_t c = 0; c < 3; ++c) {
@@ -66,8 +67,8 @@ static void apply_rows(const double *in, size_t count, size_t terms, const doubl
   }
 }
 
-/* Compute out [count, 3, terms] = in_c A_c^T A_c for each component c of rows A. gram [terms,
- * terms] is work space. */
+/* Compute out_c = in_c A_c^T A_c for each component c, with rows A, in [count, 3, terms] and out
+ * [count, 3, terms]. gram [terms, terms] is work space. */
 static void apply_gram(const supine_normals_rows *rows, size_t terms, const double *in,
                        size_t count, double *gram, double *out) {
   const int width = (int)terms;
@@ -80,22 +81,22 @@ static void apply_gram(const supine_normals_rows *rows, size_t terms, const doub
   }
 }
 
-/* Choose the snapshots by pivoted Cholesky factorisation, P ~ L L^T, of the scalar products P [S,
- * S] of normalised states, and find the `count` best modes of their span: n_j = sum over r of
- * coefficients_jr state_r. The products are overwritten. */
+/* Choose the snapshots by pivoted Cholesky factorisation, P ~ L L^T, of the products P [S, S] of
+ * normalised states, which are overwritten. Find the best modes n_j = sum over r of coefficients_jr
+ * snapshot_r. */
 static supine_status choose_snapshots(size_t s, double *product, fit *made,
                                       double coefficients[MOST * SNAPSHOTS]) {
   lapack_int pivots[STATES];
   lapack_int rank = 0;
-  double gram[SNAPSHOTS * SNAPSHOTS]; /* L^T L, then overwritten */
+  double gram[SNAPSHOTS * SNAPSHOTS]; /* L^T L */
   double values[SNAPSHOTS];
   const lapack_int info = LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product,
                                          (lapack_int)s, pivots, &rank, least_new);
-  if (info < 0) { /* positive if the rank is below S, which is no error */
+  if (info < 0) { /* a positive result says that the rank is below S, which is no error */
     return supine_lapack_status(info);
   }
   const size_t r = rank < SNAPSHOTS ? (size_t)rank : SNAPSHOTS;
-  made->snapshots = r;
+  made->snapshot_count = r;
   made->count = r < MOST ? r : MOST;
   for (size_t k = 0; k < r; ++k) {
     made->state[k] = (size_t)pivots[k] - 1;
@@ -110,8 +111,8 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   return status;
 }
 
-/* Find the best modes of the normals in the states: orthonormal over the rows, with equal weight
- * for every state. Write T into mix [MOST, 3, terms], where n_jc = T_jc . A_c. */
+/* Find the modes that approximate the normals of all states best, with equal weights. They are
+ * orthonormal over the rows. Write T with n_jc = T_jc . A_c to mix [MOST, 3, terms]. */
 static supine_status find_fit(const normals_work *work, size_t lung,
                               const supine_normals_rows *rows, double *mix, fit *made) {
   const size_t terms = work->terms;
@@ -142,9 +143,9 @@ static supine_status find_fit(const normals_work *work, size_t lung,
   }
   memset(mix, 0, MOST * all * sizeof *mix);
   for (size_t j = 0; j < made->count; ++j) {
-    for (size_t r = 0; r < made->snapshots; ++r) {
+    for (size_t r = 0; r < made->snapshot_count; ++r) {
       const size_t state = made->state[r];
-      const double share = coefficients[j * made->snapshots + r] / length[state];
+      const double share = coefficients[j * made->snapshot_count + r] / length[state];
       made->share[1 + r][j] = (float)share;
       cblas_daxpy((int)all, share, phi + state * all, 1, mix + j * all, 1);
     }
@@ -157,7 +158,7 @@ cleanup:
   return status;
 }
 
-/* Find one lung's modes, and its held-out vertices. */
+/* Find the modes of one lung, and evaluate them at held-out vertices. */
 static supine_status find_lung(const normals_work *work, size_t lung, fit *made) {
   const supine_normals_surface *s = work->surface;
   const size_t stride = 1 + (s->lung_begin[lung + 1] - s->lung_begin[lung]) / ROWS;
@@ -192,7 +193,7 @@ static supine_status find_lung(const normals_work *work, size_t lung, fit *made)
   return status;
 }
 
-/* Round a vertex's modes along one axis to 13, 10 and 9 bits, as an open basis stores them. */
+/* Round a vertex's modes along one axis as an open basis stores them, with 13, 10 and 9 bits. */
 static void pack(const int16_t *modes, size_t count, double *packed) {
   const size_t words = supine_tiles_normal_words(count);
   for (size_t j = 0; j < words; ++j) {
@@ -207,9 +208,9 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Divide modes [n, 3, stride] by the lengths [n] of the reference surface's normals (NULL: 1), and
- * round the first `count` to 16 bits, [n, 3, count], in units [count], which are written. A vertex
- * whose reference normal is zero gets zero modes. */
+/* Divide the modes, values [n, 3, stride], by the lengths [n] of the reference normals, unless
+ * `lengths` is NULL. Round the first `count` modes to 16 bits in rounded [n, 3, count], and write
+ * the unit [count] of each. A vertex whose reference normal is zero gets zero modes. */
 static void round_modes(float *values, const float *lengths, size_t n, size_t stride, size_t count,
                         int16_t *rounded, double *unit) {
   float top[MOST] = {0.0f};
@@ -254,7 +255,7 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
     angles[i] = sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
   }
   for (size_t i = 0; i < count; ++i) {
-    angles[i] = degrees * atan2(angles[i], cosine[i]);
+    angles[i] = degrees_per_radian * atan2(angles[i], cosine[i]);
   }
 }
 
@@ -268,7 +269,7 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   const size_t states = work->held_out.count;
   const double *phi = work->held_out.phi + lung * work->held_out.room * all;
   double v[HELD_OUT * MOST];
-  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] exact normals */
+  double exact[BLOCK * 3 * HELD_OUT]; /* [BLOCK, 3, states] */
   double normals[3 * HELD_OUT];
   double angles[HELD_OUT];
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)states, (int)count, (int)all, 1.0, phi,
@@ -327,12 +328,12 @@ static supine_status measure_all(const normals_work *work, size_t count,
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
-/* Work of make_modes: every vertex's modes, summed over the snapshots. */
+/* Work space of make_modes(), which sums every vertex's modes over the snapshots. */
 typedef struct planes_work {
   const normals_work *work;
-  size_t count; /* number of modes, Q */
-  size_t first; /* state in the first lane: 0, the reference surface; 1 + r, snapshot r */
-  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gains times weights */
+  size_t count; /* Q */
+  size_t first; /* state in the first lane: 0 is the reference surface, 1 + r is snapshot r */
+  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] products of gain and weight */
   float *at;                                          /* [N, 3, LANES] positions, mm */
   float *modes;                                       /* [N, 3, Q] sums so far */
   float *lengths;                                     /* [N] length of each reference normal */
@@ -407,8 +408,8 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Set each lane's gains times weights, from the monomials: for axis a, they are terms 1 to K of
- * component a + 2, modulo 3. */
+/* Copy the products of gain and weight for each lane from the monomials. For axis a, they are terms
+ * 1 to K of component (a + 2) mod 3. */
 static void find_steer(const planes_work *planes) {
   const normals_work *work = planes->work;
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {
@@ -426,7 +427,6 @@ static void find_steer(const planes_work *planes) {
   }
 }
 
-/* Make the first `count` modes of every vertex. */
 static supine_status make_modes(const normals_work *work, size_t count,
                                 supine_normals_modes *made) {
   enum { GRAIN = 1024 };
@@ -445,7 +445,8 @@ static supine_status make_modes(const normals_work *work, size_t count,
   made->count = count;
   size_t snapshots = 0;
   for (size_t lung = 0; lung < s->lung_count; ++lung) {
-    snapshots = work->fits[lung].snapshots > snapshots ? work->fits[lung].snapshots : snapshots;
+    snapshots =
+        work->fits[lung].snapshot_count > snapshots ? work->fits[lung].snapshot_count : snapshots;
   }
   const bool memory = planes.at != NULL && planes.modes != NULL && planes.lengths != NULL &&
                       made->modes != NULL && made->weights != NULL;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute normals, sums of triangles' area vectors, as polynomials of the weights and gains. */
+/* Expand normals, the sums of triangles' area vectors, as polynomials of weights and gains. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,8 @@
 
 enum { COLUMNS = SUPINE_NORMALS_FIELD_MAX + 1 };
 
-/* Find the index of the monomial of column k along axis a times column l along axis b. Column 0 is
- * the reference position, column k mode k - 1. */
+/* Find the index of the monomial for column k along axis a times column l along axis b. Column 0 is
+ * the reference position; column k > 0 is the displacement by mode k - 1. */
 static size_t term_of(size_t modes, size_t k, size_t l) {
   const size_t low = (k < l ? k : l) - 1;
   const size_t high = (k < l ? l : k) - 1;
@@ -47,7 +47,7 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface,
     supine_normals_fans_free(fans);
     return SUPINE_ERROR_MEMORY;
   }
-  uint32_t *next = fans->begin + 1; /* filling advances next[i] to the end of fan i */
+  uint32_t *next = fans->begin + 1; /* filling the fans advances next[i] to the end of fan i */
   for (size_t s = 0; s < corners; ++s) {
     ++next[surface->triangles[s] + 1];
   }
@@ -66,8 +66,8 @@ void supine_normals_fans_free(supine_normals_fans *fans) {
   *fans = (supine_normals_fans){0};
 }
 
-/* Compute the reference position of vertex `to` and its displacement by each mode, less those of
- * vertex `from`, into side [3, COLUMNS]. */
+/* Subtract vertex `from` from vertex `to`: first their reference positions, then their
+ * displacements by each mode. Write the differences to side [3, COLUMNS]. */
 static void read_side(const supine_normals_surface *s, size_t from, size_t to,
                       double (*side)[COLUMNS]) {
   const size_t modes = s->field->mode_count;

@@ -1,24 +1,25 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expand a vertex's normal as a polynomial of the weights and the three gains, and choose the
- * states that modes of normals are found from and measured on. */
+/* Expand a vertex's normal as a polynomial of the weights and the three gains, and sample the
+ * states in which modes of the normals are found and measured. */
 #ifndef SUPINE_NORMALS_POLYNOMIAL_H
 #define SUPINE_NORMALS_POLYNOMIAL_H
 
 #include "precompute/normals/normal_modes.h"
 
-/* Return the number of monomials of K weights in one component of a normal, along axis c:
+/* Return the number of monomials of a normal along one axis. With a and b the gains of the next two
+ * axes in cyclic order and w the weights of the modes, they are
  *
- *     1, a w_k, b w_k, a b w_k w_l (k <= l)     a, b: gains of the next two axes, cyclically */
+ *     1, a w_k, b w_k, a b w_k w_l for k <= l */
 static inline size_t supine_normals_terms(size_t modes) {
   return 1 + 2 * modes + modes * (modes + 1) / 2;
 }
 
-/* Compute phi [3, terms]: the monomials of the components x, y and z. */
+/* Compute the monomials phi [3, terms] along x, y and z. */
 void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],
                               double *phi);
 
-/* The triangles around each vertex: corner[s] for begin[i] <= s < begin[i + 1] are the indices in
- * `triangles` that hold vertex i. */
+/* The triangles around each vertex. Vertex i stands in the array `triangles` at the indices
+ * corner[begin[i]] to corner[begin[i + 1] - 1]. */
 typedef struct supine_normals_fans {
   uint32_t *begin;  /* [N + 2]; the last entry is work space */
   uint32_t *corner; /* [3 M] indices into `triangles` */
@@ -30,8 +31,7 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface,
                                          supine_normals_fans *fans);
 void supine_normals_fans_free(supine_normals_fans *fans);
 
-/* Read the other two vertices of the triangle to which index `corner` of `triangles` belongs, in
- * the triangle's order. */
+/* Read the vertices that follow index `corner` of `triangles` in the same triangle, cyclically. */
 static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t corner,
                                              uint32_t others[2]) {
   const uint32_t v = corner % 3;
@@ -41,13 +41,13 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
 
 /* The polynomials of some vertices of one lung. */
 typedef struct supine_normals_rows {
-  size_t count;     /* number of vertices, R */
-  uint32_t *vertex; /* [R] indices of the vertices */
+  size_t count;     /* R */
+  uint32_t *vertex; /* [R] */
   double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normal_modes.h) */
 } supine_normals_rows;
 
-/* Find the polynomials of every `stride`-th vertex of a lung from `offset` on, without those whose
- * normal on the reference surface is zero.
+/* Find the polynomials of every `stride`-th vertex of a lung, beginning at its vertex `offset`.
+ * Leave out vertices whose normal on the reference surface is zero.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          const supine_normals_fans *fans, size_t lung,
@@ -56,15 +56,15 @@ void supine_normals_rows_free(supine_normals_rows *rows);
 
 /* Sampled states of the lungs, and the monomials of their weights and gains. */
 typedef struct supine_normals_states {
-  size_t count;    /* number S of states, all with volumes that the lungs can reach */
-  size_t room;     /* number of states requested */
+  size_t count;    /* number of states whose volumes the lungs can reach, S */
+  size_t room;     /* requested number of states */
   double *phi;     /* [G, room, 3, terms] monomials of each lung in each state */
   double range[2]; /* range of the states, as in supine_normals_modes */
 } supine_normals_states;
 
-/* Spread up to `count` states over the sphere and over the volumes from rest to the reference
- * surface, or if rest is unknown, over largest displacements of -15 to 60 mm. Another `shift`, 0 to
- * 1, gives states in between. Release them with supine_normals_states_free.
+/* Spread up to `count` states over all directions of gravity, and over the volumes from rest to the
+ * reference surface. If rest is unknown, spread their largest displacements from -15 to 60 mm. A
+ * different `shift`, 0 to 1, gives states in between. Release them with supine_normals_states_free.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states);

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Choose states for normals: postures on a golden-angle spiral, volumes at multiples of an
- * irrational number, so that both are covered evenly. */
+/* Sample states: gravity on a golden-angle spiral, volumes at multiples of an irrational number. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
@@ -11,7 +9,7 @@
 
 #include "precompute/normals/polynomial.h"
 
-/* Range of the states' largest displacement, mm, if rest is unknown; negative: deflated. */
+/* If rest is unknown, range of the states' largest displacement, mm. Negative values deflate. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 
@@ -40,9 +38,9 @@ static double largest(const supine_normals_surface *s, const double *w) {
   return sqrt(top);
 }
 
-/* Find each lung's gains at a share, 0 to 1, of its volume from rest to the reference surface, and
- * the volume of all lungs, `amount`, in mL beyond that surface. y [9] are the harmonics of gravity.
- * Return false if the surface folds before it reaches the volume. */
+/* Find the gains that take each lung from rest (share 0) towards the volume of the reference
+ * surface (share 1). Write the volume of all lungs, mL beyond that surface, to `amount`. y [9] are
+ * the harmonics of gravity. Return false if the surface folds before it reaches the volume. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
   *amount = 0.0;
@@ -62,8 +60,8 @@ static bool gains_from_rest(const supine_normals_surface *s, const double *y, co
   return true;
 }
 
-/* Find the common gain of all lungs at a share, 0 to 1, of the range of displacements, and the
- * displacement, `amount`, mm. Return false if no vertex moves. */
+/* Find the gain, equal for all lungs, at which the largest displacement is at `share`, 0 to 1, of
+ * its range. Write the displacement, mm, to `amount`. Return false if no vertex moves. */
 static bool common_gain(const supine_normals_surface *s, const double *w, double share,
                         double (*gains)[3], double *amount) {
   const double size = largest(s, w);
@@ -76,8 +74,7 @@ static bool common_gain(const supine_normals_surface *s, const double *w, double
 
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states) {
-  /* Step of the volume from state to state, not commensurable with the spiral's angle. */
-  static const double volume_share = 0.4142135623730950488; /* sqrt 2 - 1 */
+  static const double share_step = 0.4142135623730950488; /* sqrt 2 - 1, an irrational number */
   const size_t terms = 3 * supine_normals_terms(surface->field->mode_count);
   double low[9];
   double w[SUPINE_MODES_MAX];
@@ -88,7 +85,7 @@ supine_status supine_normals_states_create(const supine_normals_surface *surface
   }
   for (size_t i = 0; i < count; ++i) {
     const double at = (double)i + shift;
-    const double share = fmod(at * volume_share, 1.0);
+    const double share = fmod(at * share_step, 1.0);
     double g[3];
     supine_spiral(at, (double)count, 0.0, g);
     double gains[SUPINE_LUNGS_MAX][3];

@@ -13,7 +13,7 @@
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
-/* Length of a direction, relative to the RMS length, below which its force is damped. */
+/* The force along directions shorter than this share of their RMS length is damped. */
 static const double damped_below = 0.1;
 
 /* Compute the spread force [N] of the law, corrected by the remaining distance of each match. */
@@ -64,8 +64,7 @@ static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
   return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
 }
 
-/* Fit (18) to the force of the blocks by least squares; return false if the blocks do not
- * determine it. */
+/* Fit (18) to the force of the blocks. Return false if the blocks do not determine (18). */
 static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied *applied) {
   double matrix[ALL * ALL];
   double k[COLUMNS];

@@ -18,14 +18,14 @@ enum {
   ROUNDS = 5         /* rounds of fitting and matching */
 };
 
-/* Prior standard deviations of the difference of expandability: between neighbours, and from 1. */
+/* Prior standard deviations of the expandability a: of a_i - a_j for neighbours, and of a_i - 1. */
 static const double neighbour_deviation = 0.3;
 static const double region_deviation = 1.0;
 
 static const double noise_least = 0.3;     /* lower bound on the noise of a row, mm */
 static const double rows_per_error = 10.0; /* number of nearby rows that share one error */
 
-/* Largest distance between neighbouring centres / smallest distance between any two centres. */
+/* Largest distance of neighbouring centres, as a multiple of the smallest distance of centres. */
 static const double neighbour_ratio = 1.7;
 
 /* Regions are kept if their held-out error is below this share of the error with uniform tissue. */
@@ -93,7 +93,7 @@ static void find_precision(const supine_patient_stiffness *regions, double *prec
   }
 }
 
-/* Solve for the spread force due to each region of expandability 1: response [rows, regions]. */
+/* Solve for response [rows, regions]: the spread force due to each region of expandability 1. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,
                                     const double gravity[3], double *response,
@@ -137,7 +137,7 @@ cleanup:
   return status;
 }
 
-/* Set the force at the rows from the expandability a [count] of the regions; NULL: all 1. */
+/* Set the force at each row from the expandability a [count] of the regions; NULL counts as 1. */
 static void set_forces(supine_patient_matching *m, size_t count, const double *response,
                        const double *a) {
   for (size_t i = 0; i < m->count; ++i) {
@@ -150,7 +150,7 @@ static void set_forces(supine_patient_matching *m, size_t count, const double *r
   }
 }
 
-/* Alternate between fit and matching; no robust weights, as large residuals show the regions. */
+/* Alternate between fit and matching, without robust weights: large residuals show the regions. */
 static supine_status iterate(supine_patient_matching *m, const double *response,
                              supine_patient_fit_options *options, supine_patient *patient,
                              supine_patient_stiffness *regions, supine_error *error) {

@@ -14,28 +14,29 @@
 #include "sh/base/vec3.h"
 
 enum {
-  EXPECTED_MAX = 200, /* approximate number of points for the expected error */
-  FOLDS = 5,          /* folds of held-out blocks */
-  SEEDS = 3,          /* random divisions into blocks and folds */
+  EXPECTED_MAX = 200, /* approximate number of points at which the expected error is found */
+  FOLDS = 5,          /* number of folds; the blocks of a fold are held out together */
+  SEEDS = 3,          /* number of random divisions into blocks and folds */
   AFFINE = 12,        /* number of constants of an affine map */
   ITEMS = SEEDS * FOLDS,
   SCORES = SUPINE_PATIENT_SCORES
 };
 
-/* Half width of the 95 % band, in expected errors: of a point (3-D) and of one component. */
+/* Half width of the 95 % band in units of the expected error, for a 3-D point and a component. */
 static const double band_point = 1.8;
 static const double band_component = 1.96;
 
 /* Ratio of the error within 8 mm of the surface to the expected error, measured in ten patients. */
 static const double near_surface = 1.3;
 
-/* Sums over rows of weighted squared residuals and expected variances, mm^2, and of weights;
- * numbers of points, and of points within the band. */
 typedef struct squares {
-  double residual[SCORES], expected, weight, points, within;
+  double residual[SCORES]; /* sums of weighted squared residuals, mm^2 */
+  double expected;         /* sum of weighted expected variances, mm^2 */
+  double weight;           /* sum of weights */
+  double points, within;   /* number of points, and of points within the 95 % band */
+
 } squares;
 
-/* Inputs and work space of a fit. */
 typedef struct study {
   supine_patient_fit_options options;
   const supine_patient_row *rows;
@@ -55,7 +56,7 @@ static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   }
 }
 
-/* Fit the displacement t or t + M p to rows. `map` is t, mm, then M by rows; 0 if the fit fails. */
+/* Fit the displacement t or t + M p to rows. `map` becomes t and M, or zeros if the fit fails. */
 static void affine_fit(const supine_patient_row *rows, size_t count, bool translation,
                        double map[AFFINE]) {
   double matrix[AFFINE * AFFINE] = {0.0};
@@ -77,7 +78,7 @@ static void affine_fit(const supine_patient_row *rows, size_t count, bool transl
   }
 }
 
-/* Return the displacement by the map along a row, less the measured displacement, mm. */
+/* Return the displacement by the map along a row's axis, minus the measured displacement, mm. */
 static double affine_residual(const double map[AFFINE], const supine_patient_row *row) {
   double x[AFFINE];
   affine_design(row, x);
@@ -85,7 +86,7 @@ static double affine_residual(const double map[AFFINE], const supine_patient_row
 }
 
 /* Assign each row to a block and each block at random to a fold; write the fold [count] of each
- * row. Return the number of blocks; 0: out of memory. */
+ * row. Return the number of blocks, or 0 if out of memory. */
 static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
                            size_t count, unsigned long seed, size_t *fold) {
   const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
@@ -193,8 +194,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
   return SUPINE_OK;
 }
 
-/* Compute the expected error, by `krige`, of points near a surface in three dimensions, RMS in mm;
- * return the mean displacement of the points by the fitted law, mm. */
+/* Compute the expected error that `krige` predicts for points near a surface, in three dimensions,
+ * RMS in mm; 0 for landmarks. Return the mean displacement of the points by `law`, mm. */
 static double find_expected_error(const study *s, const supine_patient_power *law,
                                   supine_patient_krige *krige, double *expected) {
   const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
@@ -206,7 +207,7 @@ static double find_expected_error(const study *s, const supine_patient_power *la
     double u[3];
     supine_patient_direction(law, &row.place, supine_patient_force_at(law, &row.place), u);
     mean += supine_length(u) * share;
-    for (size_t a = 0; a < 3 && s->components == 1; ++a) { /* else held-out points give it */
+    for (size_t a = 0; a < 3 && s->components == 1; ++a) {
       double axis_variance;
       for (size_t b = 0; b < 3; ++b) {
         row.axis[b] = a == b ? 1.0 : 0.0;
@@ -224,7 +225,8 @@ static supine_patient_score baseline_of(const study *s) {
                                                         : SUPINE_PATIENT_SCORE_NONE;
 }
 
-/* Convert sums to RMS errors; return the share of the squared displacement that is explained, %. */
+/* Convert sums to RMS errors. Return by how many percent the squared error is below that of the
+ * baseline. */
 static double find_rms(const study *s, const squares *sums, double score[SCORES]) {
   for (size_t k = 0; k < SCORES; ++k) {
     score[k] = sqrt(sums->residual[k] * (double)s->components / sums->weight);
@@ -240,7 +242,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
   double mean_displacement = 0.0;
   supine_patient_krige krige = {0};
   const bool sliding_unseen = triples == 0 && s->options.region_count == 0;
-  supine_patient_krige population = {0}; /* by the covariance of other patients */
+  supine_patient_krige population = {0}; /* fitted with the covariance of other patients */
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
   if (status == SUPINE_OK) {
@@ -250,7 +252,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
     supine_patient_krige_errors(&krige, report->error);
     supine_patient_krige_copy_law(&krige, patient);
   }
-  if (status == SUPINE_OK && sliding_unseen) { /* the rows hold nothing of the sliding */
+  if (status == SUPINE_OK && sliding_unseen) { /* the rows do not show sliding */
     supine_patient_fit_options options = s->options;
     options.sill = 1.0;
     options.noise = krige.noise;

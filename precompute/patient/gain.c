@@ -11,7 +11,7 @@
 #include "sh/base/vec3.h"
 
 static const double gain_least = 0.01, gain_most = 2.0; /* range of accepted gains */
-static const double same_posture = 0.05;  /* distance of unit vectors 3 degrees apart */
+static const double same_posture = 0.05;  /* distance of two unit vectors 3 degrees apart */
 static const double converged = 1e-4;     /* change of scales and gain below which rounds end */
 static const double not_converged = 1e-2; /* change in the last round above which the fit fails */
 static const double force_least = 0.2;    /* lower bound on the fitted force */
@@ -27,15 +27,15 @@ typedef struct field {
  * lung has its own scale s, because it has its own volume in the further posture. */
 typedef struct work {
   const supine_patient_record *record;
-  bool fits_translation; /* fit the translation t */
-  double gains[2][3];    /* gains of the fuller and the emptier state (supine_patient_path) */
+  bool fits_translation;
+  double gains[2][3]; /* gains of the fuller and the emptier state (supine_patient_path) */
   supine_patient_matching matching; /* matches and rows; blocks are eighths of the lungs */
   field *field;                     /* [rows] fitted law at each row */
   double x[UNKNOWNS];               /* scales s of the left and the right lung, t, gain */
 } work;
 
-/* Fit the unknowns by linear least squares about the present scales; return the RMS residual, mm.
- * @param without  eighth of the lungs that is left out; EIGHTHS: none */
+/* Fit the unknowns by linear least squares about the present scales. Return the RMS residual, mm.
+ * @param without  eighth of the lungs to leave out, or EIGHTHS to leave out none */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
@@ -50,7 +50,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
     double x[UNKNOWNS] = {0.0};
     x[lung] = along;
     x[GAIN] = fits_gain ? scale[lung] * w->field[i].force_change * along : 0.0;
-    double value = row->value; /* displacement from full inflation, mm */
+    double value = row->value; /* measured displacement from full inflation, mm */
     for (size_t a = 0; a < 3; ++a) {
       x[2 + a] = w->fits_translation ? row->axis[a] : 0.0;
       value += w->gains[0][a] * row->axis[a] * w->field[i].u[a];
@@ -162,11 +162,15 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
     change =
         fabs(w->x[0] - before[0]) + fabs(w->x[1] - before[1]) + fabs(w->x[GAIN] - before[GAIN]);
   }
-  if (status == SUPINE_OK && change >= not_converged) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "a further state does not converge: after %d rounds its gain still "
-                              "changes by %.2g; check that axes and person are the same",
-                              ROUNDS, change);
+  if (status != SUPINE_OK) {
+    return status;
+  }
+  if (change >= not_converged) {
+    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                            "the fit to a further state does not converge: after %d rounds the "
+                            "scales of the lungs and the gain still change by %.2g: check that "
+                            "axes and person are the same",
+                            ROUNDS, change);
   }
   memcpy(further->scale, w->x, sizeof further->scale);
   further->gain = w->x[GAIN];
@@ -179,7 +183,7 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
   }
   further->residual_without_gain = fit(w, false, EIGHTHS);
   further->gain_error = sqrt(fmax(0.0, (EIGHTHS - 1.0) / EIGHTHS * (square - sum * sum / EIGHTHS)));
-  return status;
+  return SUPINE_OK;
 }
 
 supine_status supine_patient_gain_fit(const supine_patient_record *record, const supine_lungs *rest,

@@ -13,8 +13,8 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  LAW = SUPINE_PATIENT_CONSTANTS, /* first term of the motion, after the constants */
-  SCALE = TERMS - 1,              /* the relative size of the law */
+  MOTION = SUPINE_PATIENT_CONSTANTS, /* first term of the motion */
+  SCALE = TERMS - 1,                 /* term of the law's relative size */
   TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
@@ -24,10 +24,10 @@ static const double converged = 1e-10;    /* relative decrease of the squares at
 static const double damping_most = 1e10;  /* damping above which a fit ends */
 static const double expandability_least = 0.02;
 
-/* Bounds on the exponents, and on the slopes c7 to c9, above which the force would change sign. */
+/* Bounds of the exponents c2, c4, c6, and of the absolute slopes c7 to c9. */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* Prior standard deviations of c1, c3, c5 (relative), of log c2, c4, c6, and of c7 to c9. */
+/* Prior standard deviations of c1, c3, c5 (relative); of log c2, log c4, log c6; of c7 to c9. */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
@@ -40,21 +40,20 @@ static supine_patient_centre centre_of(const supine_patient_power *law,
   return centre;
 }
 
-/* Return whether only the size of the law is fitted. */
 static bool shape_is_fixed(const supine_patient_krige *k) {
   return k->options.size_only || (k->options.law == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
-/* Return the prior standard deviation of a term; 0: known, INFINITY: free. */
+/* Return the prior standard deviation of a term: 0 if it is known, INFINITY if it is free. */
 static double prior_deviation(const supine_patient_krige *k, size_t term) {
   const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
   const bool shape_fixed = shape_is_fixed(k);
-  return term == SCALE ? (k->options.size_only ? INFINITY
-                          : shape_fixed        ? size_deviation
-                                               : 0.0)
-         : term < LAW  ? (shape_fixed ? 0.0 : law_deviation[k->options.law][term / 3] * unit)
-         : term - LAW < (size_t)k->options.scan_motion ? INFINITY
-                                                       : 0.0;
+  return term == SCALE   ? (k->options.size_only ? INFINITY
+                            : shape_fixed        ? size_deviation
+                                                 : 0.0)
+         : term < MOTION ? (shape_fixed ? 0.0 : law_deviation[k->options.law][term / 3] * unit)
+         : term - MOTION < (size_t)k->options.scan_motion ? INFINITY
+                                                          : 0.0;
 }
 
 static double offset_from_prior(const supine_patient_krige *k, size_t term) {
@@ -97,8 +96,9 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factor the covariance of the rows, noise plus g. If only the size of the law is fitted, g has its
- * covariance at the prior mean of the size.
+/* Factorise the covariance of the rows: that of the noise plus that of the correction. If only the
+ * size of the law is fitted, the covariance of the correction is that at the prior mean of the
+ * size.
  * @return half the logarithm of the determinant; NAN if it is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
@@ -127,7 +127,6 @@ static double factor(supine_patient_krige *k) {
   return logarithm;
 }
 
-/* Add the prior of the terms to the normal equations. */
 static void add_prior(supine_patient_krige *k) {
   const size_t terms = k->terms;
   for (size_t t = 0; t < TERMS; ++t) {
@@ -246,7 +245,7 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   return likelihood - 0.5 * k->squares;
 }
 
-/* Choose the most likely sill, then the most likely noise, then the sill again, unless given. */
+/* Choose the most likely sill, then noise, then sill again. Keep those that the options give. */
 static void choose_factors(supine_patient_krige *k, const supine_patient_fit_options *options) {
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
@@ -272,7 +271,7 @@ static void choose_factors(supine_patient_krige *k, const supine_patient_fit_opt
   k->noise = best[1];
 }
 
-/* Fit the law without g, starting from the prior mean. */
+/* Fit the law without a correction, starting from the prior mean. */
 static bool fit_uncorrected(supine_patient_krige *k, bool size_only) {
   k->sill = 0.0;
   k->noise = 1.0;
@@ -347,7 +346,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   }
   k->law = k->mean;
   choose_factors(k, options);
-  /* Scale g to the fitted law, then compute the weights of the kernels. */
+  /* Scale the correction to the fitted law, then compute the weights of the kernels. */
   determined = !isnan(factor(k)) && descend(k) && !isnan(factor(k));
   linearise(k);
   if (!determined || !factor_terms(k)) {
@@ -360,7 +359,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   return SUPINE_OK;
 }
 
-/* Compute the variance of the linear combination x of the terms; x is overwritten. */
+/* Compute the variance of the scalar product of x and the terms. x is overwritten. */
 static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
   const int terms = (int)k->terms;
   cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, terms, k->normal, terms, x, 1);
@@ -380,7 +379,7 @@ void supine_patient_krige_resolution(const supine_patient_krige *krige, double *
 
 void supine_patient_krige_errors(const supine_patient_krige *krige,
                                  double error[SUPINE_PATIENT_CONSTANTS]) {
-  for (size_t t = 0; t < LAW; ++t) {
+  for (size_t t = 0; t < MOTION; ++t) {
     const bool exponent = t >= 3 && t < 6;
     const size_t c = t < 3 ? 2 * t : exponent ? 2 * t - 5 : t;
     double x[TERMS_MAX] = {0.0};
@@ -404,8 +403,8 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
     value += cblas_ddot(n, krige->scratch, 1, krige->weight, 1);
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, krige->factor, n,
                 krige->scratch, 1);
-    cblas_dgemv(CblasRowMajor, CblasTrans, n, TERMS, -1.0, krige->design, TERMS + 1, krige->scratch,
-                1, 1.0, x, 1);
+    cblas_dgemv(CblasRowMajor, CblasTrans, n, (int)krige->terms, -1.0, krige->design,
+                (int)krige->terms + 1, krige->scratch, 1, 1.0, x, 1);
     *variance = krige->scaled_sill * supine_patient_covariance(&at, &at) -
                 cblas_ddot(n, krige->scratch, 1, krige->scratch, 1);
   }

@@ -11,7 +11,7 @@
 typedef struct supine_patient_match {
   size_t vertex;      /* index in the reference surface */
   double position[3]; /* position displaced by the present law, mm */
-  double distance;    /* distance of `position` from the other surface along the normal there, mm */
+  double distance;    /* distance of `position` from the other surface along its normal, mm */
   supine_inside_place nearest; /* nearest point of the other surface */
 } supine_patient_match;
 
@@ -22,20 +22,21 @@ typedef struct supine_patient_matching {
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
   double *spread;                /* [N, COLUMNS] spread terms of (18) */
-  double *rest_normals;          /* [N, 3] unit normals of the reference surface */
-  double *state_normals;         /* [state vertices, 3] unit normals of the other surface */
+  double *rest_normals;          /* [N, 3] unit vectors */
+  double *state_normals;         /* [state->vertex_count, 3] unit vectors */
   size_t count;                  /* number of chosen vertices */
   supine_patient_match *match;   /* [count] chosen vertices and their matches */
   supine_patient_row *rows;      /* [count + landmark_row_count] rows of the fit */
-  double *space;                 /* [count] work space */
+  double *space;                 /* [count] */
   double matched;                /* share of the vertices whose match has a compatible normal */
   double rms;                    /* weighted RMS distance of the matches, mm */
   const supine_patient *patient; /* law that last displaced the vertices */
-  size_t landmark_row_count;     /* number of rows of landmarks, three for each */
+  size_t landmark_row_count;     /* three for each landmark */
 } supine_patient_matching;
 
-/* Spread the terms of (18), choose at most `limit` vertices of the reference surface, and
- * allocate rows for them and for `landmarks` landmarks. Free the matching also after a failure.
+/* Spread the terms of (18), choose at most `limit` vertices of the reference surface, and allocate
+ * rows for them and for `landmarks` landmarks. Call supine_patient_matching_free also after a
+ * failure.
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
                                              const supine_patient_stiffness *stiffness,
@@ -59,13 +60,12 @@ double supine_patient_matching_place(supine_patient_matching *matching,
                                      const supine_patient *patient);
 
 /* Match each displaced vertex to the nearest point of the other surface. Its row becomes the
- * displacement along the normal at that point, with weight 1, or 0 if the normals are
- * incompatible. */
+ * displacement along the normal at that point. The weight is 1, or 0 for incompatible normals. */
 void supine_patient_matching_find(supine_patient_matching *matching);
 
-/* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the distances;
- * find the matched share and the RMS distance.
- * @param scale  lower bound on the robust scale, mm; INFINITY: leave the weights as they are
+/* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the distances.
+ * Find the matched share and the RMS distance.
+ * @param scale  lower bound on the robust scale, mm; INFINITY keeps the weights as they are
  * @retval SUPINE_ERROR_MESH  less than 30 % of the vertices match */
 supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
                                             supine_error *error);
@@ -81,11 +81,11 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
 /** Find the expandability a of each region of the lungs from the displacement between two surfaces
  * ([Santhanam2008] VI).
  *
- * The displacement depends only on the product a f of expandability and force, so f is fixed to
- * the force of the deep law. The spread force F is then linear in the values a_k of the regions:
- * F = sum over k of a_k F_k, where F_k is the spread force of region k by itself. The values are
- * fitted together with the constants of the paper's law and the motion between the scans (krige.h),
- * under a prior that a is near 1 and similar in neighbouring regions. Fits alternate with matching.
+ * The displacement depends only on the product a f of expandability and force, so f is fixed to the
+ * force of the deep law. The spread force F is then linear in the values a_k of the regions: F =
+ * sum over k of a_k F_k, where F_k is the spread force of region k by itself. The values are fitted
+ * together with the constants of the paper's law and the motion between the scans (krige.h), under
+ * a prior that a is near 1 and similar in neighbouring regions. Fits alternate with matching.
  *
  * The regions are kept only if they predict held-out blocks of 40 mm better than uniform tissue.
  * @param matching   without landmarks; on return its force is spread by the stiffness found
@@ -101,7 +101,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
 /** Find the force that the displacement to the other surface implies, averaged over blocks, and fit
  * (18) to it.
  * @param matching  created with the patient's stiffness; on return all vertices are matched
- * @param patient   law fitted to the matching; its correction g is not used
+ * @param patient   law fitted to the matching; its correction is not used
  * @param gravity   unit vector in the other state
  * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine (18)
  * @retval SUPINE_ERROR_MEMORY */

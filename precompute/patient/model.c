@@ -12,14 +12,14 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between the faces of a surface's box and of a fitted state's box, relative to
- * the width of the state's box. [0]: the state was given by landmarks; [1]: by a surface. */
+/* Largest distance between the faces of a surface's box and those of a fitted state's box, relative
+ * to the width of the state's box: [0] if the state was given by landmarks, [1] if by a surface. */
 static const double apart_most[2] = {0.45, 0.2};
 
 /* Lower bound on a force that a displacement is divided by; the mean force is 1. */
 static const double force_least = 0.2;
 
-/* Smallest distance of the two states on the path; if nearer, they count as full and rest. */
+/* Two states that are nearer than this on the path count as full inflation and rest. */
 static const double part_least = 0.02;
 
 /* Plausible range of the ratio of the volume at rest to the full volume. */
@@ -81,7 +81,7 @@ void supine_patient_path(const supine_patient_record *record, double gains[2][3]
 typedef struct work {
   const supine_patient_record *record;
   supine_lungs lungs;   /* estimate of the lungs in the fuller state */
-  const double *scan;   /* [N, 3] vertices of the scan if it is the emptier state, else NULL */
+  const double *scan;   /* [N, 3] vertices of a scan in the emptier state, or NULL */
   double *ratio;        /* [N] spread force divided by the force (18) */
   double *displacement; /* [N, 3] displacement between the states, mm */
 } work;
@@ -111,7 +111,7 @@ static void move(work *w) {
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Compute the ratio [N] of the spread force to (18), in the fitted posture. */
+/* Compute the ratio [N] of the spread force to the force (18), in the fitted posture. */
 static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -142,8 +142,8 @@ static double volume_to_end(const supine_volume_form *form, const double part[2]
   return supine_volume_form_at(form, towards);
 }
 
-/* Find the difference between the gains of the two states, along x, y and z, for which the path
- * ends at the volumes of full inflation and of rest.
+/* Find the difference between the gains of the two states, along x, y and z. It must be such that
+ * the ends of the path have the volumes of full inflation and of rest.
  * @param ones  [N] 1 for each vertex */
 static void find_path_span(const work *w, const supine_resting *resting, const double *ones,
                            double path_span[3]) {

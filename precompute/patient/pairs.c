@@ -106,8 +106,8 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
 bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
                             const double *to, supine_patient_affinity *map) {
   double mean[2][3] = {{0.0}};
-  double cross[3][3] = {{0.0}};   /* sum of from_a to_b about the means */
-  double scatter[3][3] = {{0.0}}; /* sum of from_a from_b about the means */
+  double cross[3][3] = {{0.0}};   /* sum over points of from_a to_b, both minus their mean */
+  double scatter[3][3] = {{0.0}}; /* sum over points of from_a from_b, both minus their mean */
   double mapped[3];
   bool determined = true;
   *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
@@ -132,7 +132,8 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
       map->m[k] = cross[k % 3][k / 3];
     }
     determined = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
-    /* Element (k, k) is sqrt(count) times the RMS distance from the span of the axes before k. */
+    /* Element (k, k) of the factor is sqrt(count) times the RMS residual of coordinate k after a
+     * linear fit to coordinates 0 to k - 1. */
     for (size_t k = 0; k < 3; ++k) {
       determined = determined && scatter[k][k] >= flat_least * sqrt((double)count);
     }
@@ -157,8 +158,8 @@ typedef struct summary {
   double size[2];      /* longest side of each state's box, mm */
   double translation;  /* distance between the means of the two states, mm */
   double rotation;     /* angle of the best rotation, degrees */
-  bool flat;           /* the points of the first state lie in a plane */
-  double growth;       /* determinant of the best affine map; negative: a reflection */
+  bool flat;           /* whether the points of the first state lie in a plane */
+  double growth;       /* determinant of the best affine map, negative for a reflection */
   double residual;     /* RMS residual of the affine map, mm */
   double displacement; /* RMS displacement, mm; about the mean if the scans moved */
 } summary;

@@ -14,7 +14,7 @@ typedef struct supine_patient_pairs {
   size_t count;
   double *from; /**< [count, 3] in the first state */
   double *to;   /**< [count, 3] in the second state */
-  double *side; /**< [count] +1 left lung, -1 right; NULL: the midline decides */
+  double *side; /**< [count] +1 left lung, -1 right lung; NULL to let the midline decide */
 } supine_patient_pairs;
 
 /** Read pairs of points from a CSV file with the columns x,y,z,to_x,to_y,to_z (first and second
@@ -42,15 +42,15 @@ double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error);
 
-/** Maps from one state to the other: the prediction of a law, its baselines, and a rigid map. */
+/** Maps from one state to the other: the prediction of a law, its baselines, and a rotation with
+ * translation, which is no baseline. */
 typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_PREDICTED = 0,
   SUPINE_PATIENT_MAP_NONE,
   SUPINE_PATIENT_MAP_TRANSLATION,
   SUPINE_PATIENT_MAP_AFFINE,
   SUPINE_PATIENT_MAP_COUNT,
-  SUPINE_PATIENT_MAP_RIGID =
-      SUPINE_PATIENT_MAP_COUNT /**< rotation and translation; not a baseline */
+  SUPINE_PATIENT_MAP_RIGID = SUPINE_PATIENT_MAP_COUNT
 } supine_patient_map;
 
 /** The map x -> m x + t, with m by rows. */

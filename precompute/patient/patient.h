@@ -3,9 +3,9 @@
  * ([Santhanam2008] IV-B): a law of nine constants, and a correction that interpolates the residual
  * of the law.
  *
- * The law gives the displacement u from the fuller of two states to the emptier one. X, Y, Z are
- * the box coordinates of lungs.h in the box of the fuller state; `side` is +1 in the left lung and
- * -1 in the right; the correction r is a sum of kernels (krige.h):
+ * The law gives the displacement u from the fuller of two states to the emptier one. X, Y and Z are
+ * the box coordinates of lungs.h in the box of the fuller state. `side` is +1 in the left lung and
+ * -1 in the right. The correction r is a sum of kernels (krige.h):
  *
  *     u = (1 + c7 (X-1/2) + c8 (Y-1/2) + c9 (Z-1/2)) (side c1 X^c2, -c3 Y^c4, -c5 Z^c6) + r
  *
@@ -13,14 +13,13 @@
 #ifndef SUPINE_PATIENT_H
 #define SUPINE_PATIENT_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include "precompute/lungs/lungs.h"
 #include "precompute/physics/force.h"
 
 typedef enum supine_patient_law {
-  SUPINE_PATIENT_DEEP = 0, /**< the deep law of model.h, or a law near to it (krige.h) */
+  SUPINE_PATIENT_DEEP = 0, /**< the deep law of model.h, or a law close to it (krige.h) */
   SUPINE_PATIENT_PAPER,    /**< all nine constants are fitted */
   SUPINE_PATIENT_LAW_COUNT
 } supine_patient_law;
@@ -28,7 +27,7 @@ typedef enum supine_patient_law {
 /** Names of the laws, "deep" and "paper". */
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
-/** Motion of the body between the scans; each value is its number of fitted unknowns. */
+/** Motion of the body between the scans. Each value is the number of fitted unknowns. */
 typedef enum supine_patient_scan_motion {
   SUPINE_PATIENT_STILL = 0,
   SUPINE_PATIENT_TRANSLATION = 3,
@@ -39,28 +38,27 @@ typedef enum supine_patient_scan_motion {
 typedef struct supine_patient_frame {
   double minimum[3], maximum[3];
   double midline; /**< x of the plane between the lungs */
-  int only_side;  /**< the side of the only lung, +1 left or -1 right; 0: there are two lungs */
+  int only_side;  /**< +1 if only the left lung is given, -1 if only the right, 0 for both lungs */
 } supine_patient_frame;
 
 enum {
   SUPINE_PATIENT_CONSTANTS = 9,
-  SUPINE_PATIENT_COLUMNS = 4, /**< terms of (18): 1, X - 1/2, Y - 1/2, Z - 1/2 */
+  SUPINE_PATIENT_COLUMNS = 4, /**< number of terms of (18): 1, X - 1/2, Y - 1/2, Z - 1/2 */
   SUPINE_PATIENT_CENTRES_MAX = 900
 };
 
 /** The constants of a law, and the motion between the scans. */
 typedef struct supine_patient_power {
-  double c[SUPINE_PATIENT_CONSTANTS]; /**< c1 to c9; c1, c3 and c5 in mm, below 0 if the lung
-                                         empties */
-  double motion[6]; /**< translation (mm) and small rotation (rad) about the box's centre, which
-                        add to u in the measured displacement */
+  double c[SUPINE_PATIENT_CONSTANTS]; /**< c1 to c9; c1, c3 and c5 are lengths, mm */
+  double motion[6]; /**< translation (mm) and small rotation (rad) about the box's centre. The
+                        measured displacement is the sum of this motion and u */
 } supine_patient_power;
 
 /** One kernel of the correction. */
 typedef struct supine_patient_centre {
   double offset[3]; /**< position from the box's centre, mm */
-  double side;      /**< lung: +1 left, -1 right */
-  double size;      /**< length of the displacement by the law without r, mm */
+  double side;      /**< +1 left lung, -1 right lung */
+  double size;      /**< length of the displacement by the law without correction, mm */
   double weight[3]; /**< factor on the kernel's covariance along each axis, 1/mm */
 } supine_patient_centre;
 
@@ -68,27 +66,28 @@ typedef struct supine_patient {
   supine_patient_law law;
   supine_patient_frame frame;
   supine_patient_power power;
-  size_t centre_count; /**< number of kernels; 0: no correction */
+  size_t centre_count; /**< number of kernels, or 0 without a correction */
   supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
 } supine_patient;
 
 /** A point in the coordinates of the law. */
 typedef struct supine_patient_place {
   double box[3];                        /**< X, Y, Z, each 0 to 1 in the box */
-  double side;                          /**< +1 left, -1 right */
+  double side;                          /**< +1 left lung, -1 right lung */
   double offset[3];                     /**< position from the box's centre, mm */
-  double force[SUPINE_PATIENT_COLUMNS]; /**< terms of (18); at vertices, spread terms */
+  double force[SUPINE_PATIENT_COLUMNS]; /**< terms of (18); spread terms for a vertex */
 } supine_patient_place;
 
-/** Find a point's place. The force is not spread; outside the box it is that at the nearest face.
+/** Find a point's place. The terms of (18) are not spread. Outside the box, they have their values
+ * at the nearest face.
  * @param point  mm
- * @param side   +1 if the point is in the left lung, -1 in the right; 0: the midline decides */
+ * @param side   +1 left lung, -1 right lung, 0 to let the midline decide */
 supine_patient_place supine_patient_find(const supine_patient_frame *frame, const double point[3],
                                          double side);
 
 /** Make a frame from landmarks [count, 3], mm: their box, 10 mm larger on every side, because lungs
  * extend beyond landmarks.
- * @param midline  x of the plane between the lungs, mm; NULL: the box's centre */
+ * @param midline  x of the plane between the lungs, mm, or NULL for the box's centre */
 supine_patient_frame supine_patient_frame_of_points(size_t count, const double *points,
                                                     const double *midline);
 
@@ -101,9 +100,9 @@ int supine_patient_side_of(const supine_lungs *lungs, size_t vertex);
 supine_patient_place supine_patient_find_vertex(const supine_lungs *lungs, size_t vertex);
 
 /** Express the deep law by nine constants.
- * @param gravity    unit vector; 0,0,0: supine
+ * @param gravity    unit vector, or 0,0,0 for supine
  * @param path_span  difference between the gains of the two states on the path from full inflation
- *                   to rest, along x, y and z; 0,0,0: 1 along each axis */
+ *                   to rest, along x, y and z; 0,0,0 counts as 1,1,1 */
 supine_patient_power supine_patient_deep(const double gravity[3], const double path_span[3]);
 
 /** Compute the force (18) at a place. */
@@ -128,7 +127,7 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
                                  double spread, double u[3]);
 
 /** Find the position in the fuller state of a point of the emptier state, by fixed-point iteration.
- * @param side    +1 left lung, -1 right; 0: the midline decides
+ * @param side    +1 left lung, -1 right lung, 0 to let the midline decide
  * @param spread  factor on the force (18)
  * @param at      in: initial guess; out: position in the fuller state, mm
  * @param u       written: displacement between the states, mm */
@@ -139,8 +138,8 @@ void supine_patient_find_in_fuller(const supine_patient *patient, const double p
 void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points);
 
 /** Split the force (18) into a part that follows gravity, with factor `gain`, and a part that is
- * fixed to the body. With gravity as in the fitted posture, the sum is (18) for any gain.
- * @param gravity  in the fitted posture, unit vector */
+ * fixed to the body. In the fitted posture, the sum is (18) for any gain.
+ * @param gravity  unit vector in the fitted posture */
 supine_force_law supine_patient_force(const supine_patient_power *power, double gain,
                                       const double gravity[3]);
 

@@ -20,9 +20,9 @@ enum {
 
 /* A number or an array of numbers in a record and in its file. */
 typedef struct numbers {
-  const char *group; /* key of the enclosing object; NULL: the root */
+  const char *group; /* key of the enclosing object, or NULL for the root */
   const char *key;
-  size_t count;  /* number of values; 1: a number, more: an array */
+  size_t count;  /* 1 for a number, more for an array */
   size_t offset; /* position in the record, bytes */
   bool optional; /* may be missing, and is left out if all numbers are 0 */
 } numbers;
@@ -82,7 +82,7 @@ static json_t *array_of(const double *values, size_t count) {
   return array;
 }
 
-/* Return the member `key` of the root, an object, and add it if missing; key NULL: the root. */
+/* Return the object `key` of the root, added if it is missing, or the root if `key` is NULL. */
 static json_t *group_of(json_t *root, const char *key) {
   if (key != NULL && json_object_get(root, key) == NULL) {
     (void)json_object_set_new(root, key, json_object());
@@ -197,7 +197,7 @@ static const char *text_of(const json_t *root, const char *group, const char *ke
   return text != NULL ? text : "";
 }
 
-/* Return the index of a word in a list; `count` if the word is missing. */
+/* Return the index of a word in a list, or `count` if the word is missing. */
 static int find_word(const char *word, const char *const *words, int count) {
   int k = 0;
   while (k < count && strcmp(word, words[k]) != 0) {
@@ -256,7 +256,7 @@ static bool read_regions(const json_t *root, supine_patient_stiffness *stiffness
   return valid;
 }
 
-/* Read a record; return a key that is missing or invalid, or NULL. */
+/* Read a record. Return the first key that is missing or invalid, or NULL if there is none. */
 static const char *read_record(const json_t *root, supine_patient_record *record) {
   supine_patient *patient = &record->patient;
   for (size_t i = 0; i < sizeof table / sizeof *table; ++i) {

@@ -13,12 +13,11 @@ enum { SUPINE_PATIENT_TEXT = 48, SUPINE_PATIENT_OTHERS_MAX = 8, SUPINE_PATIENT_S
 typedef struct supine_patient_further {
   supine_state state;
   bool fits_gain; /**< the gain is fitted, because the posture differs from the fitted posture */
-  double
-      scale[2]; /**< factors on the displacement from full inflation to rest, left and right lung */
+  /** Factors on the displacement from full inflation to rest of the left and the right lung. */
+  double scale[2];
   double residual;              /**< RMS residual, mm; along the normals for a surface */
   double residual_without_gain; /**< RMS residual if all of the force is fixed to the body, mm */
-  double gain, gain_error;      /**< gain and its standard error (jackknife over eighths of the
-                                     lungs) */
+  double gain, gain_error;      /**< gain and its standard error */
 } supine_patient_further;
 
 /** A region of a lung. The expandability a = 1/E at a point p ([Santhanam2008] VI) is a weighted
@@ -28,14 +27,14 @@ typedef struct supine_patient_further {
  *            / sum over k of w(|p - centre_k| / radius_k)
  *     w(t) = 1 for t <= 1/2, 0 for t >= 1, 3 q^2 - 2 q^3 between, q = 2 (1 - t) */
 typedef struct supine_patient_region {
-  double side;      /**< lung: 1 left, -1 right */
-  double value;     /**< expandability a_k, > 0 */
+  double side;      /**< +1 left lung, -1 right lung */
+  double value;     /**< expandability, > 0 */
   double centre[3]; /**< centre in the reference surface, mm */
-  double radius;    /**< radius, mm, > 0 */
-  double seen;      /**< share of a_k that the surfaces determine, 0 to 1 */
+  double radius;    /**< mm, > 0 */
+  double seen;      /**< share of the expandability that the surfaces determine, 0 to 1 */
 } supine_patient_region;
 
-/** The regions of the left lung, then of the right lung; none: uniform tissue. */
+/** The regions of the left lung, then those of the right; 0 regions mean uniform tissue. */
 typedef struct supine_patient_stiffness {
   size_t count;
   supine_patient_region region[SUPINE_PATIENT_REGIONS_MAX];
@@ -61,38 +60,36 @@ typedef struct supine_patient_expand_report {
  *
  * A amplifies roughness of u, so f is averaged over blocks of 40 mm of surface. */
 typedef struct supine_patient_applied {
-  double blocks;      /**< number of blocks; 0: the force was not computed */
+  double blocks;      /**< number of blocks, or 0 if the force was not computed */
   double correlation; /**< correlation of force and height along gravity */
-  double slopes[3];   /**< c7 to c9 of (18) fitted to f */
-  double residual;    /**< RMS residual of (18), divided by f at the box's centre */
-  double spread;      /**< standard deviation of f over blocks, divided by f at the box's centre */
+  double slopes[3];   /**< c7 to c9 of (18), fitted to the force */
+  double residual;    /**< RMS residual of (18), divided by the force at the box's centre */
+  double spread; /**< standard deviation over blocks, divided by the force at the box's centre */
 } supine_patient_applied;
 
-/** Result of matching two surfaces. */
 typedef struct supine_patient_surface_report {
-  double vertices;      /**< number of vertices matched; 0: no surfaces */
+  double vertices;      /**< number of matched vertices, or 0 without surfaces */
   double matched;       /**< share of the vertices whose match has a compatible normal */
   double before, after; /**< RMS distance along normals before and after the fit, mm */
 } supine_patient_surface_report;
 
-/** A patient's law, its states and its fit. */
 typedef struct supine_patient_record {
   char name[SUPINE_PATIENT_TEXT];
   supine_patient patient;
   supine_force_law force; /**< force (18) with its dependence on gravity */
   supine_state state[2];  /**< the fuller and the emptier state */
-  double volume[2];       /**< volumes of the two states, mL; 0: unknown */
+  double volume[2];       /**< volumes of the two states, mL, or 0 if unknown */
   double emptier[2][3];   /**< minimum and maximum of the emptier state's box, mm */
-  bool from_surface;      /**< the boxes are those of surfaces, else of landmarks */
+  bool from_surface;      /**< true if the boxes are those of surfaces, false if of landmarks */
   supine_patient_fit_report report;
-  supine_patient_stiffness stiffness; /**< regions of expandability; none: uniform tissue */
+  supine_patient_stiffness stiffness;
   supine_patient_surface_report surface;
   supine_patient_expand_report expand;
   supine_patient_applied applied;
-  double gain_error;    /**< standard error of the gain; 0: not fitted */
+  double gain_error;    /**< standard error of the gain, or 0 if it was not fitted */
   size_t further_count; /**< number of further states; 0 after supine_patient_read */
   supine_patient_further further[SUPINE_PATIENT_OTHERS_MAX];
-  bool gain_undetermined; /**< the fitted gain is not used, as it is not between 0.01 and 2 */
+  bool gain_undetermined; /**< the fitted gain is ignored, as it is not between 0.01 and 2 */
 } supine_patient_record;
 
 /** Write the record to a file, whole or not at all.
@@ -122,7 +119,7 @@ supine_status supine_patient_read(const char *path, supine_patient_record *recor
  *
  * @param resting  volumes at rest
  * @param lungs    the scan of one of the two states
- * @param state    the state of the scan: 0 the fuller, 1 the emptier
+ * @param state    0 if the scan shows the fuller state, 1 if the emptier one
  * @param arrays   [4 N], written: the directions [N, 3], mm, then the relative stiffness E [N];
  * must outlive the model
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_solve */
@@ -132,15 +129,16 @@ supine_status supine_patient_model(const supine_patient_record *record,
                                    supine_error *error);
 
 /** Find by its box which of the two states a surface shows.
- * @param state  written: 0 the fuller, 1 the emptier
+ * @param state  written: 0 for the fuller state, 1 for the emptier one
  * @retval SUPINE_ERROR_MESH  the surface lies elsewhere, or is the other lung */
 supine_status supine_patient_check_place(const supine_patient_record *record,
                                          const supine_lungs *lungs, size_t *state,
                                          supine_error *error);
 
 /** Compute the gains of the two states along x, y and z on the deep law's path from full inflation
- * (0) to rest (1) (supine_volume_bend). A state other than these two is placed by the cube root of
- * its volume. If that is unknown, the fuller state counts as full and the emptier one as rest. */
+ * to rest (supine_volume_bend). A state that is neither full inflation nor rest is placed by the
+ * cube root of its volume. If this volume is unknown, the fuller state counts as full inflation,
+ * and the emptier one as rest. */
 void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
 /** Scale the volumes at rest to those of the patient, if one of the two states is relative to rest
@@ -153,13 +151,13 @@ void supine_patient_resting(const supine_patient_record *record, supine_resting 
 supine_scan supine_patient_scan(const supine_patient_record *record, size_t state, double volume,
                                 const supine_resting *resting);
 
-/** Fit a law to a surface in another state, whose triangles may differ; write patient, reports,
- * stiffness and applied force into the record.
+/** Fit a law to the surface of another state, which may have other triangles. Write patient,
+ * reports, stiffness and applied force into the record.
  *
- * Each round displaces vertices of the reference surface by the present law and matches them to
- * the nearest points of the other surface. A match with a compatible normal gives a row along that
- * normal, so that surfaces may slide, with a robust weight (Tukey's biweight). The law is then
- * fitted to the rows. Rounds end when the vertices change by less than 0.002 mm (RMS).
+ * Each round displaces vertices of the reference surface by the present law and matches them to the
+ * nearest points of the other surface. A match with a compatible normal gives a row along that
+ * normal, so that surfaces may slide. The law is then fitted to the rows with robust weights
+ * (Tukey's biweight). Rounds end when the vertices change by less than 0.002 mm (RMS).
  *
  * A small distance between the surfaces does not prove the displacement of points, because sliding
  * along the surface is not observed.
@@ -182,11 +180,12 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
  *     u_j(p) = s_j (1 + gain_j (h_j(p) - h(p)) / f(p)) u(p) + t_j
  *
  * with u the fitted displacement, scaled to the path from full inflation to rest
- * (supine_patient_path); s_j the scale of each lung; h_j and h the heights along gravity in this
- * posture and in the fitted one; f the fitted force. On a surface, heights and force are spread.
- * Scales, gain and t_j are fitted by iterated least squares, in rounds that match a surface again.
- * @param rest     the surface of the fuller state; NULL without `surface`
- * @param pairs    points in the fuller state and in this one; NULL with `surface`
+ * (supine_patient_path); s_j the scale of each lung; h_j and h the heights along gravity in the
+ * posture of state j and in the fitted posture; f the fitted force. On a surface, heights and force
+ * are spread. Scales, gain and t_j are fitted by iterated least squares, in rounds that match a
+ * surface again.
+ * @param rest     the surface of the fuller state; NULL if `surface` is NULL
+ * @param pairs    points in the fuller state and in state j; NULL if `surface` is given
  * @param scans_moved  also fit a translation t_j between the scans
  * @param further  in: the state; out: the fit
  * @retval SUPINE_ERROR_MESH    too few compatible points

@@ -9,8 +9,9 @@
 
 #include "sh/base/vec3.h"
 
-/* Side of a block of rows that are held out together, mm. The displacements of landmarks at a third
- * of this distance agree to a few mm, so single held-out landmarks would understate the error. */
+/* Side of a block of rows that are held out together, mm. Landmarks that are a third of this
+ * distance apart move alike to within a few mm. If single landmarks were held out, the error would
+ * seem too small. */
 static const double block_side = 40.0;
 
 /* Standard deviation of a landmark along each axis, mm. */
@@ -34,7 +35,7 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
   enum { CELLS = 64 }; /* number of cells along each axis, 2.5 m in all */
   size_t blocks = 0;
   double origin[3] = {0.0};
-  /* index of the block of each cell, plus 1; 0: none yet */
+  /* For each cell, 1 plus the index of its block, or 0 if it has no block yet. */
   size_t *number = calloc((size_t)CELLS * CELLS * CELLS, sizeof *number);
   gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
   const bool able = number != NULL && random != NULL;
@@ -62,10 +63,10 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]) {
   const double force = supine_patient_force_at(law, &row->place);
-  double along[3]; /* displacement for a force of 1 and c1, c3, c5 of 1 mm */
+  double along[3]; /* displacement if the force is 1 and c1, c3, c5 are 1 mm */
   double motion[3];
   double turned[3];
-  double unit_force = 0.0; /* displacement along the row's axis for a force of 1, mm */
+  double unit_force = 0.0; /* displacement along the row's axis if the force is 1, mm */
   supine_patient_power unit = *law;
   unit.c[0] = unit.c[2] = unit.c[4] = 1.0;
   supine_patient_direction(&unit, &row->place, 1.0, along);

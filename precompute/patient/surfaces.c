@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Fit a law to surfaces by iterated nearest points (point to plane) with robust weights. */
 #include <math.h>
-#include <stdlib.h>
 
 #include <gsl/gsl_statistics.h>
 
 #include "precompute/patient/matching.h"
 
 enum {
-  VERTICES_MAX = 600,  /* matched vertices: dense enough for a correlation length of 90 mm */
-  EXPANDED_MAX = 2000, /* if regions of expandability are fitted, which are 45 mm apart */
+  VERTICES_MAX = 600,  /* number of matched vertices, enough for a correlation length of 90 mm */
+  EXPANDED_MAX = 2000, /* number of matched vertices if regions, 45 mm apart, are fitted */
   ROUNDS_MAX = 60
 };
 
-static const double converged = 2e-3;     /* RMS change in a round below which the fit ends, mm */
-static const double size_converged = 0.5; /* the same while only a size is fitted, mm */
+/* RMS change in a round, mm, below which the fit ends; then that for a fit of the size alone. */
+static const double converged = 2e-3;
+static const double size_converged = 0.5;
 
 /* Lower bound on the robust scale, mm. Smaller residuals are left to kriging. */
 static const double scale_least = 1.0;
@@ -124,7 +124,7 @@ static supine_status run(supine_patient_matching *m, const supine_patient_fit_op
   if (status == SUPINE_OK && expandability) {
     status = supine_patient_expand(m, wanted, &record->patient, &record->stiffness, &record->expand,
                                    error);
-    if (status == SUPINE_OK) { /* the found stiffness changes the spread force */
+    if (status == SUPINE_OK) { /* the new stiffness changes the spread force */
       status = iterate(m, wanted, &record->patient, &record->surface, error);
     }
   }
@@ -153,8 +153,8 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   if (status == SUPINE_OK && landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
     m.landmark_row_count = 3 * landmark_count;
-    for (size_t i = 0; i < m.landmark_row_count;
-         ++i) { /* all landmarks together weigh as much as the surface */
+    /* All landmarks together weigh as much as the surface. */
+    for (size_t i = 0; i < m.landmark_row_count; ++i) {
       m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
     }
   }

@@ -3,13 +3,12 @@
  *
  * The total lung capacity of adults of height H in m (ECSC: Quanjer et al., Eur Respir J 6 Suppl
  * 16, 1993) is 7.99 H - 7.08 L in men (SD 0.7 L) and 6.60 H - 5.79 L in women (SD 0.6 L). These are
- * capacities upright, so the code divides them by 1 + SUPINE_FULL_UPRIGHT_GAIN; it adds 0.86 L of
+ * capacities upright, so the code divides them by 1 + SUPINE_FULL_UPRIGHT_GAIN, and adds 0.86 L of
  * tissue (Denison 1986, Thorax 41:620, n 12: 431 mL in each lung). The coefficients were checked
  * against an R implementation of the ECSC table (getQuanjerPred, getQuanjerLLN), not against the
  * paper. For men of 1.60 to 1.95 m and women of 1.50 to 1.80 m, they are within 5 % of the medians
  * of Hall et al. at age 40 (Eur Respir J 57: 2000289, 2021, without their splines). */
 #include <math.h>
-#include <stdio.h>
 
 #include "precompute/physics/reference.h"
 #include "sh/base/text.h"
@@ -22,14 +21,14 @@ static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 
-/* Largest relative difference between a scan's volume and the volume that the options state. */
+/* Largest relative difference between a scan's volume and the volume stated in the options. */
 static const double agreement = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
   static const struct {
     double slope, offset; /* capacity in L is slope x height in m - offset */
-    double usual[2];      /* shortest and tallest usual adults, cm */
-  } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* women, men */
+    double usual[2];      /* range of usual heights, cm */
+  } of[2] = {{6.60, 5.79, {150.0, 180.0}}, {7.99, 7.08, {160.0, 195.0}}}; /* [0] women, [1] men */
   range[0] = INFINITY;
   range[1] = 0.0;
   for (int sex = 0; sex < 2; ++sex) {
@@ -46,7 +45,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* Return the usual share of both lungs' volume that the reference has: 1 if it has both lungs. */
+/* Return the usual share of the given lungs in the volume of both lungs: 1 if both are given. */
 static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0
          : reference->side[0] > 0   ? SUPINE_LEFT_SHARE

@@ -22,21 +22,21 @@
 
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
-/* BATCH: largest number of right-hand sides that are solved together, which limits the work space.
- * LARGE: number of vertices of a part above which its factor is freed after each solve. */
+/* Up to BATCH right-hand sides are solved together, which limits the work space. The factor of a
+ * part with more than LARGE vertices is freed after each solve. */
 enum { BATCH = 8, LARGE = 100000 };
 
-/* Largest relative residual of a solve. With a reach R and edges of length h, double precision
- * reaches about 1e-16 (R / h)^2. */
+/* Largest accepted relative residual of a solve. With a reach R and edges of length h, rounding
+ * errors alone cause about 1e-16 (R / h)^2. */
 static const double residual_limit = 1e-8;
 
 /* A part of the mesh without edges to other parts, such as one lung. Each part is solved in its own
  * thread, unless the first part has more than LARGE vertices. */
 typedef struct part {
-  size_t vertex, vertex_count; /* index of the first vertex, and their number */
+  size_t vertex, vertex_count; /* index of the first vertex, and number of vertices */
   size_t edge, edge_count;
   bool factorised;        /* whether `factor` matches the values of `matrix` */
-  cholmod_sparse *matrix; /* lower triangle: column i has the diagonal, then the edges from i */
+  cholmod_sparse *matrix; /* lower triangle: diagonal element i, then the edges from vertex i */
   cholmod_factor *factor;
   cholmod_common common;
 } part;
@@ -44,12 +44,12 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
-  double reach;    /* reach R, mm; 0: none */
-  double *area;    /* [N] area of each vertex / mean area; NULL without a reach */
-  double *link;    /* [edges] with a reach w / 2, else D(mass, spring) in mm (equilibrium.h) */
-  double *lesions; /* [N] factors on the normalised stiffness; NULL: 1 */
-  double *mass_s;  /* [N] S of the masses in the matrix: with a reach 1, else 1 / E */
-  double *load;    /* [N] right-hand side for a unit force: with a reach area / E, else 1 */
+  double reach;    /* mm, or 0 for the paper's transfer */
+  double *area;    /* [N] area of each vertex / mean area, or NULL without a reach */
+  double *link;    /* [edges] w / 2 with a reach, otherwise D(mass, spring) in mm (equilibrium.h) */
+  double *lesions; /* [N] factors on the normalised stiffness, or NULL */
+  double *mass_s;  /* [N] S of the masses: 1 with a reach, otherwise 1 / E */
+  double *load;    /* [N] right-hand side for a unit force: area / E with a reach, otherwise 1 */
   size_t part_count;
   part parts[2];
 };
@@ -104,16 +104,16 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
 static void split(supine_equilibrium *eq) {
   const size_t n = eq->vertex_count;
   const supine_topology *topology = eq->topology;
-  size_t last = 0;  /* highest index of a neighbour of the vertices before i */
-  size_t least = n; /* size of the larger part in the best split so far */
+  size_t highest = 0; /* highest index of a neighbour of vertices 0 to i - 1 */
+  size_t least = n;   /* size of the larger part in the best split so far */
   part *first = &eq->parts[0];
   *first = (part){.vertex_count = n, .edge_count = topology->edge_count};
   for (size_t i = 1, e = 0; i < n; ++i) {
     for (; e < topology->edge_count && topology->edges[2 * e] < i; ++e) {
-      last = topology->edges[2 * e + 1] > last ? topology->edges[2 * e + 1] : last;
+      highest = topology->edges[2 * e + 1] > highest ? topology->edges[2 * e + 1] : highest;
     }
     const size_t larger = i < n - i ? n - i : i;
-    if (last < i && larger < least) {
+    if (highest < i && larger < least) {
       least = larger;
       *first = (part){.vertex_count = i, .edge_count = e};
     }
@@ -178,11 +178,11 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
 /* Compute vertex areas and link weights for a reach R.
  *
  * The system of equilibrium.h with a reach is the weak form of (1 - R^2 Laplacian) F = a f on the
- * surface, divided by the mean vertex area A. Its link weights are w = 2 R^2 c / A, where the
- * coefficients c make the sum of c (F_i - F_j)^2 over all links the integral of |grad F|^2. With
- * the link's length h and a third of the area of its triangles, s, this holds for c = 2 s / h^2 if
- * links run equally in all directions. Unlike cotangent weights, these are never negative, but they
- * realise R^2 only to about a tenth. */
+ * surface, divided by the mean vertex area A. Its link weights are w = 2 R^2 c / A. The factors c
+ * should make the sum of c (F_i - F_j)^2 over all links equal to the integral of |grad F|^2. If
+ * links run equally in all directions, this holds for c = 2 s / h^2, where h is the length of the
+ * link and s a third of the area of its triangles. Unlike cotangent weights, these weights are
+ * never negative, but R^2 is accurate only to about 10 %. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
@@ -191,7 +191,8 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* lower limit, mm^2: degenerate triangles must not give a vertex or a link the weight 0 */
+  /* Lower bound of areas, mm^2, so that degenerate triangles give no vertex or link the weight 0.
+   */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
@@ -199,7 +200,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   memset(eq->link, 0, eq->topology->edge_count * sizeof *eq->link);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
     const uint32_t *corner = mesh->triangles + 3 * t;
-    double normal[3]; /* length: twice the triangle's area */
+    double normal[3]; /* its length is twice the triangle's area */
     supine_normal(p + 3 * (size_t)corner[0], p + 3 * (size_t)corner[1], p + 3 * (size_t)corner[2],
                   normal);
     for (size_t k = 0; k < 3; ++k) {
@@ -250,7 +251,6 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
   return supine_physics_equilibrium_set_shape(made, mesh, reach, NULL, error);
 }
 
-/* Fill in the values of a part's matrix. */
 static void set_values(const supine_equilibrium *eq, part *p) {
   const int *begin = p->matrix->p;
   double *value = p->matrix->x;
@@ -316,7 +316,6 @@ supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibri
   return supine_physics_equilibrium_set_stiffness(eq, stiffness, error);
 }
 
-/* Forces and results of one solve. */
 typedef struct solve {
   supine_equilibrium *eq;
   size_t count;

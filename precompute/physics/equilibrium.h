@@ -2,16 +2,18 @@
 /** @file Solve the physics of [Santhanam2008] III-E: masses at the vertices of a surface and
  * springs at the midpoints of its edges exchange force until they are in equilibrium.
  *
- * A mass of stiffness E has S = 1/E; a spring has S = E, the mean of both ends. D is the distance
- * of two nodes in mm, at least 1, with D(j, j) = 1, and clique(j) is node j with its neighbours. Of
- * the force x_j that reaches it, node j passes the share Te[j->i] to node i, and keeps the share
- * Te[j->j]. With the applied force f and Z_j = sum over l in clique(j) of S_l / D(l, j):
+ * A mass of stiffness E has S = 1/E. A spring has S = E, where E is the mean of its two masses. D
+ * is the distance of two nodes in mm, at least 1, with D(j, j) = 1. clique(j) is node j with its
+ * neighbours. Node j passes the share Te[j->i] of the force x_j that reaches it to node i, and
+ * keeps the share Te[j->j]. f is the applied force, and Z_j = sum over l in clique(j) of S_l / D(l,
+ * j):
  *
  *     Te[j->i] = S_i / (D(j, i) Z_j), which sums to 1 over i                   (8), (3)
  *     x = f + A x,  A[i, j] = Te[j->i] for i != j;    F_i = Te[i->i] x_i       (5), (12)-(14)
  *
- * The result is the catch F. The substitution y = x / Z eliminates the springs exactly; then
- * y = S t leaves one unknown t for each vertex, in a diagonal matrix plus a graph Laplacian:
+ * The result is the catch F. The substitution y = x / Z eliminates the springs exactly. The
+ * substitution y = S t leaves one unknown t for each vertex, and makes the matrix a diagonal matrix
+ * plus a graph Laplacian:
  *
  *     mass_i t_i + sum over edges ij of c_ij (t_i - t_j) = f_i,     F_i = S_i^2 t_i
  *     c_ij = S_i S_j / (D (D + 2 S_i S_j))
@@ -21,14 +23,15 @@
  * number of forces.
  *
  * In this transfer a mass with more links keeps a smaller share of the force, so results change as
- * the mesh is refined. A reach R in mm removes this dependence by other weights. For a mass,
- * 1 / D(j, j) is replaced by area_j, the vertex's area over the mean area; for a spring, by 0. For
- * an edge ij of length h with the spring l, 1 / D(i, l) is replaced by
+ * the mesh is refined. A reach R in mm removes this dependence by other weights: 1 / D(j, j) of a
+ * mass is replaced by area_j, the vertex's area divided by the mean area, and that of a spring by
+ * 0. For an edge ij of length h with the spring l, 1 / D(i, l) is replaced by w_ij, where s is a
+ * third of the area of the edge's triangles:
  *
- *     w_ij = 4 (R^2 / mean area) s / h^2      s: a third of the area of the edge's triangles
+ *     w_ij = 4 (R^2 / mean area) s / h^2
  *
- * The stiffness then scales the force instead of the links, as the expandability a = 1/E, so that
- * the matrix depends on the geometry alone:
+ * The stiffness then acts on the force instead of the links, by the expandability a = 1/E. The
+ * matrix depends on the geometry alone:
  *
  *     area_i F_i + sum over edges ij of (w_ij / 2) (F_i - F_j) = area_i a_i f_i
  *
@@ -37,8 +40,8 @@
  * The sum of area_i F_i equals the sum of area_i a_i f_i.
  *
  * [Santhanam2008] A. P. Santhanam, C. Imielinska, P. Davenport, P. Kupelian, J. P. Rolland,
- * "Modeling Real-Time 3-D Lung Deformations for Medical Visualization", IEEE Trans. Inf.
- * Technol. Biomed. 12(2), 2008. */
+ * "Modeling Real-Time 3-D Lung Deformations for Medical Visualization", IEEE Trans. Inf. Technol.
+ * Biomed. 12(2), 2008. */
 #ifndef SUPINE_EQUILIBRIUM_H
 #define SUPINE_EQUILIBRIUM_H
 
@@ -50,8 +53,8 @@ typedef struct supine_equilibrium supine_equilibrium;
 /** Assemble the matrix of a surface with a stiffness of 1 everywhere.
  * @param mesh      [N] vertices in mm
  * @param topology  edges of the mesh; must outlive the equilibrium
- * @param reach     R in mm; 0: the paper's transfer
- * @param lesions   [N] factors on the normalised stiffness, copied; NULL: 1
+ * @param reach     R in mm, or 0 for the paper's transfer
+ * @param lesions   [N] factors on the normalised stiffness, or NULL; copied
  * @param equilibrium  written; release with supine_physics_equilibrium_destroy
  * @retval SUPINE_ERROR_MEMORY
  * @retval SUPINE_ERROR_UNSUPPORTED  CHOLMOD is not installed */
@@ -62,15 +65,16 @@ supine_status supine_physics_equilibrium_create(const supine_mesh *mesh,
                                                 supine_error *error);
 void supine_physics_equilibrium_destroy(supine_equilibrium *equilibrium);
 
-/** Update an equilibrium for moved vertices, a reach and a stiffness; faster than a new one.
- * @param reach  mm; above 0 only if it was above 0 at creation
+/** Update an equilibrium for moved vertices, a reach and a stiffness. This is faster than creating
+ * a new one.
+ * @param reach  mm; may be above 0 only if it was above 0 at creation
  * Statuses as supine_physics_equilibrium_set_stiffness. */
 supine_status supine_physics_equilibrium_set_shape(supine_equilibrium *equilibrium,
                                                    const supine_mesh *mesh, double reach,
                                                    const double *stiffness, supine_error *error);
 
 /** Set the stiffness. Without a reach this changes the matrix, which is then factorised again.
- * @param stiffness  [N] E > 0, relative: scaled to geometric mean 1; NULL: 1 everywhere
+ * @param stiffness  [N] E > 0, which is scaled to a geometric mean of 1; NULL for 1 everywhere
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */
 supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equilibrium,
                                                        const double *stiffness,
@@ -79,7 +83,7 @@ supine_status supine_physics_equilibrium_set_stiffness(supine_equilibrium *equil
 /** Solve for the catch F of `count` applied forces. The first solve factorises the matrix; the
  * factor takes about 40 N log2 N bytes and is kept for the next solve. The factor of a lung of more
  * than 100000 vertices is not kept: solve for all forces in one call.
- * @param force     [N, count] f on the masses (nothing is applied to springs)
+ * @param force     [N, count] f on the masses; no force is applied to springs
  * @param catch_    [N, count] F, written; may be `force`
  * @retval SUPINE_ERROR_MEMORY
  * @retval SUPINE_ERROR_NUMERICAL  a force that is not finite, or a relative residual above 1e-8 */
@@ -93,21 +97,22 @@ supine_status supine_physics_equilibrium_force(supine_equilibrium *equilibrium,
                                                const double *catch_, double *force,
                                                supine_error *error);
 
-/** Compute column `vertex` of the transfer matrix T of (2): the response F [N] to a unit force
- * on that vertex alone.
+/** Compute column `vertex` of the transfer matrix T of (2): the response F [N] to a unit force on
+ * that vertex alone.
  * @retval SUPINE_ERROR_ARGUMENT  no such vertex */
 supine_status supine_physics_transfer_column(supine_equilibrium *equilibrium, size_t vertex,
                                              double *column, supine_error *error);
 
-/** Run the Pitcher/Catcher iteration of the paper: the node with the largest Pitcher (force still
- * to be passed on) distributes it over its clique, until no Pitcher exceeds `tolerance` times the
- * largest |f|. It is slow; tests compare supine_physics_equilibrium_solve without a reach with it.
+/** Run the Pitcher/Catcher iteration of the paper. A node's Pitcher is the force that it has yet to
+ * pass on. In each step, the node with the largest Pitcher distributes it over its clique. The
+ * iteration ends when no Pitcher exceeds `tolerance` times the largest |f|. It is slow; tests
+ * compare it with supine_physics_equilibrium_solve without a reach.
  *
- * @param stiffness  [N] E > 0, relative: scaled to geometric mean 1; NULL: 1 everywhere
+ * @param stiffness  [N] E > 0, which is scaled to a geometric mean of 1; NULL for 1 everywhere
  * @param force      [N] f
  * @param masses     [N] F of the masses, written
- * @param progress   called at the beginning and after every N distributions, with their number so
- *   far and the sum of |Pitcher| over all nodes divided by the sum of |f|; may be NULL
+ * @param progress   called at the beginning and after every N steps, with the number of steps and
+ *   the sum of |Pitcher| over all nodes divided by the sum of |f|; may be NULL
  * @param tolerance  above 0
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive
  * @retval SUPINE_ERROR_MEMORY */
@@ -118,7 +123,8 @@ supine_physics_pitcher_catcher(const supine_mesh *mesh, const supine_topology *t
                                void (*progress)(void *context, size_t steps, double remaining),
                                void *context, supine_error *error);
 
-/** Scale a stiffness [N] to geometric mean 1, into scaled [N]; a stiffness of NULL gives 1.
+/** Scale a stiffness [count] to a geometric mean of 1, into scaled [count]. If `stiffness` is NULL,
+ * write 1.
  * @retval SUPINE_ERROR_ARGUMENT  a stiffness that is not positive and finite (vertex named) */
 supine_status supine_physics_stiffness_normalise(size_t count, const double *stiffness,
                                                  double *scaled, supine_error *error);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the applied force (18) for any direction of gravity, and the directions of displacement
- * (15)-(17). */
+/* Compute the applied force (18) and the directions of displacement (15)-(17). */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -16,7 +15,7 @@ typedef struct force_work {
   const supine_lungs *lungs;
   const supine_force_law *law;
   const supine_gravities *gravities;
-  const size_t *vertices; /* indices; NULL: all vertices */
+  const size_t *vertices; /* indices, or NULL for all vertices */
   double middle[3];       /* mean position of all vertices, mm; computed only with softening */
   double *force;
 } force_work;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the range of g.p over all vertices p for many directions g: the min and max in (18). */
+/* Find the range of heights g.p of all vertices p for many directions g: min and max in (18). */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -9,11 +9,10 @@
 #include "precompute/physics/force.h"
 #include "sh/base/clones.h"
 #include "sh/base/parallel.h"
-#include "sh/base/vec3.h"
 
-/* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells and divided into
- * blocks of BLOCK neighbours, and blocks into groups of GROUP. Bounding boxes of blocks and groups
- * let the search skip most of them. LANES directions are searched together. */
+/* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells. BLOCK consecutive
+ * vertices form a block, and GROUP blocks a group. The search skips blocks and groups whose
+ * bounding boxes are too low. LANES directions are searched together. */
 enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS), LANES = 8 };
 
 typedef struct block_box {
@@ -22,8 +21,8 @@ typedef struct block_box {
 } block_box;
 
 typedef struct range_work {
-  size_t count;            /* number of vertices */
-  const double *vertices;  /* [count, 3] sorted along the curve, mm */
+  size_t vertex_count;
+  const double *vertices;  /* [vertex_count, 3] sorted along the curve, mm */
   const block_box *boxes;  /* [box_count] boxes of the blocks */
   const block_box *groups; /* boxes of GROUP blocks each */
   size_t box_count;
@@ -32,12 +31,11 @@ typedef struct range_work {
   double *minimum, *maximum;
 } range_work;
 
-/* LANES directions g, the absolute values of their components, and the greatest height g.p along
- * each that was found so far, mm. */
+/* LANES directions of gravity. */
 typedef struct lanes {
-  double g[3][LANES];
-  double size[3][LANES];
-  double best[LANES];
+  double g[3][LANES];    /* unit vectors */
+  double size[3][LANES]; /* absolute value of each component of g */
+  double best[LANES];    /* greatest height g.p found so far, mm */
 } lanes;
 
 static block_box box_of(const double *vertices, size_t count) {
@@ -72,7 +70,8 @@ static inline bool may_improve(const block_box *box, const lanes *at) {
 
 /* Raise the best height of each lane to the greatest height of a block's vertices. */
 static inline void raise_best(const range_work *work, size_t block, lanes *at) {
-  const size_t end = (block + 1) * BLOCK < work->count ? (block + 1) * BLOCK : work->count;
+  const size_t end =
+      (block + 1) * BLOCK < work->vertex_count ? (block + 1) * BLOCK : work->vertex_count;
   for (size_t i = block * BLOCK; i < end; ++i) {
     const double x = work->vertices[3 * i];
     const double y = work->vertices[3 * i + 1];
@@ -85,7 +84,7 @@ static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   }
 }
 
-/* Find the greatest heights, beginning in block `seed`. Return the last block searched, which is a
+/* Find the greatest heights. Search block `seed` first; return the block searched last, which is a
  * good seed for similar directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
   raise_best(work, seed, at);
@@ -127,7 +126,7 @@ SUPINE_CLONES static void height_range(void *context, size_t begin, size_t end, 
   }
 }
 
-/* Return the number, along the Morton curve, of the cell that holds a vertex. */
+/* Return the index along the Morton curve of the cell that holds a vertex. */
 static size_t cell_of(const block_box *box, const double *p) {
   size_t cell = 0;
   for (size_t k = 0; k < 3; ++k) {
@@ -140,8 +139,8 @@ static size_t cell_of(const block_box *box, const double *p) {
   return cell;
 }
 
-/* Sort the vertices along the Morton curve by counting sort, into sorted [count, 3]. begin
- * [CELLS + 1] is work space, zero on entry. */
+/* Sort the vertices along the Morton curve by counting sort, into sorted [count, 3]. begin [CELLS +
+ * 1] is work space and must be zero. */
 static void sort_vertices(const double *vertices, size_t count, size_t *begin, double *sorted) {
   const block_box box = box_of(vertices, count);
   for (size_t i = 0; i < count; ++i) {

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Move a scan to full inflation: solve p = image(p), the fixed-point equation of reference.h, with
- * image_j(p) = scan_j - A_j F(g; p) d_j(p), by Anderson acceleration (D. G. Anderson, J. ACM 12,
- * 1965). The next p is the combination of the last images with the smallest residual, image - p. */
+/* Move a scan to full inflation. The surface p at full inflation is the fixed point of the image
+ * scan_j - A_j F(g; p) d_j(p), as reference.h explains. It is found by Anderson acceleration (D. G.
+ * Anderson, J. ACM 12, 1965): the next p is the combination of the last images with the smallest
+ * residual, image - p. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <gsl/gsl_linalg.h>
 
-#include "sh/base/vec3.h"
 #include <supine/volume.h>
 
 #include "precompute/physics/reference.h"
@@ -22,25 +22,25 @@ enum { SOLVES_MAX = 30, DEPTH = 4 };
 static const double converged = 5e-4;
 static const double stalled = 5e-3;
 static const double folded_share = 0.01; /* largest share of folded triangles in a valid surface */
-static const double ridge = 1e-12;       /* relative regularisation, for equal residuals */
+static const double ridge = 1e-12; /* relative regularisation, needed if residuals are equal */
 
 typedef struct ascent {
   supine_lungs lungs; /* current estimate; the caller owns its vertices */
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
-  supine_solution field;  /* solution for the current estimate */
-  size_t size;            /* number of coordinates, 3 N */
-  double *image;          /* [size] image of the current estimate, mm */
-  double *last;           /* [size] the previous image, mm */
-  double *residual;       /* [size] the previous residual, mm */
-  double rms;             /* RMS residual of the current estimate, mm */
-  double *images;         /* [DEPTH, size] differences of successive images */
-  double *residuals;      /* [DEPTH, size] differences of successive residuals */
-  size_t stored, history; /* numbers of differences stored so far and in use */
+  supine_solution field;     /* solution for the current estimate */
+  size_t size;               /* 3 N */
+  double *image;             /* [size] image of the current estimate, mm */
+  double *previous_image;    /* [size] mm */
+  double *previous_residual; /* [size] mm */
+  double rms;                /* RMS residual of the current estimate, mm */
+  double *image_changes;     /* [DEPTH, size] differences of successive images, mm */
+  double *residual_changes;  /* [DEPTH, size] mm */
+  size_t stored, history;    /* number of changes stored so far, and number in use */
 } ascent;
 
-/* Return an error if too many triangles turn over between the scan and full inflation. */
+/* Check that few triangles turn over between the scan and full inflation. */
 static supine_status check_folds(const ascent *a, supine_error *error) {
   const double share = supine_mesh_turned_over(&a->scan.mesh, a->lungs.mesh.vertices);
   return share <= folded_share
@@ -53,16 +53,17 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
                                 100.0 * share);
 }
 
-/* Find the gains A = s (sigma + 2 bend e(sigma)) of one lung's scan, on the path from full
- * inflation (sigma 0) to rest (sigma 1, gains s; supine/volume.h). Two volumes determine s and
- * sigma: applied to the scan, gains -A add `to_full` mL and lead to full inflation; gains s - A add
- * `to_rest` mL and lead to rest. `to_full` gives s for each sigma; secant steps find sigma.
+/* Find the gains A of one lung in the scan. On the path from full inflation (sigma 0) to rest
+ * (sigma 1) of supine/volume.h, gains are s (sigma + 2 bend e(sigma)). Two volumes determine the
+ * scan's sigma and s: gains -A, applied to the scan, add `to_full` mL and lead to full inflation;
+ * gains s - A add `to_rest` mL and lead to rest. For any sigma, `to_full` gives s. Secant steps
+ * find the sigma that satisfies `to_rest`.
  * @param form  volume form of the field applied to the scan */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],
                                      supine_error *error) {
   enum { STEPS = 50 };
-  static const double tolerance = 1e-9; /* largest error of the volume, mL */
+  static const double tolerance = 1e-9; /* largest accepted error of the volume, mL */
   const bool straight = at_rest || (bend[0] == 0.0 && bend[1] == 0.0 && bend[2] == 0.0);
   double sigma = straight ? 1.0 : to_full / (to_full - to_rest);
   double last_sigma = 0.0;
@@ -148,17 +149,17 @@ static double product(const double *a, const double *b, size_t size) {
   return sum;
 }
 
-/* Store the image and residual, and their differences from the previous ones. */
+/* Store the image and the residual, and their changes since the previous step. */
 static void store_differences(ascent *a) {
-  double *images = a->images + a->stored % DEPTH * a->size;
-  double *residuals = a->residuals + a->stored % DEPTH * a->size;
+  double *images = a->image_changes + a->stored % DEPTH * a->size;
+  double *residuals = a->residual_changes + a->stored % DEPTH * a->size;
   const bool first = a->found->solves == 1;
   for (size_t i = 0; i < a->size; ++i) {
     const double residual = a->image[i] - a->lungs.mesh.vertices[i];
-    images[i] = a->image[i] - a->last[i];
-    residuals[i] = residual - a->residual[i];
-    a->last[i] = a->image[i];
-    a->residual[i] = residual;
+    images[i] = a->image[i] - a->previous_image[i];
+    residuals[i] = residual - a->previous_residual[i];
+    a->previous_image[i] = a->image[i];
+    a->previous_residual[i] = residual;
   }
   if (!first) {
     ++a->stored;
@@ -166,16 +167,17 @@ static void store_differences(ascent *a) {
   }
 }
 
-/* Replace the estimate by the combination of images with the smallest residual. */
+/* Replace the estimate by the combination of images whose residual is smallest. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
   const size_t n = a->history;
   for (size_t j = 0; j < n; ++j) {
-    const double *r = a->residuals + j * a->size;
-    weights[j] = product(r, a->residual, a->size);
+    const double *r = a->residual_changes + j * a->size;
+    weights[j] = product(r, a->previous_residual, a->size);
     for (size_t k = 0; k <= j; ++k) {
-      matrix[j * n + k] = matrix[k * n + j] = product(r, a->residuals + k * a->size, a->size);
+      matrix[j * n + k] = matrix[k * n + j] =
+          product(r, a->residual_changes + k * a->size, a->size);
     }
     matrix[j * n + j] *= 1.0 + ridge;
   }
@@ -193,7 +195,7 @@ static supine_status advance(ascent *a, supine_error *error) {
   double *to = a->lungs.mesh.vertices;
   memcpy(to, a->image, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {
-    const double *image = a->images + j * a->size;
+    const double *image = a->image_changes + j * a->size;
     for (size_t i = 0; i < a->size; ++i) {
       to[i] -= weights[j] * image[i];
     }
@@ -218,7 +220,7 @@ static supine_status iterate(ascent *a, supine_error *error) {
       /* The step was too long: restart from the last image. */
       a->history = 0;
       a->stored = 0;
-      memcpy(a->lungs.mesh.vertices, a->last, a->size * sizeof(double));
+      memcpy(a->lungs.mesh.vertices, a->previous_image, a->size * sizeof(double));
       status = SUPINE_OK;
     }
   }
@@ -241,15 +243,15 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
               .size = 3 * lungs->mesh.vertex_count};
   const size_t bytes = a.size * sizeof(double);
   supine_status status = SUPINE_OK;
-  a.model.share[0] = a.model.share[1] = 1.0; /* collapse scales the field after the solve */
+  a.model.share[0] = a.model.share[1] = 1.0; /* healthy lungs; collapse scales the finished field */
   a.scan.mesh.vertices = malloc(bytes);
   a.image = malloc(bytes);
-  a.last = calloc(a.size, sizeof *a.last);
-  a.residual = calloc(a.size, sizeof *a.residual);
-  a.images = malloc(DEPTH * bytes);
-  a.residuals = malloc(DEPTH * bytes);
-  if (a.scan.mesh.vertices == NULL || a.image == NULL || a.last == NULL || a.residual == NULL ||
-      a.images == NULL || a.residuals == NULL) {
+  a.previous_image = calloc(a.size, sizeof *a.previous_image);
+  a.previous_residual = calloc(a.size, sizeof *a.previous_residual);
+  a.image_changes = malloc(DEPTH * bytes);
+  a.residual_changes = malloc(DEPTH * bytes);
+  if (a.scan.mesh.vertices == NULL || a.image == NULL || a.previous_image == NULL ||
+      a.previous_residual == NULL || a.image_changes == NULL || a.residual_changes == NULL) {
     status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu vertices", a.size / 3);
     goto cleanup;
   }
@@ -268,9 +270,9 @@ cleanup:
   supine_physics_solution_free(&a.field);
   free(a.scan.mesh.vertices);
   free(a.image);
-  free(a.last);
-  free(a.residual);
-  free(a.images);
-  free(a.residuals);
+  free(a.previous_image);
+  free(a.previous_residual);
+  free(a.image_changes);
+  free(a.residual_changes);
   return status;
 }

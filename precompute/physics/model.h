@@ -9,7 +9,7 @@
 
 /* clang-format off */
 /** The laws, one per row: identifier, name, base, gain, (cx, cy, cz), (c1, ..., c6), bend, reach in
- * mm (0: transfer over links, as in the paper), pair (supine_force_law), description for the user.
+ * mm (0 for the paper's transfer over links), pair (supine_force_law), description for the user.
  *
  * The paper's constants (Table I) are not available: c1..c6 of `paper` are fits to 4-D CT landmarks
  * of ten patients (DIR-Lab), c1..c6 of `deep` to the full breaths of ten others (DIR-Lab COPDgene).
@@ -41,14 +41,13 @@ typedef enum supine_law {
 
 /** The physical model of a basis or a solve, without the geometry. The caller owns the arrays. */
 typedef struct supine_model {
-  supine_law law; /**< source of the constants */
+  supine_law law;
   supine_force_law force;
   supine_direction_law direction;
   double bend[3];          /**< bend of the path from full inflation to rest (supine/volume.h) */
-  const double *stiffness; /**< [N] stiffness E; NULL: 1 everywhere */
-  const double *lesions;   /**< [N] factors on the normalised E (disease.h); NULL: 1 */
-  double reach;            /**< R of equilibrium.h, mm, at most half the diagonal of the lungs' box;
-                                0: the paper's transfer over links */
+  const double *stiffness; /**< [N] stiffness E, or NULL for 1 everywhere */
+  const double *lesions;   /**< [N] factors on the normalised E (disease.h), or NULL */
+  double reach; /**< mm, at most half the diagonal of the lungs' box; 0 for the paper's transfer */
   double share[2]; /**< volume and breath of each lung relative to healthy; 1 unless collapsed */
 } supine_model;
 
@@ -60,12 +59,11 @@ extern const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1];
 
 /** Set up the equilibrium of lungs with the model's stiffness, lesions and reach.
  * @param lungs        must outlive the equilibrium
- * @param equilibrium  points to NULL, replaced by a new equilibrium, which the caller destroys; or
- *                     to an equilibrium of the same lungs, which is updated for moved vertices
- * @retval SUPINE_ERROR_ARGUMENT  softening without a reach: the paper's transfer depends on the
- *                                stiffness, so it would change with gravity
- * Other statuses as supine_physics_equilibrium_create and supine_physics_equilibrium_set_stiffness
- */
+ * @param equilibrium  in: points to NULL, or to an equilibrium of the same lungs, which is updated
+ *                     for moved vertices; out: the equilibrium, which the caller destroys
+ * @retval SUPINE_ERROR_ARGUMENT  softening without a reach: the matrix would change with gravity
+ * Other statuses as supine_physics_equilibrium_create and
+ * supine_physics_equilibrium_set_stiffness */
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,
                                                supine_error *error);

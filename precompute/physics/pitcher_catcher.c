@@ -8,14 +8,14 @@
 /* State of the iteration. Nodes 0 to N - 1 are the masses; node N + e is the spring of edge e. */
 typedef struct iteration {
   size_t node_count;
-  size_t *clique_begin; /* [nodes + 2] index in `clique` of the first neighbour of a node */
-  size_t *clique;       /* neighbours of each node, without itself */
-  double *te;           /* Te[j->i] from each node j to each neighbour i, as ordered in `clique` */
-  double *te_self;      /* [nodes] Te[j->j] */
-  double *pitcher;      /* [nodes] force still to be distributed; may be negative */
-  double *catcher;      /* [nodes] force kept so far */
-  size_t *largest; /* [2 nodes] tree: entry nodes + j is node j; every other entry k is the node
-                      of entries 2 k and 2 k + 1 with the larger |pitcher|; 1 is the root */
+  size_t *clique_begin; /* [nodes + 2] index in `clique` of each node's first neighbour */
+  size_t *clique;       /* neighbours of each node */
+  double *te;      /* Te[j->i] from each node j to each neighbour i, in the order of `clique` */
+  double *te_self; /* [nodes] Te[j->j] */
+  double *pitcher; /* [nodes] force that is yet to be distributed; may be negative */
+  double *catcher; /* [nodes] force kept so far */
+  size_t *largest; /* [2 nodes] binary tree of nodes with the root 1. Leaf nodes + j is node j;
+                      entry k is the entry of 2 k and 2 k + 1 with the larger |pitcher| */
 } iteration;
 
 static void iteration_free(iteration *it) {
@@ -54,7 +54,7 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
       it->pitcher == NULL || it->catcher == NULL || it->largest == NULL) {
     return false;
   }
-  /* Offset by one entry: filling the cliques advances each entry to the next node's beginning. */
+  /* Shifted by one entry, because filling the cliques advances begin[j] to the end of clique j. */
   size_t *begin = it->clique_begin + 1;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];

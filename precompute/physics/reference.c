@@ -1,10 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Find the reference volumes from the state of a scan, and move the lungs to full inflation. */
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "sh/base/vec3.h"
 #include <supine/volume.h>
 
 #include "precompute/physics/reference.h"

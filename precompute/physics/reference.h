@@ -24,7 +24,6 @@
 #include "precompute/physics/model.h"
 #include "precompute/physics/resting.h"
 
-/** The state that a scan shows. */
 typedef struct supine_scan {
   bool known;         /**< whether the state is known; if not, the scan is the reference surface */
   supine_state state; /**< rest or full inflation, with a difference in mL */
@@ -41,17 +40,17 @@ typedef struct supine_scan_frame {
   double millimetres_per_unit;
 } supine_scan_frame;
 
-/** Volumes of each lung without disease, gas and tissue, in mL, and the gains of the scan. */
+/** Volumes of gas and tissue of each lung, mL, without disease, and the gains of the scan. */
 typedef struct supine_reference {
   bool known; /**< whether rest is known; if not, volumes are relative to the scan */
   supine_scan scan;
-  supine_resting resting; /**< volumes at rest, all as shares of full_volume */
+  supine_resting resting; /**< volumes at rest as shares of full_volume */
   size_t lung_count;
-  int side[2];             /**< +1 left, -1 right */
-  double full_volume[2];   /**< F, volume of the reference surface */
-  double scan_volume[2];   /**< volume of the scan minus F: negative below full inflation */
-  double scan_rest[2];     /**< volume at rest in the scan's posture; 0 if the scan is full */
-  double scan_gains[2][3]; /**< gains A of each lung in the scan */
+  int side[2];           /**< +1 left, -1 right */
+  double full_volume[2]; /**< F, volume of the reference surface */
+  double scan_volume[2]; /**< volume of the scan minus full_volume; negative below full inflation */
+  double scan_rest[2];   /**< volume at rest in the scan's posture; 0 if the scan is full */
+  double scan_gains[2][3]; /**< gains of each lung in the scan */
   size_t solves;           /**< number of solves to reach the fixed point */
 } supine_reference;
 
@@ -64,14 +63,15 @@ supine_status supine_reference_find(supine_lungs *lungs, const supine_model *mod
                                     const supine_scan *scan, const supine_resting *resting,
                                     supine_reference *reference, supine_error *error);
 
-/** Compute the volume of each lung at rest into ml [lung_count], with gravity along the unit vector
- * g. Return their sum. */
+/** Compute the volume of each lung at rest into ml [lung_count]. g is the direction of gravity.
+ * Return the sum. */
 double supine_reference_rest(const supine_reference *reference, const double g[3], double *ml);
 
 /** Compute the volume of each lung at full inflation into ml [lung_count]. Return their sum. */
 double supine_reference_full(const supine_reference *reference, const double g[3], double *ml);
 
-/** Divide `total` mL between the lungs, with one t for all (resting.h), into ml [lung_count]. */
+/** Divide `total` mL between the lungs, which have the same t of resting.h, into ml
+ * [lung_count]. */
 void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
                                 double *ml);
 
@@ -95,13 +95,12 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
 typedef enum supine_sex { SUPINE_SEX_UNKNOWN = 0, SUPINE_SEX_FEMALE, SUPINE_SEX_MALE } supine_sex;
 
 typedef struct supine_person {
-  double height; /**< cm; 0: not given */
+  double height; /**< cm, or 0 if unknown */
   supine_sex sex;
 } supine_person;
 
-/** Estimate the volume of both lungs at full inflation, supine, gas and tissue, in mL, as range
- * [2]: smallest and largest of usual adults if height or sex is unknown, otherwise one value twice.
- */
+/** Estimate the smallest and the largest volume, mL of gas and tissue, that both lungs of usual
+ * adults have at full inflation, supine. If height and sex are known, both values are equal. */
 void supine_reference_capacity(const supine_person *person, double range[2]);
 
 /** Append the full volume, in mL, that is expected of the lungs to text [size]: "expected 6500", or
@@ -111,7 +110,7 @@ void supine_reference_compare(const supine_reference *reference, const supine_pe
 
 /** Write a warning if the full volume is implausible for the person, or if the volume of a scan at
  * rest contradicts the volume given for rest.
- * @param given  volumes at rest as given, before supine_reference_resting_settle
+ * @param given  the user's volumes at rest, before supine_reference_resting_settle
  * @param text   [size] the warning; empty if there is none */
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,
                             const supine_resting *given, char *text, size_t size);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute volumes at rest and at full inflation as functions of gravity. */
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -168,7 +169,8 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
   return value;
 }
 
-/* With e_k = (v(+k) + v(-k)) / 2, their mean m and g = (x, y, z), the sum of e_k g_k^2 is
+/* Let e_k be the mean of the values along +k and -k, and m the mean of e_x, e_y and e_z. With g =
+ * (x, y, z), the sum of e_k g_k^2 is
  *
  *     m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) / 2 (x^2 - y^2)
  *

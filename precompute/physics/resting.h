@@ -12,7 +12,6 @@
 #ifndef SUPINE_RESTING_H
 #define SUPINE_RESTING_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include <supine/status.h>
@@ -28,7 +27,7 @@
  * supine, prone, head down, upright. */
 typedef struct supine_resting {
   double share[2][6]; /**< share r of the left and the right lung */
-  double ml[6];       /**< volume of both lungs together, mL; 0: given as a share */
+  double ml[6];       /**< volume of both lungs together, mL; 0 where a share was given */
 } supine_resting;
 
 /** Return the default shares, for healthy people; resting.c names their sources. */

@@ -13,7 +13,7 @@
 typedef struct supine_solution {
   size_t vertex_count;
   supine_equilibrium *equilibrium; /**< kept for the next solve of the same lungs */
-  double *catch_;                  /**< [N] the catch F */
+  double *catch_;                  /**< [N] F (equilibrium.h) */
   double *directions;              /**< [N, 3] d, mm; for collapsed lungs scaled by
                                       supine_tissue_collapse_directions */
   double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
@@ -21,8 +21,8 @@ typedef struct supine_solution {
 } supine_solution;
 
 /** Solve for gravity along the unit vector `g`.
- * @param solution  zero-initialised, or a solution of the same lungs, whose vertices may have
- *   moved: its memory is then reused. Empty after a failure; release with
+ * @param solution  zero-initialised, or an earlier solution of the same lungs, whose memory is then
+ *   reused; vertices may have moved. Empty after a failure. Release it with
  *   supine_physics_solution_free
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,

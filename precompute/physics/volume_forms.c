@@ -10,8 +10,8 @@
 #include "sh/base/vec3.h"
 
 /* The triangles of each lung are summed in PARTS parts, BLOCK triangles at a time. The number of
- * parts is fixed, so that the sums do not depend on the number of threads. FORM: number of terms of
- * a supine_volume_form. */
+ * parts is fixed, so that the sums do not depend on the number of threads. A supine_volume_form has
+ * FORM terms. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
 static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron, mL per mm^3 of determinant */
@@ -23,17 +23,16 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   *forms = (supine_volume_forms){0};
 }
 
-/* Inputs and sums of one lung. */
 typedef struct lung_work {
   const supine_lungs *lungs;
-  const double *directions; /* [N, 3] d, mm; NULL: the columns are vectors */
-  const double *columns;    /* [N, count]; without directions [N, 3, count] */
+  const double *directions; /* [N, 3] mm, or NULL if the columns are vectors */
+  const double *columns;    /* [N, count], or [N, 3, count] without directions */
   size_t count;             /* number of columns */
   size_t lung;
   double centre[3]; /* centre of the lungs' box, mm, subtracted from vertices */
   double *sums;     /* [PARTS, size] */
   size_t size;      /* number of sums of one part */
-  double *space;    /* [threads, room] work space */
+  double *space;    /* [threads, room] */
   size_t room;
 } lung_work;
 
@@ -58,13 +57,10 @@ static const uint32_t *read_corners(const lung_work *work, size_t triangle, doub
   return corner;
 }
 
-/* Return the first triangle of a part. */
 static size_t part_begin(const lung_work *work, size_t part) {
   const size_t *begin = work->lungs->triangle_begin + work->lung;
   return begin[0] + (begin[1] - begin[0]) * part / PARTS;
 }
-
-/* --- forms of columns ------------------------------------------------------------------------ */
 
 /* Return the index of the product of columns k and l among the distinct products. */
 static size_t pair_of(size_t k, size_t l) {
@@ -83,9 +79,9 @@ static void add_pairs(size_t count, double factor, const double *a, const double
   }
 }
 
-/* Add the cubic terms of n triangles to sums [pairs, count]: det(u0, u1, u2) of the displacements
- * of their corners, made symmetric in the columns of the first two. With directions d and columns c
- * the determinant is det(d0, d1, d2) c0 c1 c2. x: work space. */
+/* Add the cubic terms of n triangles to sums [pairs, count]. The term of a triangle is det(u0, u1,
+ * u2) of its corners' displacements, made symmetric in the columns of corners 0 and 1. With
+ * directions d and columns c it is det(d0, d1, d2) c0 c1 c2. x is work space. */
 SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
                                     double *x, double *sums) {
   const size_t count = work->count;
@@ -119,9 +115,9 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
 }
 
 /* Add the terms of det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK, with corners p and
- * their displacements u, to separate sums for each power of u and each axis: linear terms by the
- * axis of u, quadratic terms by the axis of p. The rows of u, area and at are the first corners of
- * the n triangles, then the second, then the third. */
+ * their displacements u. Linear terms have a sum for each axis of u, quadratic terms one for each
+ * axis of p. In u, area and at, the first corners of all n triangles precede the second corners,
+ * and these precede the third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;
@@ -183,8 +179,7 @@ static void forms_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Add the sums of all parts, times `unit`, to the forms of one lung, and make the forms symmetric.
- */
+/* Add the sums of all parts, times `unit`, to the forms of one lung. Make the forms symmetric. */
 static void forms_collect(const lung_work *work, double unit, supine_volume_forms *forms) {
   const size_t n = work->count;
   double *linear = forms->linear + 3 * work->lung * n;
@@ -245,8 +240,6 @@ supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, cons
   free(space);
   return status;
 }
-
-/* --- forms of fields ------------------------------------------------------------------------- */
 
 SUPINE_CLONES static void fields_range(void *context, size_t begin, size_t end, size_t thread) {
   const lung_work *work = context;
@@ -311,8 +304,6 @@ void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *sh
     }
   }
 }
-
-/* --- use of forms ---------------------------------------------------------------------------- */
 
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form) {

@@ -20,15 +20,15 @@ typedef struct supine_volume_forms {
   size_t lung_count;
   size_t column_count;
   double *linear;    /**< [G, 3, K] */
-  double *quadratic; /**< [G, 3, K, K] symmetric in the last two */
+  double *quadratic; /**< [G, 3, K, K] symmetric in the last two indices */
   double *cubic;     /**< [G, K, K, K] symmetric */
 } supine_volume_forms;
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
 /** Compute the forms of closed lungs. Free them with supine_physics_volume_forms_free.
- * @param share       [G] volume of each lung relative to healthy (disease.h); NULL: 1
- * @param directions  [N, 3] d of the healthy shape, mm; NULL: the columns are vectors,
+ * @param share       [G] volume of each lung relative to healthy (disease.h), or NULL for 1
+ * @param directions  [N, 3] d of the healthy shape, mm; if NULL, the columns are vectors, and
  *                    u_ij = A_j sum over k of w_k c_ijk
  * @param columns     [N, count] c; without directions [N, 3, count]
  * Cost: count^3 / 2 multiplications per triangle, three times that without directions.
@@ -60,7 +60,7 @@ void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms,
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
-/** Add the coefficients of a form with one gain on all axes to cubic [3], mL. */
+/** Add a form with one gain s on all axes to the coefficients cubic [3] of s, s^2 and s^3, mL. */
 void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]);
 
 #endif

@@ -16,8 +16,9 @@
 #include "precompute/projection/projection.h"
 #include "precompute/projection/tally.h"
 
-/* BLOCK: vertices in a block. PARTS: parts into which sums are divided, a fixed number, so that
- * sums do not depend on the number of threads. VOLUME_HALVINGS: limit of halvings of a volume. */
+/* The vertices are divided into PARTS parts, which are evaluated BLOCK vertices at a time. The
+ * number of parts is fixed, so that sums do not depend on the number of threads. A volume is halved
+ * at most VOLUME_HALVINGS times. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
 /* Sums over one of the PARTS of the vertices. */
@@ -30,18 +31,19 @@ typedef struct tally {
 typedef struct accuracy_work {
   const supine_truth *truth;
   const supine_compression *compression;
-  const double *directions; /* [N, 3] directions of displacement, mm */
-  const double *weights;    /* [D, K] weights of the modes */
-  const double *scales; /* [D, 2] gains of the full solve and the compression; NULL: open surface */
-  tally *tallies;       /* [PARTS] */
-  double *space;        /* [threads, BLOCK, K + 2 D] work space */
+  const double *directions; /* [N, 3] mm */
+  const double *weights;    /* [D, K] */
+  const double *scales;     /* [D, 2] gains of the full solve and the compression */
+  tally *tallies;           /* [PARTS] */
+  double *space;            /* [threads, BLOCK, K + 2 D] */
 } accuracy_work;
 
-/* Compute errors of displacement, |a is - b should| length, mm; a and b are gains of the fields. */
-SUPINE_CLONES static void find_misses(size_t n, const double *is, const double *should,
+/* Compute the errors |a approximate - b exact| length, mm, of the displacement by a field with gain
+ * a, where the exact field has gain b. */
+SUPINE_CLONES static void find_errors(size_t n, const double *approximate, const double *exact,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {
-    out[i] = fabs(a * is[i] - b * should[i]) * length[i];
+    out[i] = fabs(a * approximate[i] - b * exact[i]) * length[i];
   }
 }
 
@@ -52,10 +54,10 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
   const int count = (int)truth->direction_count;
   const size_t modes = work->compression->mode_count;
   double *coefficients = space;
-  double *is = coefficients + modes * BLOCK; /* [D, n] */
-  double *should = is + truth->direction_count * BLOCK;
+  double *approximate = coefficients + modes * BLOCK; /* [D, n] */
+  double *exact = approximate + truth->direction_count * BLOCK;
   double length[BLOCK];
-  double misses[BLOCK];
+  double errors[BLOCK];
   for (size_t i = 0; i < n; ++i) {
     length[i] = supine_length(work->directions + 3 * (begin + i));
   }
@@ -63,18 +65,19 @@ static void compare_block(const accuracy_work *work, size_t begin, size_t n, dou
     coefficients[i] = (double)work->compression->coefficients[begin * modes + i];
   }
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)n, (int)modes, 1.0,
-              work->weights, (int)modes, coefficients, (int)modes, 0.0, is, (int)n);
+              work->weights, (int)modes, coefficients, (int)modes, 0.0, approximate, (int)n);
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, count, (int)n, rank, 1.0, truth->functions,
-              rank, truth->columns + begin * truth->rank, rank, 0.0, should, (int)n);
-  for (size_t d = 0; d < truth->direction_count; ++d, is += n, should += n) {
+              rank, truth->columns + begin * truth->rank, rank, 0.0, exact, (int)n);
+  for (size_t d = 0; d < truth->direction_count; ++d, approximate += n, exact += n) {
     for (size_t i = 0; i < n; ++i) {
-      const double field = should[i] * length[i];
+      const double field = exact[i] * length[i];
       sums->field2 += field * field;
     }
-    find_misses(n, is, should, length, 1.0, 1.0, misses);
-    supine_accuracy_tally_add(&sums->error, n, misses);
-    find_misses(n, is, should, length, work->scales[2 * d + 1], work->scales[2 * d], misses);
-    supine_accuracy_tally_add(&sums->error_mm, n, misses);
+    find_errors(n, approximate, exact, length, 1.0, 1.0, errors);
+    supine_accuracy_tally_add(&sums->error, n, errors);
+    find_errors(n, approximate, exact, length, work->scales[2 * d + 1], work->scales[2 * d],
+                errors);
+    supine_accuracy_tally_add(&sums->error_mm, n, errors);
   }
 }
 
@@ -92,7 +95,7 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
 }
 
 /* Find the gains at which the full solve and the compression each reach `part` times the volumes
- * [D]; return false if either cannot reach them in some direction. */
+ * [D]. Return false if either does not reach its volume in some direction. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
                         const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {
@@ -118,9 +121,7 @@ static double volume_along(const double harmonics[9], const double g[3]) {
   return volume;
 }
 
-/* Find the gains at which the full solve and the compression each reach the volumes [D] times the
- * largest part, 1, 1/2, 1/4, ..., that is reached in every direction. Return that part; 0 if there
- * is none. */
+/* Return the first of the parts 1, 1/2, 1/4, ... for which find_scales succeeds, or 0 if none. */
 static double find_part(const accuracy_work *work, const supine_volume_forms *forms,
                         const double *volumes, double *scales) {
   double part = 1.0;

@@ -14,24 +14,25 @@
 /** Errors of displacement over all vertices and held-out directions. */
 typedef struct supine_accuracy {
   size_t direction_count;
-  double relative_rms, relative_p95,
-      relative_max; /**< errors as fractions of the RMS displacement, for equal gains */
-  /** Fraction, 0 to 1, of the requested volume at which the errors in mm were measured; if rest is
-   * unknown, supine_precompute replaces it by that volume in mL. 0: the surface is open, and there
-   * are no errors in mm. */
+  /** Errors at equal gains, as fractions of the RMS displacement. */
+  double relative_rms, relative_p95, relative_max;
+  /** Errors at equal volumes, mm; for fields of another simulator, at the given displacements. */
+  double rms_mm, p95_mm, max_mm;
+  /** Fraction of the requested volume at which the errors in mm were measured. If rest is unknown,
+   * supine_precompute replaces the fraction by the volume in mL. 0 for fields of another simulator,
+   * whose errors are not measured at a volume. */
   double volume;
-  double rms_mm, p95_mm, max_mm; /**< errors at equal volumes */
 } supine_accuracy;
 
-/** The full solve at D held-out directions, which no grid used: the fields columns x functions^T,
- * exact up to the tolerance of the projection's span. */
+/** The full solve at D held-out directions, which no grid used. The fields are columns x
+ * functions^T, exact up to the tolerance of span.c. */
 typedef struct supine_truth {
   size_t direction_count;
   double *directions; /**< [D, 3] unit vectors */
   size_t rank;
   const double *columns; /**< [N, rank] owned by the projection */
   double *functions;     /**< [D, rank] weights of the columns */
-  double *cubic;         /**< [D, 3] volume, mL, as a cubic of the gain; NULL: open surface */
+  double *cubic;         /**< [D, 3] volume, mL, as a cubic of the gain */
 } supine_truth;
 
 /** Find the full solve at `count` held-out directions. The projection must outlive `truth`.
@@ -44,15 +45,14 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                            supine_truth *truth, supine_error *error);
 void supine_accuracy_truth_free(supine_truth *truth);
 
-/** Spread `count` directions [count, 3] evenly on the sphere along a golden-angle spiral; none is a
- * node of a product grid. */
+/** Spread directions [count, 3] evenly along a golden-angle spiral that avoids the grid's nodes. */
 void supine_accuracy_held_out_directions(size_t count, double *directions);
 
 /** Measure the error. The 95th percentiles come from a histogram whose bins are at most 0.4 % wide.
  * @param directions  [N, 3] directions of displacement, mm
- * @param forms       volume forms of the compression; NULL: open surface
- * @param volume      [9] harmonics of the volume for the errors in mm, mL beyond the reference
- *             surface; it is halved until the field reaches it in every direction
+ * @param forms       volume forms of the compression
+ * @param volume      [9] harmonics of the volume at which errors in mm are measured, mL beyond the
+ *             reference surface; halved until the field reaches it in every direction
  * @retval SUPINE_ERROR_NUMERICAL  not even a thousandth of the volume is reached
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
@@ -61,12 +61,12 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error);
 
-/** Find the share, 0 to 1, of the triangles whose normal turns by more than a right angle from the
- * reference surface to a volume. The share is the largest in the six postures with gravity along an
- * axis; a posture in which the field cannot reach the volume is left out. Up to 50,000 evenly
- * chosen triangles are examined. Above a few in a thousand the surface looks torn.
+/** Find the share, 0 to 1, of triangles whose normal turns by more than a right angle between the
+ * reference surface and a volume. It is the largest share in the six postures with gravity along an
+ * axis. Postures in which the field cannot reach the volume are left out. Up to 50,000 evenly
+ * chosen triangles are examined. Above a few in a thousand, the surface looks torn.
  * @param directions  [N, 3] directions of displacement, mm
- * @param forms       volume forms of the compression; the surface must be closed
+ * @param forms       volume forms of the compression
  * @param volume      [9] harmonics of the state's volume, mL beyond the reference surface
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
@@ -76,9 +76,9 @@ supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const doubl
 
 /** Relative RMS errors at the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
-  size_t band_count;                        /**< number of bands, L + 1 */
+  size_t band_count;                        /**< L + 1 */
   double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [L + 1] error with the first (l + 1)^2 harmonics */
-  size_t mode_count;                        /**< number of modes, K */
+  size_t mode_count;                        /**< K */
   double modes[SUPINE_MODES_MADE_MAX];      /**< [K] error with the first k + 1 modes */
 } supine_error_table;
 

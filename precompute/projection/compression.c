@@ -68,8 +68,8 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
   const size_t terms = supine_sh_count(projection->band);
   if (terms > SUPINE_MODES_MADE_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "band %zu has %zu harmonics, and a basis holds at most %d functions: "
-                            "ask for modes instead, or for band 7 or less",
+                            "band %zu has %zu harmonics, but a basis holds at most %d functions: "
+                            "give --modes 16, or --band 7 or less",
                             projection->band, terms, SUPINE_MODES_MADE_MAX);
   }
   supine_compression made;
@@ -98,7 +98,7 @@ void supine_projection_compression_truncate(supine_compression *compression, siz
   if (count < width) {
     keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
     keep_columns(compression->mix, rank, width, count, sizeof(double));
-    compression->mode_count = count; /* each mode is a row, so the first modes stay in place */
+    compression->mode_count = count; /* each mode is a row and keeps its place */
   }
 }
 

@@ -13,8 +13,8 @@
 
 enum { VERTICES_MAX = 4096 };
 
-/* Compute gram [R, R], the scalar products of the columns over evenly chosen vertices with weights
- * |d|^2: w' gram w is the sum of the squared displacements of the field columns x w. */
+/* Compute the scalar products gram [R, R] of the columns over evenly chosen vertices, with weights
+ * |d|^2. For the field columns x w, w^T gram w is the sum of the squared displacements. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
@@ -27,7 +27,7 @@ static void find_gram(const supine_truth *truth, size_t vertex_count, const doub
   }
 }
 
-/* Compute w' gram w for the coefficients w. */
+/* Compute w^T gram w for the coefficients w. */
 static double square_of(const double *gram, size_t rank, const double *coefficients) {
   double image[SUPINE_SPAN_MAX];
   cblas_dsymv(CblasRowMajor, CblasLower, (int)rank, 1.0, gram, (int)rank, coefficients, 1, 0.0,
@@ -35,7 +35,7 @@ static double square_of(const double *gram, size_t rank, const double *coefficie
   return cblas_ddot((int)rank, coefficients, 1, image, 1);
 }
 
-/* Compute residual -= part x weights; rows of part [rank, count] are `stride` values apart. */
+/* Compute residual -= part x weights. The rows of part [rank, count] are `stride` values apart. */
 static void subtract(const double *part, size_t stride, size_t count, const double *weights,
                      size_t rank, double *residual) {
   cblas_dgemv(CblasRowMajor, CblasNoTrans, (int)rank, (int)count, -1.0, part, (int)stride, weights,

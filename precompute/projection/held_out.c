@@ -22,8 +22,8 @@ void supine_accuracy_truth_free(supine_truth *truth) {
   *truth = (supine_truth){0};
 }
 
-/* Find the volume of each direction's field as a polynomial of the gain: if there are few columns,
- * from their volume forms; otherwise from the fields, AT_ONCE at a time. */
+/* Find the volume of each direction's field as a cubic of the gain. Use the volume forms of the
+ * columns if there are at most FEW; otherwise compute AT_ONCE fields at a time. */
 static supine_status find_cubics(const supine_lungs *lungs, const double *share,
                                  const double *directions, const supine_truth *truth) {
   enum { FEW = 8, AT_ONCE = SUPINE_VOLUME_FIELDS };
@@ -84,7 +84,7 @@ supine_status supine_accuracy_truth_create(const supine_lungs *lungs, const supi
                                             truth->functions);
   }
   free(range);
-  if (status == SUPINE_OK && truth->cubic != NULL) {
+  if (status == SUPINE_OK) {
     status = find_cubics(lungs, model->share, directions, truth);
   }
   if (status != SUPINE_OK) {

@@ -10,8 +10,8 @@
 #include "precompute/projection/projection.h"
 #include "sh/base/lapack.h"
 
-/* Relative singular value below which a mode is rounding error, as the Gram matrix squares singular
- * values. */
+/* Singular values below this share of the largest are rounding errors, as the Gram matrix holds
+ * their squares. */
 static const double rank_tolerance = 1e-7;
 
 /* Compute the lower triangle, by columns, of gram [R, R] = columns^T diag(weight) columns. */
@@ -69,11 +69,13 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
   return status;
 }
 
-/* Find the squares [R] of the singular values of C = sqrt(W) columns x functions, their sum, and
- * the leading right singular vectors, modes [count, (band + 1)^2]. These are the same for
- * A = H functions if H^T H = columns^T W columns, because then C^T C = A^T A. As A has only R rows,
- * the eigenvalues sigma_k^2 and eigenvectors U_k of the R x R matrix A A^T give them. gram [R, R],
- * which is columns^T W columns, is overwritten. */
+/* Find the singular values and right singular vectors of C = sqrt(W) columns x functions: the
+ * squares [R] of the singular values, their sum, and the leading vectors, modes [count, (band +
+ * 1)^2]. gram [R, R] is columns^T W columns, and is overwritten.
+ *
+ * A = H functions has the same singular values and right singular vectors as C if H^T H = gram,
+ * because then A^T A = C^T C. As A has only R rows, the eigenvalues sigma_k^2 and eigenvectors U_k
+ * of the R x R matrix A A^T give them. */
 static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = projection->rank;
@@ -88,7 +90,7 @@ static supine_status find_modes(const supine_projection *projection, double *gra
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  /* The rows of H are eigenvectors of gram times the roots of their eigenvalues. */
+  /* The rows of H are the eigenvectors of gram, times the roots of their eigenvalues. */
   for (size_t k = 0; k < rank; ++k) {
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
   }
@@ -101,7 +103,7 @@ static supine_status find_modes(const supine_projection *projection, double *gra
     *total += gram[r * rank + r];
   }
   status = supine_projection_leading_eigenpairs(rank, gram, rank, values, vectors);
-  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* mode k: A^T U_k / sigma_k */
+  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* mode k is A^T U_k / sigma_k */
     const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
                 vectors + k * rank, 1, 0.0, modes + k * terms, 1);
@@ -147,7 +149,7 @@ supine_status supine_projection_compress_modes(const supine_projection *projecti
   }
   if (count == 0) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the field is zero everywhere: change the constants of the force");
+                              "the field is zero everywhere: change --base or --gain");
     goto cleanup;
   }
   status = supine_projection_compression_create(projection, count, &made);

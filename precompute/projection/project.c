@@ -8,7 +8,7 @@
 #include <supine/sh.h>
 
 enum {
-  LATITUDES_PER_BAND = 8, /* latitudes of the grid; longitudes are twice as many */
+  LATITUDES_PER_BAND = 8, /* the grid has twice as many longitudes */
   LATITUDES_MIN = 32
 };
 
@@ -19,9 +19,7 @@ void supine_projection_free(supine_projection *projection) {
   *projection = (supine_projection){0};
 }
 
-/* --- functions of gravity -------------------------------------------------------------------- */
-
-/* Directions g of the grid [count, 3], and the least and largest g.p of vertices p, mm. */
+/* Directions [count, 3] of the grid, and the smallest and largest height along each, mm. */
 typedef struct grid_heights {
   double *directions, *minimum, *maximum;
 } grid_heights;
@@ -45,7 +43,7 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Expand the span's weights, as functions of gravity, in harmonics: functions [R, (band + 1)^2]. */
+/* Expand each weight of the span, a function of gravity, in harmonics: functions [R, harmonics]. */
 static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                                const supine_span *span, double *functions, supine_error *error) {
   const size_t least = LATITUDES_PER_BAND * (band + 1);
@@ -86,8 +84,6 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
                              : supine_error_set(error, status, "projection to band %zu: %s", band,
                                                 supine_status_string(status));
 }
-
-/* --- columns --------------------------------------------------------------------------------- */
 
 /* Solve for each direction of the span, into columns [N, R]. */
 static supine_status solve(const supine_lungs *lungs, const supine_model *model,

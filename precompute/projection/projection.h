@@ -14,21 +14,20 @@
 #include "precompute/physics/volume_forms.h"
 #include "precompute/projection/span.h"
 
-/** A projected scalar field. */
 typedef struct supine_projection {
   size_t vertex_count;
   size_t band;
-  supine_span *span; /**< directions of the columns; NULL: another simulator's field */
-  size_t rank;       /**< R, number of columns */
+  supine_span *span; /**< directions of the columns, or NULL for another simulator's field */
+  size_t rank;       /**< R */
   double *columns;   /**< [N, R] fields for R directions of gravity */
   double *functions; /**< [R, (band + 1)^2] harmonics of the weights of the columns */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);
 
-/** Project the field. The span's weights have kinks where another vertex becomes the lowest or
- * highest; a grid eight times finer than the band keeps them from aliasing. The caller frees the
- * projection with supine_projection_free.
+/** Project the field. Release the projection with supine_projection_free. The weights of the span
+ * have kinks where another vertex becomes the lowest or the highest. The grid has eight latitudes
+ * for each degree of the harmonics, so that these kinks hardly alias.
  * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach (model.h), a
  *             band above SUPINE_SH_BAND_MAX, invalid stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
@@ -36,15 +35,15 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
                                        size_t band, supine_projection *projection,
                                        supine_error *error);
 
-/** A field compressed to K functions of orientation:
- * F_i(g) ~ sum over k of coefficients[i, k] sum over lm of modes[k, lm] Y_lm(g). */
+/** A field compressed to K functions of orientation: F_i(g) ~ sum over k of coefficients[i, k] sum
+ * over lm of modes[k, lm] Y_lm(g). */
 typedef struct supine_compression {
   size_t vertex_count;
   size_t band;
-  size_t mode_count;   /**< number of modes, K */
+  size_t mode_count;   /**< K */
   float *coefficients; /**< [N, K] */
   double *modes;       /**< [K, (band + 1)^2] harmonics of each mode */
-  double *mix;         /**< [R, K]: coefficients = columns x mix */
+  double *mix;         /**< [R, K], with coefficients = columns x mix */
 } supine_compression;
 
 void supine_projection_compression_free(supine_compression *compression);
@@ -59,11 +58,11 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
 /** Find the best functions of orientation: the leading right singular vectors of the weighted
  * coefficient matrix, from the Gram matrix of the columns.
  *
- * @param weight     [N] weight of each vertex's square, such as |d_i|^2; NULL: 1
+ * @param weight     [N] weight of each vertex's squared error, such as |d_i|^2, or NULL for 1
  * @param mode_max   largest number of modes, 1 to SUPINE_MODES_MADE_MAX; there are fewer if the
  *             matrix has lower rank
- * @param singular   [mode_max] singular values of the modes, in falling order, then 0; optional
- * @param total      sum of the squares of all singular values; optional
+ * @param singular   [mode_max] singular values of the modes in falling order, then zeros, or NULL
+ * @param total      written: sum of the squares of all singular values; may be NULL
  * @retval SUPINE_ERROR_ARGUMENT   `mode_max` is out of range
  * @retval SUPINE_ERROR_NUMERICAL  the field is zero, or an eigenvalue problem failed
  * @retval SUPINE_ERROR_MEMORY */
@@ -102,8 +101,8 @@ void supine_projection_compression_field(const supine_compression *compression,
                                          const double *weights, double *field);
 
 /** Find the volume forms of the coefficients as they are stored, in single precision.
- * @param share       [G] each lung's share of its healthy volume; NULL: 1
- * @param directions  [N, 3] directions of displacement, mm; NULL: a vector field */
+ * @param share       [G] volume of each lung relative to healthy, or NULL for 1
+ * @param directions  [N, 3] directions of displacement, mm, or NULL for a vector field */
 supine_status supine_projection_compression_volume_forms(
     const supine_compression *compression, const supine_lungs *lungs, const double *share,
     const double *directions, supine_volume_forms *forms, supine_error *error);

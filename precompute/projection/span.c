@@ -9,17 +9,17 @@
 #include "sh/base/lapack.h"
 #include "sh/base/vec3.h"
 
-/* Largest number of vertices, and number of directions, that the cross approximation examines. */
+/* The cross approximation examines at most VERTICES vertices, in DIRECTIONS directions. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest residual force relative to the largest force. With softening, it is `tolerance`: the RMS
- * residual is then 6e-5 of the RMS force, a hundredth of the error of 16 modes. Without, it is
- * `rounding`, so that only rounding errors remain. */
+/* Largest accepted residual force, relative to the largest force: `tolerance` with softening, and
+ * `rounding` without. With `tolerance`, the RMS residual is 6e-5 of the RMS force, a hundredth of
+ * the error of 16 modes. */
 static const double tolerance = 3e-4;
 static const double rounding = 1e-12;
 
-/* Subtract from force [vertices, DIRECTIONS] the product of the row and the column through entry
- * `at`, divided by that entry: a step of elimination with full pivoting. */
+/* Eliminate the row and the column of entry `at` from force [vertices, DIRECTIONS]: subtract their
+ * product, divided by that entry. */
 static void eliminate(double *force, size_t vertices, size_t at) {
   const double *column = force + at % DIRECTIONS;
   double row[DIRECTIONS];
@@ -51,17 +51,16 @@ static supine_status invert(double *matrix, size_t rank) {
                                         : LAPACKE_dgetri(LAPACK_COL_MAJOR, n, matrix, n, pivots));
 }
 
-/* Choose rows `of` and columns `from` of the force [count, DIRECTIONS], which is overwritten, until
- * no residual exceeds `share` of the largest force. Return false if that takes more than
- * SUPINE_SPAN_MAX of each. */
+/* Choose rows and columns of force [count, DIRECTIONS], which is overwritten, until no residual
+ * exceeds `share` of the largest force. Return false if SUPINE_SPAN_MAX of each do not suffice. */
 static bool choose(double *force, size_t count, double share, size_t *rank,
-                   size_t of[SUPINE_SPAN_MAX], size_t from[SUPINE_SPAN_MAX]) {
+                   size_t rows[SUPINE_SPAN_MAX], size_t columns[SUPINE_SPAN_MAX]) {
   size_t at = largest_of(force, count * DIRECTIONS);
   const double least = share * fabs(force[at]);
   *rank = 0;
   while (fabs(force[at]) > least && *rank < SUPINE_SPAN_MAX) {
-    of[*rank] = at / DIRECTIONS;
-    from[(*rank)++] = at % DIRECTIONS;
+    rows[*rank] = at / DIRECTIONS;
+    columns[(*rank)++] = at % DIRECTIONS;
     eliminate(force, count, at);
     at = largest_of(force, count * DIRECTIONS);
   }
@@ -76,8 +75,8 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   double directions[3 * DIRECTIONS];
   double range[2 * DIRECTIONS];
   size_t vertices[VERTICES];
-  size_t from[SUPINE_SPAN_MAX];
-  size_t of[SUPINE_SPAN_MAX];
+  size_t columns[SUPINE_SPAN_MAX];
+  size_t rows[SUPINE_SPAN_MAX];
   double *force = malloc(values * sizeof *force);
   double *residual = malloc(values * sizeof *residual);
   supine_status status = SUPINE_OK;
@@ -96,7 +95,8 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   const supine_gravities gravities = {DIRECTIONS, directions, range, range + DIRECTIONS};
   supine_physics_force(lungs, law, &gravities, count, vertices, force);
   memcpy(residual, force, values * sizeof *residual);
-  if (!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank, of, from)) {
+  if (!choose(residual, count, law->soften == 0.0 ? rounding : tolerance, &span->rank, rows,
+              columns)) {
     status =
         supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                          "--soften %g takes more than %d functions of gravity: give at most 12",
@@ -104,10 +104,10 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
     goto cleanup;
   }
   for (size_t r = 0; r < span->rank; ++r) {
-    memcpy(span->directions + 3 * r, directions + 3 * from[r], 3 * sizeof *directions);
-    span->vertices[r] = vertices[of[r]];
+    memcpy(span->directions + 3 * r, directions + 3 * columns[r], 3 * sizeof *directions);
+    span->vertices[r] = vertices[rows[r]];
     for (size_t c = 0; c < span->rank; ++c) {
-      span->inverse[r * span->rank + c] = force[of[r] * DIRECTIONS + from[c]];
+      span->inverse[r * span->rank + c] = force[rows[r] * DIRECTIONS + columns[c]];
     }
   }
   status = span->rank == 0 ? SUPINE_ERROR_NUMERICAL : invert(span->inverse, span->rank);
@@ -115,7 +115,7 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
     (void)supine_error_set(error, status, "no memory for the force");
   } else if (status != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the force is zero everywhere: change its constants");
+                              "the force is zero everywhere: change --base or --gain");
   }
 cleanup:
   free(force);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Express the force f_i on any vertex i for any direction of gravity by the forces for a few
- * directions:
+/* Express the force f_i on any vertex i for any direction of gravity g by the forces for R
+ * directions g_r:
  *
- *     f_i(g) = sum over r of f_i(g_r) w_r(g),      f_j(g) = sum over r of f_j(g_r) w_r(g)
+ *     f_i(g) = sum over r of f_i(g_r) w_r(g)
  *
- * The second equation, at R vertices j, determines w (cross approximation: Goreinov, Tyrtyshnikov
- * and Zamarashkin 1997). Without softening R is 4 or 5 and the sum is exact; with softening R
- * depends on the tolerance. */
+ * The weights w satisfy this equation exactly at R chosen vertices j (cross approximation:
+ * Goreinov, Tyrtyshnikov and Zamarashkin 1997). Without softening, R is 4 or 5 and the equation is
+ * exact for all vertices. With softening, R depends on the tolerance. */
 #ifndef SUPINE_SPAN_H
 #define SUPINE_SPAN_H
 
@@ -16,10 +16,10 @@
 enum { SUPINE_SPAN_MAX = 128 };
 
 typedef struct supine_span {
-  size_t rank;                                       /* number of directions, R */
-  double directions[3 * SUPINE_SPAN_MAX];            /* [R, 3] directions g_r */
-  size_t vertices[SUPINE_SPAN_MAX];                  /* [R] vertices j */
-  double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX]; /* [R, R] inverse of the matrix f_j(g_r) */
+  size_t rank;                                       /* R */
+  double directions[3 * SUPINE_SPAN_MAX];            /* [R, 3] */
+  size_t vertices[SUPINE_SPAN_MAX];                  /* [R] chosen vertices */
+  double inverse[SUPINE_SPAN_MAX * SUPINE_SPAN_MAX]; /* [R, R] inverse of the forces f_j(g_r) */
 } supine_span;
 
 /* Choose the directions and vertices.

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the sum of squares, the largest value and percentiles of many non-negative numbers without
- * storing them. */
+/* Find the sum of squares, the maximum and percentiles of non-negative numbers without storing
+ * them. */
 #ifndef SUPINE_TALLY_H
 #define SUPINE_TALLY_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* A bin for each exponent and first 8 bits of the mantissa of a float: 0.2 to 0.4 % wide. */
+/* A bin for each exponent and first 8 bits of the mantissa of a float; it is 0.2 to 0.4 % wide. */
 enum { SUPINE_TALLY_BINS = 1 << 16 };
 
 typedef struct supine_tally {
@@ -20,11 +20,10 @@ typedef struct supine_tally {
 /* Add `count` values, none of which is negative. */
 void supine_accuracy_tally_add(supine_tally *tally, size_t count, const double *values);
 
-/* Add `other` to `tally`. */
 void supine_accuracy_tally_merge(supine_tally *tally, const supine_tally *other);
 
-/* Return the value below which a share, 0 to 1, of the numbers lies: the upper edge of its bin. 0
- * if there are no numbers. */
+/* Return the value below which `share`, 0 to 1, of the numbers lie, rounded up to the edge of its
+ * bin; 0 if there are no numbers. */
 double supine_accuracy_tally_percentile(const supine_tally *tally, double share);
 
 #endif
