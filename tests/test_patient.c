@@ -11,6 +11,7 @@
 #include "precompute/patient/krige.h"
 #include "precompute/patient/patient_file.h"
 #include "program/validation.h"
+#include "runtime/kriging.h"
 
 /* Fit a law to pairs of points, like `supine fit`. */
 static void fit_pairs(const supine_patient_pairs *pairs, supine_patient_law law,
@@ -88,6 +89,24 @@ static supine_patient_record record_of(const supine_patient *patient) {
       .expand = {.fitted = {0.75, 0.5}}};
   record.force = supine_patient_force(&patient->power, 0.4, record.state[1].gravity);
   return record;
+}
+
+TEST(test_covariances_any_distance_equal_those_of_kriging) {
+  supine_patient_centre centre[200];
+  double covariance[200];
+  const supine_kriging_point p = {.size = 3.0};
+  const supine_patient_centre here = {.side = 1.0, .size = 3.0};
+  for (size_t i = 0; i < 200; ++i) {
+    centre[i] = (supine_patient_centre){.side = i % 3 == 0 ? -1.0 : 1.0, .size = 0.17 * (double)i};
+    centre[i].offset[i % 3] = 0.0137 * (double)(i * i * i) * (i % 2 == 0 ? 1.0 : -1.0);
+  }
+  supine_patient_covariances(&here, 200, centre, covariance);
+  for (size_t i = 0; i < 200; ++i) {
+    supine_kriging_point q = {.size = centre[i].size, .lung = centre[i].side > 0.0 ? 0U : 1U};
+    memcpy(q.position, centre[i].offset, sizeof q.position);
+    assert_true(fabs(covariance[i] - supine_kriging_covariance(&supine_kriging_default, &p, &q)) <
+                1e-12);
+  }
 }
 
 /* Held-out errors of five public pairs of images, fitted from either image, are below those of a

@@ -27,12 +27,12 @@ near() {
 vertices() {
   awk '/^v / { print $2 "," $3 "," $4 }' "$1"
 }
-# pairs FROM TO NAME: write NAME.csv with every 101st vertex of two OBJ files as landmarks.
+# pairs FROM TO NAME: write NAME.csv with every 25th vertex of two OBJ files as landmarks.
 pairs() {
   {
     echo x,y,z,to_x,to_y,to_z
     vertices "$1.obj" >from.csv
-    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 101 == 1'
+    vertices "$2.obj" | paste -d, from.csv - | awk 'NR % 25 == 1'
   } >"$3.csv"
 }
 # surfaces FILE: print the distance of the surfaces in the first state of `validate`, mm RMS.
@@ -40,8 +40,8 @@ surfaces() {
   number rms_mm "$1"
 }
 
-# One person in several states, with two meshes and a law far from the default.
-for mesh in p:20000 q:14000; do
+# One person in several states, with three meshes and a law far from the default.
+for mesh in p:20000 q:14000 s:5000; do
   name=${mesh%:*}
   "$supine" phantom -o $name.ply --vertices ${mesh#*:} >/dev/null || fail phantom
   "$supine" precompute $name.ply --base 0.75 --gain 0.7 --constants 8,2.2,12,1.3,13,1.2 \
@@ -53,10 +53,10 @@ for mesh in p:20000 q:14000; do
     done
   done
 done
-pairs p_supine_rest p_supine_full full
-pairs p_supine_full p_supine_rest empty
-pairs p_supine_rest p_prone_rest prone
-pairs p_supine_full p_prone_rest down
+pairs s_supine_rest s_supine_full full
+pairs s_supine_full s_supine_rest empty
+pairs s_supine_rest s_prone_rest prone
+pairs s_supine_full s_prone_rest down
 mv prone.csv prone.CSV
 
 # The gain of 0.70 is recovered for either order of the two states, and the basis of the scan at rest reaches
@@ -67,18 +67,18 @@ turns() {
   shift
   "$supine" fit "$@" --name somebody -o "$name.json" >fit.txt || fail "fit $name"
   near "$(number gain "$name.json")" 0.70 0.05 || fail "$name: $(grep gain fit.txt)"
-  "$supine" precompute p_supine_rest.ply --patient "$name.json" -o "$name.safetensors" \
+  "$supine" precompute s_supine_rest.ply --patient "$name.json" -o "$name.safetensors" \
     >out 2>note || fail "precompute $name: $(cat note)"
   grep -q 'assumed to be the emptier of the two' note || fail "the assumed state of the scan is not stated"
-  "$supine" validate "$name.safetensors" --from supine:rest --state prone:rest:p_prone_rest.ply \
+  "$supine" validate "$name.safetensors" --from supine:rest --state prone:rest:s_prone_rest.ply \
     --json >valid.json || fail "validate $name"
   near "$(surfaces valid.json)" 0 1 || fail "$name: prone off by $(surfaces valid.json) mm"
   near "$(number rms_mm valid.json 2)" 0 4 && fail "prone did not turn"
 }
-turns forwards p_supine_rest.ply p_supine_full.ply --other supine:full \
-  --state prone:rest:p_prone_rest.ply
-turns backwards p_supine_full.ply p_supine_rest.ply --rest supine:full --other supine:rest \
-  --state prone:rest:p_prone_rest.ply
+turns forwards s_supine_rest.ply s_supine_full.ply --other supine:full \
+  --state prone:rest:s_prone_rest.ply
+turns backwards s_supine_full.ply s_supine_rest.ply --rest supine:full --other supine:rest \
+  --state prone:rest:s_prone_rest.ply
 turns points --landmarks full.csv --other supine:full --state prone:rest:prone.CSV
 turns reversed --landmarks empty.csv --rest supine:full --other supine:rest \
   --state prone:rest:down.csv
@@ -122,14 +122,14 @@ chain q_supine_full rest p 0.2 rest+2000 p 0.2
 grep -q '"explained_percent": null' valid.json || fail "a share is explained where nothing moved"
 
 # A scan given as at rest gives a warning if it holds too much gas.
-"$supine" fit p_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
+"$supine" fit s_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
   fail "fit a fuller rest"
 grep -q 'at rest the lungs hold 51 % of full inflation' note || fail "no warning: $(cat note)"
 
 # If fit knows only absolute volumes, states relative to rest or full inflation are refused.
-"$supine" fit p_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \
+"$supine" fit s_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \
   >fit.txt || fail "fit volumes alone"
-"$supine" precompute p_supine_rest.ply --patient known.json -o known.safetensors >out 2>&1 &&
+"$supine" precompute s_supine_rest.ply --patient known.json -o known.safetensors >out 2>&1 &&
   fail "an emptier scan of unknown state"
 grep -q 'or use the fuller scan' out || fail "emptier scan: $(cat out)"
 "$supine" precompute q_supine_full.ply --patient known.json -o known.safetensors >out 2>&1 ||
@@ -138,15 +138,15 @@ for volume in rest full; do
   "$supine" deform known.safetensors --posture prone --volume $volume -o x.ply >out 2>&1 &&
     fail "$volume is known"
 done
-"$supine" validate known.safetensors --state p_supine_rest.ply --json >valid.json ||
+"$supine" validate known.safetensors --state s_supine_rest.ply --json >valid.json ||
   fail "validate volumes alone"
 near "$(surfaces valid.json)" 0 2 || fail "volumes alone: $(surfaces valid.json) mm"
 
 # A further state does not determine the gain if its posture is the same, or if the lungs did not move.
 "$supine" fit --landmarks full.csv --other supine:full --state prone:rest:full.csv -o x.json \
   --json >fit.json 2>&1 || fail "fit a state that did not turn"
-"$supine" fit p_supine_rest.ply p_supine_full.ply --other supine:full \
-  --state prone:rest:p_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
+"$supine" fit s_supine_rest.ply s_supine_full.ply --other supine:full \
+  --state prone:rest:s_supine_rest.ply --law paper >fit.txt || fail "fit a scan that did not turn"
 grep -q 'source of the gain.*other postures do not' fit.txt || fail "a gain at its bound: $(grep gain fit.txt)"
 
 # A stiff region is recovered, and a basis with it reaches the other state.
@@ -223,7 +223,7 @@ near "$(number rms_mm valid.json)" 0 0.01 || fail "points are $(number rms_mm va
 near "$(number rms_mm valid.json 2)" 0 5 && fail "points did not turn"
 
 # A shift between the scans is removed only if --translation asks for it.
-awk '/^v / { print $1, $2 + 12, $3 - 5, $4 + 7; next } { print }' p_supine_full.obj >shifted.obj
+awk '/^v / { print $1, $2 + 12, $3 - 5, $4 + 7; next } { print }' s_supine_full.obj >shifted.obj
 "$supine" validate points.safetensors --from supine:rest --state supine:full:shifted.obj \
   --translation --json >valid.json || fail "validate a shift"
 near "$(surfaces valid.json)" 0 1 || fail "shift: $(surfaces valid.json) mm"
@@ -231,9 +231,9 @@ near "$(surfaces valid.json)" 0 1 || fail "shift: $(surfaces valid.json) mm"
   >valid.json || fail "validate without a shift"
 near "$(surfaces valid.json)" 0 3 && fail "a shift was removed without --translation"
 # A further state of half a breath in the same posture gets about half the scale.
-"$supine" deform p.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
+"$supine" deform s.safetensors --posture supine --volume rest+1500 -o half.ply >/dev/null ||
   fail deform
-"$supine" fit p_supine_rest.ply p_supine_full.ply --state supine:half.ply --other supine:full \
+"$supine" fit s_supine_rest.ply s_supine_full.ply --state supine:half.ply --other supine:full \
   --law paper >fit.txt || fail "fit half a breath"
 grep -q 'supine  *0.[45]' fit.txt || fail "half a breath: $(grep -A2 further fit.txt)"
 
@@ -254,12 +254,12 @@ refused 1 'nothing to fit to' fit rest.ply
 refused 1 'more than two scans' fit rest.ply rest.ply rest.ply
 refused 1 'name the surface of the first scan' fit --landmarks full.csv --state prone:rest:half.ply
 refused 1 'rest+500' fit --landmarks full.csv --other supine:500
-refused 2 'exchange --rest and --other' fit p_supine_full.ply p_supine_rest.ply --other supine:full
+refused 2 'exchange --rest and --other' fit s_supine_full.ply s_supine_rest.ply --other supine:full
 refused 2 'exchange --rest and --other' fit --landmarks empty.csv --other supine:full
 refused 2 'the two surfaces are the same' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
   '--reach 10'; do
-  refused 1 'has its own law and force' precompute p.ply --patient points.json $beside \
+  refused 1 'has its own law and force' precompute s.ply --patient points.json $beside \
     -o x.safetensors
 done
 refused 1 'leave --expandability out' precompute rest.ply --patient stiff.json \
@@ -271,7 +271,7 @@ refused 2 'not a patient' precompute rest.ply --patient fit.csv -o x.safetensors
 awk -F, 'NR == 1 { print; next } { printf "%s,%s,%s,%s,%s,%s\n", $1+900, $2, $3, $4+900, $5, $6 }' \
   full.csv >far.csv
 "$supine" fit --landmarks far.csv --other supine:full -o far.json >/dev/null || fail "fit far away"
-refused 2 'check that frame, unit and person are the same' precompute p.ply --patient far.json -o x.safetensors
+refused 2 'check that frame, unit and person are the same' precompute s.ply --patient far.json -o x.safetensors
 refused 2 'check their frame, unit and person' validate points.safetensors --to supine:full --landmarks far.csv
 [ ! -e x.safetensors ] || fail "a refused command left a file"
 echo passed

@@ -180,9 +180,8 @@ static void slide(const supine_lungs *lungs, const supine_patient_power *law, un
     supine_patient_direction(law, &place, supine_patient_force_at(law, &place), u);
     centre[i] = (supine_patient_centre){.side = place.side, .size = supine_length(u)};
     memcpy(centre[i].offset, place.offset, sizeof centre[i].offset);
-    for (size_t j = 0; j <= i; ++j) {
-      factor[i * n + j] = supine_patient_covariance(&centre[i], &centre[j]) + (i == j ? 1e-6 : 0.0);
-    }
+    supine_patient_covariances(&centre[i], i + 1, centre, factor + i * n);
+    factor[i * n + i] += 1e-6;
     for (size_t k = 0; k < 3; ++k) {
       g[3 * i + k] = gsl_ran_gaussian(random, 1.0);
     }

@@ -112,9 +112,9 @@ static double factor(supine_patient_krige *k) {
     return logarithm;
   }
   for (size_t i = 0; i < n; ++i) {
+    supine_patient_covariances(&k->centre[i], i + 1, k->centre, k->factor + i * n);
     for (size_t j = 0; j <= i; ++j) {
-      k->factor[i * n + j] = k->scaled_sill * supine_dot(k->rows[i].axis, k->rows[j].axis) *
-                             supine_patient_covariance(&k->centre[i], &k->centre[j]);
+      k->factor[i * n + j] *= k->scaled_sill * supine_dot(k->rows[i].axis, k->rows[j].axis);
     }
     k->factor[i * n + i] += pow(noise_of(k, &k->rows[i]), 2.0);
   }
@@ -396,17 +396,18 @@ double supine_patient_krige_predict(supine_patient_krige *krige, const supine_pa
   *variance = 0.0;
   if (krige->sill > 0.0) {
     const supine_patient_centre at = centre_of(&krige->law, &row->place);
+    supine_patient_covariances(&at, krige->count, krige->centre, krige->scratch);
+    supine_patient_covariances(&at, 1, &at, variance);
     for (size_t i = 0; i < krige->count; ++i) {
-      krige->scratch[i] = krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis) *
-                          supine_patient_covariance(&at, &krige->centre[i]);
+      krige->scratch[i] *= krige->scaled_sill * supine_dot(row->axis, krige->rows[i].axis);
     }
     value += cblas_ddot(n, krige->scratch, 1, krige->weight, 1);
     cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, krige->factor, n,
                 krige->scratch, 1);
     cblas_dgemv(CblasRowMajor, CblasTrans, n, (int)krige->terms, -1.0, krige->design,
                 (int)krige->terms + 1, krige->scratch, 1, 1.0, x, 1);
-    *variance = krige->scaled_sill * supine_patient_covariance(&at, &at) -
-                cblas_ddot(n, krige->scratch, 1, krige->scratch, 1);
+    *variance =
+        krige->scaled_sill * *variance - cblas_ddot(n, krige->scratch, 1, krige->scratch, 1);
   }
   for (size_t t = 0; t < TERMS; ++t) {
     x[t] = prior_deviation(krige, t) > 0.0 ? x[t] : 0.0;

@@ -102,19 +102,11 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
   }
 }
 
-double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b) {
-  supine_kriging_point p = {.size = a->size, .lung = a->side > 0.0 ? 0U : 1U};
-  supine_kriging_point q = {.size = b->size, .lung = b->side > 0.0 ? 0U : 1U};
-  memcpy(p.position, a->offset, sizeof p.position);
-  memcpy(q.position, b->offset, sizeof q.position);
-  return supine_kriging_covariance(&supine_kriging_default, &p, &q);
-}
-
-/* Compute the covariances between a place and `count` kernels as supine_patient_covariance does. The
- * factor exp(-a) of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 8
+/* The factor exp(-a) of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 8
  * approximates; the error is below 1e-13 of the covariance at a = 0. */
-SUPINE_CLONES static void covary(const supine_patient_centre *here, size_t count,
-                                 const supine_patient_centre *centre, double *covariance) {
+SUPINE_CLONES void supine_patient_covariances(const supine_patient_centre *here, size_t count,
+                                              const supine_patient_centre *centre,
+                                              double *covariance) {
   const supine_kriging_model *model = &supine_kriging_default;
   const double rate = sqrt(3.0) / model->length;
   const double here_size = model->sill / 3.0 * fmax(here->size, model->least);
@@ -143,7 +135,7 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
   supine_patient_direction(power, place, spread * supine_patient_force_at(power, place), u);
   supine_patient_centre here = {.side = place->side, .size = supine_length(u)};
   memcpy(here.offset, place->offset, sizeof here.offset);
-  covary(&here, patient->centre_count, patient->centre, covariance);
+  supine_patient_covariances(&here, patient->centre_count, patient->centre, covariance);
   for (size_t i = 0; i < patient->centre_count; ++i) {
     for (int k = 0; k < 3; ++k) {
       u[k] += covariance[i] * patient->centre[i].weight[k];

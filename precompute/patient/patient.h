@@ -117,8 +117,10 @@ void supine_patient_direction(const supine_patient_power *power, const supine_pa
 void supine_patient_motion(const supine_patient_power *power, const supine_patient_place *place,
                            double u[3]);
 
-/** Compute the covariance between the corrections at two centres along one axis, mm^2. */
-double supine_patient_covariance(const supine_patient_centre *a, const supine_patient_centre *b);
+/** Compute the covariances [count] between the correction at one place and the corrections at
+ * `count` kernels, along one axis, mm^2. */
+void supine_patient_covariances(const supine_patient_centre *here, size_t count,
+                                const supine_patient_centre *centre, double *covariance);
 
 /** Compute the displacement u at a place, mm, with the correction but without the motion between
  * the scans.
