@@ -3,7 +3,7 @@
 // and its border has a contrast of at least 3 to 1.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
-import { browser, open, openLungs } from './browser.mjs';
+import { close, open, openLungs } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 import { folder, loadCommon, supine } from './support.mjs';
 
@@ -46,10 +46,10 @@ for (const colorScheme of ['light', 'dark']) {
     assert.ok(ratio >= 3, `${colorScheme}: ${a} on ${b} is ${ratio.toFixed(2)}`);
   }
   assert.deepEqual(complaints, []);
-  await page.close();
+  await close(page);
 
   const second = await open(report, { colorScheme });
   await check(second.page, `the report, ${colorScheme}`);
   assert.deepEqual(second.complaints, []);
-  await second.page.close();
+  await close(second.page);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Start a headless Chromium that draws in software, and open pages from disk in it.
+import assert from 'node:assert/strict';
 import { pathToFileURL } from 'node:url';
 import { evaluate, inOrder, load, matchPoints, skip } from './support.mjs';
 
@@ -13,21 +14,45 @@ export const browser = await chromium.launch({
     '--disable-sync', '--no-first-run'],
 });
 
-/** Open a page, and collect its errors and its requests for other files. */
-export async function open(path, options = {}, hash = '') {
-  const page = await browser.newPage({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce', ...options });
-  page.setDefaultTimeout(60000);
-  if (options.init) await page.addInitScript(options.init);
-  const complaints = [];
+/** Add the page's errors and warnings to `complaints`. */
+export function listen(page, complaints) {
   page.on('console', (message) => {
-    const text = message.text(); // the compositor, which has no GPU here, reads the picture back
-    if (['error', 'warning'].includes(message.type()) && !text.includes('GPU stall due to ReadPixels')) complaints.push(text);
+    const text = message.text();
+    const ofCompositor = text.includes('GPU stall due to ReadPixels'); // it copies pictures, as it has no GPU
+    if (['error', 'warning'].includes(message.type()) && !ofCompositor) complaints.push(text);
   });
   page.on('pageerror', (error) => complaints.push(error.stack));
+}
+
+const unused = new Map(); // closed pages by the properties of their device; a new page takes a second of processor time
+
+/** Open a file, and collect its errors and its requests for other files. */
+export async function open(path, { viewport = { width: 900, height: 640 }, colorScheme = 'light', forcedColors = 'none', reducedMotion = 'reduce', init, ...device } = {}, hash = '') {
+  const kind = JSON.stringify(device);
+  const page = (!init && unused.get(kind)?.pop()) || await browser.newPage(device);
+  page.setDefaultTimeout(60000);
+  await page.setViewportSize(viewport);
+  await page.emulateMedia({ colorScheme, forcedColors, reducedMotion });
+  if (init) await page.addInitScript(init);
+  else page.kind = kind;
+  const complaints = [];
+  listen(page, complaints);
   const own = pathToFileURL(path).href;
   page.on('request', (request) => { if (request.url() !== own && !/^(data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`); });
   await page.goto(own + hash);
   return { page, complaints };
+}
+
+/** End the use of a page of open(). */
+export async function close(page) {
+  if (page.kind === undefined) {
+    await page.close();
+    return;
+  }
+  for (const event of ['console', 'pageerror', 'request']) page.removeAllListeners(event);
+  await page.mouse.move(0, 0);
+  await page.goto('about:blank');
+  unused.set(page.kind, [...(unused.get(page.kind) ?? []), page]);
 }
 
 /** Open the page of a basis, wait until it is drawn, and show all controls. By default the patient is supine and
@@ -59,10 +84,29 @@ export async function press(page, key) {
   await page.keyboard.press(key);
 }
 
-/** Return the picture after it has been drawn. */
+/** Return the picture after it has been drawn and no longer changes. */
 export async function picture(page) {
   await settled(page);
-  return page.locator('#picture').screenshot();
+  for (let before = null; ;) {
+    const now = await page.locator('#picture').screenshot();
+    if (before?.equals(now)) return now;
+    before = now;
+  }
+}
+
+/** Assert that the picture equals an earlier one. The compositor rounds some blended colours up or down by one level. */
+export async function assertPicture(page, before, message) {
+  const now = await picture(page);
+  const levels = await page.evaluate(async (pictures) => {
+    const [a, b] = await Promise.all(pictures.map(async (text) => {
+      const image = await createImageBitmap(new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))]));
+      const canvas = new OffscreenCanvas(image.width, image.height).getContext('2d');
+      canvas.drawImage(image, 0, 0);
+      return canvas.getImageData(0, 0, image.width, image.height).data;
+    }));
+    return a.length === b.length ? a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0) : 255;
+  }, [before, now].map((picture) => picture.toString('base64')));
+  assert.ok(levels <= 1, `${message}: by up to ${levels} of 255 levels`);
 }
 
 /** Wait until a change is drawn. */

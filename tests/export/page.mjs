@@ -3,7 +3,7 @@
 // the C evaluator on the GPU, and its controls work.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
-import { browser, evaluateFor, openLungs as open, picture, press } from './browser.mjs';
+import { assertPicture, close, evaluateFor, openLungs as open, picture, press } from './browser.mjs';
 import { folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
@@ -32,7 +32,7 @@ async function checkControls(page) {
     assert.ok(!after.equals(before), `${what} changed nothing`);
     before = after;
   };
-  assert.ok((await picture(page)).equals(before), 'the picture changes by itself');
+  await assertPicture(page, before, 'the picture changes by itself');
   await changes('the posture button', () => page.getByRole('button', { name: 'Prone' }).click());
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'prone');
   const drag = async (selector, dx, dy) => {
@@ -106,7 +106,7 @@ await checkPositions(page, bases[0], 700);
 await checkPointer(page);
 await checkControls(page);
 assert.deepEqual(complaints, []);
-await page.close();
+await close(page);
 
 supine('export', bases[1], '-o', html);
 const dark = await open(html, { colorScheme: 'dark', viewport: { width: 400, height: 780 } });
@@ -114,5 +114,5 @@ assert.equal(await dark.page.evaluate(() => document.documentElement.dataset.the
 await checkPositions(dark.page, bases[1], 700);
 assert.ok(await dark.page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'too wide for a phone');
 assert.deepEqual(dark.complaints, []);
-await dark.page.close();
+await close(dark.page);
 

@@ -3,7 +3,7 @@
 // enclose the lungs' volumes, and colours of the surface match the colour bar. The page also works in a small
 // window, with forced colours and without WebGL.
 import assert from 'node:assert/strict';
-import { openLungs, press, settled } from './browser.mjs';
+import { close, openLungs, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 import { supine } from './support.mjs';
 
@@ -107,7 +107,7 @@ await press(page, '2');
 await settled(page);
 assert.equal(await page.locator('#posture-name').inputValue(), 'prone');
 assert.deepEqual(complaints, []);
-await page.close();
+await close(page);
 
 /* In a window of 320 x 256 (1280 x 1024 at a zoom of 400 %) nothing is cut off, and the picture is at least 240 px
  * wide. */
@@ -117,14 +117,14 @@ const { width, height, wide } = await small.evaluate(() => ({ ...document.getEle
 assert.ok(width >= 240 && height >= 120 && wide <= 320, `${width} x ${height} in ${wide}`);
 const targets = await small.evaluate(() => [...document.querySelectorAll('button, select, summary, input')].filter((e) => e.checkVisibility()).map((e) => { const target = (e.type === 'checkbox' && e.labels.length ? e.labels[0] : e).getBoundingClientRect(); return [e.id || e.textContent, target.width, target.height]; }).filter(([, w, h]) => w < 24 || h < 24));
 assert.deepEqual(targets, []);
-await small.close();
+await close(small);
 
 /* With forced colours the bar keeps its gradient, and a pressed button has an outline. */
 const { page: forced } = await openLungs(html, { forcedColors: 'active' }, '');
 const [bar, pressed, other] = await forced.evaluate(() => [getComputedStyle(document.getElementById('colours')).backgroundImage, ...['true', 'false'].map((x) => getComputedStyle(document.querySelector(`[data-posture][aria-pressed=${x}]`)).outlineStyle)]);
 assert.match(bar, /gradient/);
 assert.ok(pressed === 'solid' && other === 'none');
-await forced.close();
+await close(forced);
 
 /* Without WebGL the numbers are the same, and the lungs are drawn on a 2-D canvas. */
 const { page: flat, complaints: said } = await openLungs(html, { init: () => {
@@ -142,4 +142,4 @@ const painted = await flat.evaluate(() => {
 assert.ok(painted[0] > 0.04 && painted[1] > 4, `${painted}`);
 assert.deepEqual(await flat.evaluate(() => [...document.querySelectorAll('#postures small')].map((e) => e.textContent)), cards);
 assert.deepEqual(said, []);
-await flat.close();
+await close(flat);

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, evaluateFor, openLungs, orderOf, picture, settled, press } from './browser.mjs';
+import { assertPicture, close, evaluateFor, openLungs, orderOf, picture, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 import { folder, inOrder, supine } from './support.mjs';
 
@@ -145,7 +145,7 @@ async function checkLoss(page) {
   await page.waitForFunction(() => window.supine.picture === null);
   await page.evaluate(() => window.lose.restoreContext());
   await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  assert.ok((await picture(page)).equals(before), 'the picture differs after the loss of the context');
+  await assertPicture(page, before, 'the picture differs after the loss of the context');
   assert.deepEqual(await facts(), told);
   await page.locator('#beside').uncheck();
   await page.locator('#probes-clear').click();
@@ -229,7 +229,7 @@ async function checkTouch() {
   const after = await page.evaluate(() => window.supine.state.gravity);
   assert.ok(Math.hypot(...after.map((x, i) => x - gravity[i])) > 0.1, 'the ball does not turn the patient');
   assert.deepEqual(complaints, []);
-  await page.close();
+  await close(page);
 }
 
 /** Check that an animated change of posture ends in the right posture, and that slow frames do not slow the breath:
@@ -269,7 +269,7 @@ async function checkMotion() {
   const went = (phases[1] - phases[0] + 1) % 1;
   assert.ok(Math.abs(went - ((clock * phases[2]) / 60) % 1) < 1e-6, `the breath advanced by ${went}`);
   assert.deepEqual(complaints, []);
-  await page.close();
+  await close(page);
 }
 
 /** Check for each quantity that the value at the pointer is within the range of values around
@@ -358,7 +358,7 @@ async function checkWords(page) {
   const { page: still } = await openLungs(html, { viewport: { width: 1000, height: 700 } });
   await still.locator('[data-posture=prone]').click();
   assert.equal(await still.evaluate(() => window.supine.state.turning), null, 'it is animated in spite of reduced motion');
-  await still.close();
+  await close(still);
 }
 
 const { page, complaints } = await openLungs(html, { viewport: { width: 1000, height: 700 } });
@@ -367,6 +367,6 @@ for (const check of [checkKeys, checkButtons, checkTyped, checkProbes, checkLoss
   console.log(check.name);
 }
 assert.deepEqual(complaints.filter((text) => !text.includes('CONTEXT_LOST')), []);
-await page.close();
+await close(page);
 await checkTouch();
 await checkMotion();

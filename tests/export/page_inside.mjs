@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, picture, settled, press } from './browser.mjs';
+import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
 import { folder, largestDistance, loadCommon, supine } from './support.mjs';
 
@@ -139,7 +139,7 @@ async function checkControls(page) {
   const without = await picture(page);
   assert.ok(!without.equals(before), 'hiding content does not change the picture');
   await page.locator('#inside').check();
-  assert.ok((await picture(page)).equals(before), 'the picture differs after content was hidden and shown');
+  await assertPicture(page, before, 'the picture differs after content was hidden and shown');
   for (const kind of ['expansion', 'height']) {
     await page.locator(`[name=kind][value=${kind}]`).check();
     assert.ok(!(await picture(page)).equals(before));
@@ -169,7 +169,7 @@ async function checkControls(page) {
   await page.waitForFunction(() => /names=\d+\.\d+/.test(location.hash));
   const { page: again } = await openLungs(files['inside.html'], {}, await page.evaluate(() => `${location.hash}&inside=0`));
   assert.deepEqual(await again.evaluate(() => [window.supine.state.named.length, document.getElementById('inside').checked]), [2, false]);
-  await again.close();
+  await close(again);
 }
 
 /** Check that the picture is the same after the loss of the WebGL context. */
@@ -180,14 +180,14 @@ async function checkLoss(page) {
   await page.waitForFunction(() => window.supine.picture === null);
   await page.evaluate(() => window.lose.restoreContext());
   await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  assert.ok((await picture(page)).equals(before), 'the picture differs after the loss of the context');
+  await assertPicture(page, before, 'the picture differs after the loss of the context');
 }
 
 async function checkSizes() {
   mkdirSync('page_inside', { recursive: true });
   for (const [width, height, colorScheme] of [[1400, 900, 'light'], [900, 600, 'dark'], [844, 390, 'light'], [390, 844, 'dark']]) {
     const touch = Math.min(width, height) < 400;
-    const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width, height }, colorScheme, hasTouch: touch }, '#posture=left&names=0.4');
+    const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width, height }, colorScheme, ...(touch && { hasTouch: true }) }, '#posture=left&names=0.4');
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input, #inside-table td')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
     if (touch) {
       await page.touchscreen.tap(...await onPage(page, 'carina'));
@@ -200,7 +200,7 @@ async function checkSizes() {
     const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
     assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), []);
     assert.deepEqual(complaints, []);
-    await page.close();
+    await close(page);
   }
 }
 
@@ -220,7 +220,7 @@ async function checkMany() {
   await page.locator('#inside-rows button').last().click();
   assert.deepEqual(await page.evaluate(() => window.supine.state.named.map((part) => window.supine.basis.inside.names[part])), ['node 229']);
   assert.deepEqual(complaints, []);
-  await page.close();
+  await close(page);
 }
 
 const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 1000, height: 700 } });
@@ -229,6 +229,6 @@ await checkPointer(page, await checkTable(page));
 await checkControls(page);
 assert.deepEqual(complaints, []);
 await checkLoss(page);
-await page.close();
+await close(page);
 await checkSizes();
 await checkMany();

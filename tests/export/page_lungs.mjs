@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, evaluateFor, openLungs, orderOf, picture, settled, press } from './browser.mjs';
+import { assertPicture, close, evaluateFor, openLungs, orderOf, picture, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 import { folder, inOrder, largestDistance, randomDirections, supine } from './support.mjs';
 
@@ -95,7 +95,7 @@ async function checkRight(page) {
     assert.equal(at.L > at.R, !behind, `from ${key}: ${JSON.stringify(at)}`);
   }
   assert.deepEqual(complaints, []);
-  await alone.close();
+  await close(alone);
 }
 
 /** Simulate a headset whose two eyes see the halves of the canvas. */
@@ -135,15 +135,8 @@ async function checkHeadset() {
   const { page: plain, complaints } = await openLungs(html, { viewport: { width: 760, height: 480 } });
   await plain.evaluate(() => new Promise((done) => { setTimeout(done, 0); }));
   assert.ok(await plain.locator('#vr').isHidden(), 'a headset is offered where there is none');
-  await plain.close();
-  const context = await browser.newContext({ viewport: { width: 760, height: 480 }, reducedMotion: 'reduce' });
-  await context.addInitScript(pretendHeadset);
-  const page = await context.newPage();
-  page.setDefaultTimeout(60000);
-  page.on('pageerror', (error) => complaints.push(error.stack));
-  await page.goto(`file://${html}`);
-  await page.waitForFunction(() => window.supine?.panes().length > 0);
-  await page.evaluate(() => { document.getElementById('more').open = true; });
+  await close(plain);
+  const { page, complaints: said } = await openLungs(html, { viewport: { width: 760, height: 480 }, init: pretendHeadset });
   await page.locator('#vr:not([hidden])').waitFor();
   const before = await picture(page);
   await page.locator('#vr').click();
@@ -168,9 +161,9 @@ async function checkHeadset() {
   assert.ok(seen[0].middle > seen[1].middle + 0.01, JSON.stringify(seen));
   await page.locator('#vr').click();
   await page.waitForFunction(() => document.getElementById('vr').textContent === 'Enter VR');
-  assert.ok((await picture(page)).equals(before), 'the picture differs after leaving the headset');
-  assert.deepEqual(complaints, []);
-  await context.close();
+  await assertPicture(page, before, 'the picture differs after leaving the headset');
+  assert.deepEqual([...complaints, ...said], []);
+  await close(page);
 }
 
 const { page, complaints } = await openLungs(html, { viewport: { width: 760, height: 480 } });
@@ -178,5 +171,5 @@ await checkRest(page);
 await checkNormals(page);
 await checkRight(page);
 assert.deepEqual(complaints, []);
-await page.close();
+await close(page);
 await checkHeadset();

@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { evaluateFor, openLungs, settled } from './browser.mjs';
+import { close, evaluateFor, openLungs, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
 import { folder, randomDirections, supine } from './support.mjs';
 
@@ -60,7 +60,7 @@ for (const [from, name] of [['supine:rest', 'supine at rest'], ['scan', 'the sca
     if (posture === 'left') assert.match(seen.finding, /^On the left side the (left|right) lung /);
   }
   assert.deepEqual(complaints, []);
-  await page.close();
+  await close(page);
 }
 
 /* Volumes and displacements in the sentences of the page equal those computed from positions by the library. */
@@ -100,4 +100,4 @@ for (const [i, g] of directions.entries()) {
   assert.ok(Math.abs(Number(/and ([\d.]+) mm at most/.exec(displacement)[1]) - far) < 0.1, `${displacement}; the largest is ${far} mm`);
 }
 assert.deepEqual(complaints, []);
-await page.close();
+await close(page);

@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, openLungs, settled, press } from './browser.mjs';
+import { close, openLungs, press, settled } from './browser.mjs';
 import { html } from './lungs.mjs';
 
 mkdirSync('page_sizes', { recursive: true });
@@ -43,7 +43,7 @@ const sizes = [[1400, 900], [900, 600], [844, 390], [390, 844]];
 for (const [width, height] of sizes) {
   for (const colorScheme of ['light', 'dark']) {
     const touch = Math.min(width, height) < 400;
-    const { page: sized, complaints: said } = await openLungs(html, { viewport: { width, height }, colorScheme, hasTouch: touch }, '#posture=left');
+    const { page: sized, complaints: said } = await openLungs(html, { viewport: { width, height }, colorScheme, ...(touch && { hasTouch: true }) }, '#posture=left');
     assert.ok(await sized.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
     if (touch) { // a tap keeps a probe and does not turn the camera
       const box = await sized.locator('#picture').boundingBox();
@@ -59,6 +59,6 @@ for (const [width, height] of sizes) {
     }
     writeFileSync(join('page_sizes', `${width}x${height}-${colorScheme}.png`), await sized.screenshot());
     assert.deepEqual(said, []);
-    await sized.close();
+    await close(sized);
   }
 }

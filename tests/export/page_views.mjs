@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Views, pan, zoom, postures, display options, probes, links and a lost WebGL context on the page.
 import assert from 'node:assert/strict';
-import { browser, openLungs, picture, settled, press } from './browser.mjs';
+import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 
 /** Return the visible letters with their positions on the screen. */
@@ -96,7 +96,7 @@ async function checkShown(page) {
     await act();
     assert.ok(!(await picture(page)).equals(before), `${name} changes nothing`);
     await undo();
-    assert.ok((await picture(page)).equals(before), `${name} is not undone`);
+    await assertPicture(page, before, `${name} is not undone`);
   }
 }
 
@@ -120,7 +120,7 @@ async function checkProbes(page) {
   await again.waitForFunction(() => document.querySelectorAll('#probes li').length === 2);
   const facts = (p) => p.evaluate(() => [window.supine.state.gravity.map((v) => v.toFixed(6)), document.getElementById('probes').textContent, document.getElementById('depth-value').textContent]);
   assert.deepEqual(await facts(again), await facts(page));
-  await again.close();
+  await close(again);
   await page.locator('#probes-clear').click();
 }
 
@@ -133,7 +133,7 @@ async function checkLoss(page) {
   await page.waitForFunction(() => window.supine.picture === null);
   await page.evaluate(() => window.lose.restoreContext());
   await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  assert.ok((await picture(page)).equals(before), 'the picture differs after the loss of the context');
+  await assertPicture(page, before, 'the picture differs after the loss of the context');
 }
 
 /** Check that an idle page draws nothing, and that a changed page is drawn. */
@@ -177,5 +177,5 @@ const goal = await page.evaluate(() => {
 });
 assert.equal(goal, 'prone');
 assert.deepEqual(complaints.filter((text) => !text.includes('CONTEXT_LOST')), []);
-await page.close();
+await close(page);
 

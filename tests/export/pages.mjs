@@ -6,7 +6,6 @@ const all = ['page', 'page_answer', 'page_hands', 'page_inside', 'page_lungs', '
 for (const name of process.argv.length > 2 ? process.argv.slice(2) : all) {
   const begin = performance.now();
   await import(`./${name}.mjs`);
-  for (const context of browser.contexts()) await context.close();
   console.log(`${name}: passed in ${((performance.now() - begin) / 1000).toFixed(1)} s`);
 }
 await browser.close();

@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { browser, open } from './browser.mjs';
+import { open } from './browser.mjs';
 import { basis } from './lungs.mjs';
 import { folder, skip, supine } from './support.mjs';
 

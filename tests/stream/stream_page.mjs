@@ -3,12 +3,11 @@
 // of the tilt sensor of one viewer. stream_page.mjs PAGE PORT
 import assert from 'node:assert/strict';
 import { createConnection } from 'node:net';
-import { load, skip } from '../export/support.mjs';
+import { skip } from '../export/support.mjs';
 
 const [site, port] = process.argv.slice(2);
 if (!site) skip('no page is served: the program was built without libwebsockets');
-const { chromium } = await load('playwright-core/index.mjs');
-if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
+const { browser, listen } = await import('../export/browser.mjs');
 
 /** Return the CRC-64 of ECMA-182, computed bit by bit. */
 function crc64(bytes) {
@@ -36,20 +35,13 @@ function transform(left, back, head) {
 
 const tracker = createConnection(Number(port), '127.0.0.1');
 tracker.on('data', () => {});
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM,
-  args: ['--headless', '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update',
-    '--disable-sync', '--no-first-run'],
-});
 const complaints = [];
 const context = await browser.newContext({ viewport: { width: 900, height: 640 }, reducedMotion: 'reduce' });
 context.setDefaultTimeout(120000); // ms, long enough on a busy machine
 
 async function view() {
   const page = await context.newPage();
-  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
-  page.on('pageerror', (error) => complaints.push(error.stack));
+  listen(page, complaints);
   await page.goto(site);
   await page.waitForFunction(() => window.supine?.state.moment && window.supineLive?.moments() > 0, null);
   return page;
