@@ -3,7 +3,7 @@
 // the C evaluator on the GPU, and its controls work.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
-import { assertPicture, close, evaluateFor, openLungs as open, picture, press } from './browser.mjs';
+import { assertPicture, close, evaluateFor, openLungs as open, picture, press, settled } from './browser.mjs';
 import { folder, largestDistance, randomDirections, randomSource, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
@@ -73,9 +73,9 @@ async function checkPointer(page) {
   const box = await page.locator('#picture').boundingBox();
   for (const [x, y] of [[0.36, 0.5], [0.4, 0.45], [0.62, 0.5], [0.3, 0.5]]) {
     await page.mouse.move(box.x + box.width * x, box.y + box.height * y);
-    await picture(page);
+    await settled(page);
     await page.waitForFunction(() => !window.supine.picture.picking);
-    await picture(page);
+    await settled(page);
     if (await page.locator('#pointed').isVisible()) {
       const value = parseFloat(await page.locator('#pointed strong').textContent());
       const [low, high] = await page.evaluate(() => {

@@ -235,7 +235,7 @@ async function checkTouch() {
 /** Check that an animated change of posture ends in the right posture, and that slow frames do not slow the breath:
  * its steps sum to the time of the frames. */
 async function checkMotion() {
-  const { page, complaints } = await openLungs(html, { viewport: { width: 1000, height: 700 }, reducedMotion: 'no-preference' });
+  const { page, complaints } = await openLungs(html, { viewport: { width: 840, height: 630 }, reducedMotion: 'no-preference' });
   const frames = await page.evaluate(() => new Promise((done) => {
     const { state: s, picture: p } = window.supine;
     const deform = p.deform.bind(p);
@@ -304,7 +304,7 @@ async function checkKinds(page) {
     await page.locator(`[name=kind][value=${kind}]`).check();
     for (const [x, y] of [[0.4, 0.5], [0.6, 0.52]]) {
       await page.mouse.move(box.x + box.width * x, box.y + box.height * y);
-      await picture(page);
+      await settled(page);
       await page.waitForFunction(() => !window.supine.picture.picking);
       await settled(page);
       const text = (await page.locator('#pointed').textContent()).replace('\u2212', '-');
@@ -355,13 +355,13 @@ async function checkWords(page) {
   assert.match(await page.locator('#title > :last-child p').textContent(), /not for diagnosis/);
   const behind = await page.evaluate(() => [...document.querySelectorAll('dl#facts dd')].map((e) => [e.textContent, e.closest('details').open]));
   assert.ok(behind.some(([text]) => /modes of band/.test(text)) && behind.every(([, open]) => !open));
-  const { page: still } = await openLungs(html, { viewport: { width: 1000, height: 700 } });
+  const { page: still } = await openLungs(html, { viewport: { width: 840, height: 630 } });
   await still.locator('[data-posture=prone]').click();
   assert.equal(await still.evaluate(() => window.supine.state.turning), null, 'it is animated in spite of reduced motion');
   await close(still);
 }
 
-const { page, complaints } = await openLungs(html, { viewport: { width: 1000, height: 700 } });
+const { page, complaints } = await openLungs(html, { viewport: { width: 840, height: 630 } });
 for (const check of [checkKeys, checkButtons, checkTyped, checkProbes, checkLoss, checkArrow, checkNotation, checkWords, checkKinds, checkLegible]) {
   await check(page);
   console.log(check.name);

@@ -103,7 +103,7 @@ const onPage = (page, name) => page.evaluate((wanted) => {
 
 async function pointed(page, [x, y]) {
   await page.mouse.move(x, y);
-  await picture(page);
+  await settled(page);
   await page.waitForFunction(() => !window.supine.picture.picking);
   await settled(page);
   return page.locator('#pointed').isVisible().then((shown) => (shown ? page.locator('#pointed').textContent() : ''));
@@ -196,9 +196,11 @@ async function checkSizes() {
     await page.locator('#inside-section').scrollIntoViewIfNeeded();
     await settled(page);
     writeFileSync(join('page_inside', `${width}x${height}-${colorScheme}.png`), await page.screenshot());
-    await page.evaluate(axe);
-    const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
-    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), []);
+    if (width === 1400 || touch) { // once in each theme
+      await page.evaluate(axe);
+      const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
+      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), []);
+    }
     assert.deepEqual(complaints, []);
     await close(page);
   }
@@ -223,7 +225,7 @@ async function checkMany() {
   await close(page);
 }
 
-const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 1000, height: 700 } });
+const { page, complaints } = await openLungs(files['inside.html'], { viewport: { width: 840, height: 630 } });
 await checkPositions(page);
 await checkPointer(page, await checkTable(page));
 await checkControls(page);

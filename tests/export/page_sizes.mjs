@@ -39,26 +39,27 @@ async function checkLetters(page, what) {
   });
 }
 
-const sizes = [[1400, 900], [900, 600], [844, 390], [390, 844]];
-for (const [width, height] of sizes) {
-  for (const colorScheme of ['light', 'dark']) {
-    const touch = Math.min(width, height) < 400;
-    const { page: sized, complaints: said } = await openLungs(html, { viewport: { width, height }, colorScheme, ...(touch && { hasTouch: true }) }, '#posture=left');
-    assert.ok(await sized.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
-    if (touch) { // a tap keeps a probe and does not turn the camera
-      const box = await sized.locator('#picture').boundingBox();
-      const azimuth = await sized.evaluate(() => window.supine.state.camera.azimuth);
-      await sized.touchscreen.tap(box.x + box.width * 0.48, box.y + box.height * 0.36);
-      await sized.waitForFunction(() => window.supine.state.probes.length === 1);
-      assert.equal(await sized.evaluate(() => window.supine.state.camera.azimuth), azimuth);
-    }
-    for (const key of ['1', '4', '5', '3']) {
-      await press(sized, key);
-      await settled(sized);
-      await checkLetters(sized, `${width} x ${height}, posture ${key}`);
-    }
-    writeFileSync(join('page_sizes', `${width}x${height}-${colorScheme}.png`), await sized.screenshot());
-    assert.deepEqual(said, []);
-    await close(sized);
+for (const [width, height] of [[1400, 900], [900, 600], [844, 390], [390, 844]]) {
+  const touch = Math.min(width, height) < 400;
+  const { page, complaints } = await openLungs(html, { viewport: { width, height }, ...(touch && { hasTouch: true }) }, '#posture=left');
+  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
+  if (touch) { // a tap keeps a probe and does not turn the camera
+    const box = await page.locator('#picture').boundingBox();
+    const azimuth = await page.evaluate(() => window.supine.state.camera.azimuth);
+    await page.touchscreen.tap(box.x + box.width * 0.48, box.y + box.height * 0.36);
+    await page.waitForFunction(() => window.supine.state.probes.length === 1);
+    assert.equal(await page.evaluate(() => window.supine.state.camera.azimuth), azimuth);
   }
+  for (const key of ['1', '4', '5', '3']) {
+    await press(page, key);
+    await settled(page);
+    await checkLetters(page, `${width} x ${height}, posture ${key}`);
+  }
+  for (const theme of ['light', 'dark']) {
+    writeFileSync(join('page_sizes', `${width}x${height}-${theme}.png`), await page.screenshot());
+    await page.evaluate(() => document.getElementById('theme').click());
+    await settled(page);
+  }
+  assert.deepEqual(complaints, []);
+  await close(page);
 }

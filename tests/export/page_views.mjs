@@ -82,6 +82,7 @@ async function checkPostures(page) {
 /** Check that each display option changes the picture and can be undone. */
 async function checkShown(page) {
   await page.mouse.move(750, 6); // off the lungs, so that no value is shown
+  const before = await picture(page);
   for (const [name, act, undo] of [
     ['a faded lung', () => page.locator('[name=lung-0][value="0.35"]').check(), () => page.locator('[name=lung-0][value="1"]').check()],
     ['a hidden lung', () => page.locator('[name=lung-1][value="0"]').check(), () => page.locator('[name=lung-1][value="1"]').check()],
@@ -92,7 +93,6 @@ async function checkShown(page) {
     ['height', () => page.locator('[name=kind][value=height]').check(), () => page.locator('[name=kind][value=displacement]').check()],
     ['a typed range', async () => { await page.locator('#range-end').fill('11'); await page.locator('#range-end').blur(); }, () => page.locator('#range-auto').click()],
   ]) {
-    const before = await picture(page);
     await act();
     assert.ok(!(await picture(page)).equals(before), `${name} changes nothing`);
     await undo();
