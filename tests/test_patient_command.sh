@@ -90,33 +90,35 @@ grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat f
 
 # With default options and two meshes, the basis of either scan reaches the other within 0.2 mm RMS, and
 # within 0.6 mm at four times the volume between them.
-# chain SCAN [VOLUME MESH ALLOWED]...: make a basis of the scan, and check its distance in mm RMS from a mesh at each
-# volume.
+# chain SCAN MESH [VOLUME ALLOWED]...: make a basis of the scan, and check its distances in mm RMS from the states of
+# a mesh at two volumes.
 chain() {
   scan=$1
-  shift
+  mesh=$2
+  shift 2
   "$supine" precompute "$scan.ply" --patient surface.json -o surface.safetensors >out 2>&1 ||
     fail "precompute $scan: $(cat out)"
-  while [ $# -gt 0 ]; do
-    "$supine" validate surface.safetensors --state "supine:$1:$2_supine_$1.ply" --json >valid.json ||
-      fail "validate $scan at $1"
-    echo "$scan at $1: $(surfaces valid.json) mm"
-    near "$(surfaces valid.json)" 0 "$3" || fail "$scan at $1: $(surfaces valid.json) mm"
-    shift 3
+  states=$(printf -- "--state supine:%s:${mesh}_supine_%s.ply " "$1" "$1" "$3" "$3")
+  "$supine" validate surface.safetensors $states --json >valid.json || fail "validate $scan"
+  for state in 1 5; do # index of the error of a state
+    echo "$scan at $1: $(number rms_mm valid.json $state) mm"
+    near "$(number rms_mm valid.json $state)" 0 "$2" ||
+      fail "$scan at $1: $(number rms_mm valid.json $state) mm"
+    shift 2
   done
 }
 for meshes in 'p q' 'q p'; do
   set -- $meshes
   "$supine" fit $1_supine_rest.ply $2_supine_rest+500.ply --other supine:rest+500 -o surface.json \
     >fit.txt || fail "fit a quiet breath"
-  chain $1_supine_rest rest+500 $2 0.2 rest+2000 $2 0.6
-  chain $2_supine_rest+500 rest $1 0.2 rest+2000 $1 0.6
+  chain $1_supine_rest $2 rest+500 0.2 rest+2000 0.6
+  chain $2_supine_rest+500 $1 rest 0.2 rest+2000 0.6
 done
 "$supine" fit p_supine_rest.ply q_supine_full.ply --other supine:full -o surface.json >fit.txt ||
   fail "fit two meshings"
 grep -q 'scans in one posture do not determine' fit.txt || fail "a gain is fitted to one posture"
-chain p_supine_rest full q 0.2 rest+2000 q 0.2
-chain q_supine_full rest p 0.2 rest+2000 p 0.2
+chain p_supine_rest q full 0.2 rest+2000 0.2
+chain q_supine_full p rest 0.2 rest+2000 0.2
 "$supine" validate surface.safetensors --state q_supine_full.ply --json >valid.json ||
   fail "validate where nothing moved"
 grep -q '"explained_percent": null' valid.json || fail "a share is explained where nothing moved"

@@ -11,7 +11,7 @@ const origin = 'http://lungs.test/';
 const kinds = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
 /** Open a page of the folder. This process answers its requests, without a network. */
 async function visit(path) {
-  const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
+  const page = await browser.newPage({ viewport: { width: 320, height: 240 } });
   const complaints = [];
   page.on('console', (message) => { if (message.type() === 'error') complaints.push(message.text()); });
   page.on('pageerror', (error) => complaints.push(error.stack));
