@@ -201,7 +201,7 @@ TEST(test_page_too_many_modes_or_vectors_refused) {
   assert_int_equal(EXPORT_RUN(text, many, "-o", out), 3);
   assert_says(text, "--modes 16");
   assert_int_equal(EXPORT_RUN(text, vector, "-o", out), 3);
-  assert_says(text, "a vector basis");
+  assert_says(text, "vector displacements");
 }
 
 TEST_GROUP(setup, teardown)

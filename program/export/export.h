@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Export a basis as a page for a browser or as a glTF file with morph targets. */
+ * Export the lungs of a basis file as an HTML page or as a glTF file with morph targets. */
 #ifndef SUPINE_EXPORT_H
 #define SUPINE_EXPORT_H
 
@@ -10,15 +10,15 @@
 
 enum { EXPORT_RESTING_TERMS = 9 }; /* number of spherical harmonics of bands 0 to 2 */
 
-/** An open basis to export. */
+/** An open basis file to export. */
 typedef struct export_source {
   supine_basis *basis;
   const supine_basis_info *info;
-  size_t terms;          /**< number of spherical harmonics of bands 0 to info->band */
-  const double *resting; /**< [resting_rows, EXPORT_RESTING_TERMS] expansion in spherical harmonics
-                            of the volume at rest minus the volume of the reference surface,
-                            mL; NULL if the volume at rest is unknown */
-  size_t resting_rows;   /**< number of lungs, or 1 if `resting` is the sum over all lungs */
+  size_t terms; /**< number of spherical harmonics of bands 0 to info->band */
+  /** [resting_rows, EXPORT_RESTING_TERMS] volume at rest minus volume of the reference surface, mL,
+   * as coefficients of spherical harmonics of the direction of gravity; NULL if rest is unknown. */
+  const double *resting;
+  size_t resting_rows; /**< number of lungs, or 1 if `resting` describes all lungs together */
 } export_source;
 
 /** Open a basis file.
@@ -32,39 +32,39 @@ void supine_export_source_close(export_source *source);
 /** Extend the box from `low` to `high`, mm, to contain all vertices of the reference surface. */
 void supine_export_box(const export_source *source, double low[3], double high[3]);
 
-/** Compute the displacement `u` of a vertex, mm, by one mode at weight 1 and gain 1. */
+/** Compute the displacement `u`, mm, that one mode causes at a vertex, at weight 1 and gain 1. */
 void supine_export_field(const export_source *source, size_t vertex, size_t mode, double u[3]);
 
 /** Compute the pose during a breath of `breath` mL, with gravity along the unit vector `g`. The
- * fraction is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration.
+ * `fraction` is 0 at rest (in the scan if rest is unknown) and 1 at the end of inspiration.
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before it reaches that volume */
 supine_status supine_export_breath_pose(const export_source *source, double breath,
                                         const double g[3], double fraction, supine_pose *pose,
                                         supine_error *error);
 
-/** Parts inside the lungs, which 'supine embed' has named. */
+/** Parts inside the lungs, with the names that 'supine embed' has stored. */
 typedef struct export_parts {
-  size_t count;       /**< > 0 */
+  size_t count;       /**< at least 1 */
   char *const *name;  /**< [count] */
-  const uint32_t *of; /**< [N] part of each vertex: index in `name` */
+  const uint32_t *of; /**< [N] index in `name` of the part that each vertex belongs to */
 } export_parts;
 
 /** Options of a glTF file. */
 typedef struct export_glb_options {
-  bool plain;    /**< if true, store floats, with vertices in the basis' order. If false, quantize
-                    and compress (KHR_mesh_quantization, EXT_meshopt_compression). Positions are
-                    then multiples of 0.045 mm (more for lungs longer than 1.4 m), and within
-                    0.1 mm of the library's up to 500 mL above rest */
-  bool animate;  /**< add five animations of breathing: one while the patient turns, and one in
-                    each of the four lying postures */
-  double breath; /**< tidal volume, mL; weights up to this volume are within 0 and 1 */
+  bool plain;   /**< true: store floats, with vertices in the order of the basis. false: store
+                   compressed integers (KHR_mesh_quantization, EXT_meshopt_compression). Positions are
+                   then multiples of 0.045 mm (of a larger unit for lungs longer than 1.47 m), and
+                   differ from the library's by at most 0.1 mm up to 500 mL above rest */
+  bool animate; /**< true: add five animations of breathing, one while the patient turns, and one in
+                   each of the four lying postures */
+  double breath; /**< tidal volume, mL; until its end, all weights are between 0 and 1 */
 } export_glb_options;
 
-/** Write glTF 2.0 binary. Each lung is a mesh of its own, with morph targets that any engine plays:
+/** Write a glTF 2.0 binary file. Each lung is a mesh with morph targets j, which place vertex i at
  *
  *     position_i = base_i + sum over j of weight_j target_ij     0 <= weight_j <= 1
  *
- * The `extras` of the file and of each lung's mesh say how to compute weights from gravity and
+ * The `extras` of the file and of each lung's mesh say how to compute the weights from gravity and
  * volume. Targets deform normals too. The colour of a vertex shows its largest displacement between
  * supine and another lying posture, at the start of a breath. The node "patient" lies on a table
  * and rotates about the centre of the lungs; an arrow shows gravity. Units are metres, y points up.
@@ -78,27 +78,27 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
                                       const export_glb_options *options, size_t *bytes,
                                       supine_error *error);
 
-/** Largest number of modes on the page: four vertex attributes with four coefficients each. */
+/** Largest number of modes on a page: four vertex attributes hold four coefficients each. */
 enum { EXPORT_PAGE_MODES_MAX = 16 };
 
 /** Options of a page. */
 typedef struct export_page {
-  double breath;               /**< tidal volume, mL */
-  const supine_pose *from;     /**< pose from which displacements are measured */
-  const char *from_name;       /**< name of `from`, for example "supine at rest" */
-  const char *title;           /**< UTF-8 */
-  const export_source *inside; /**< content of the lungs: a vector basis with the same modes; NULL
-                                  if there is no content */
-  const export_parts *parts;   /**< parts of `inside`; unused if `inside` is NULL */
-  bool live;                   /**< also show the states that the server 'supine stream' sends */
+  double breath;           /**< tidal volume, mL */
+  const supine_pose *from; /**< pose from which displacements are measured */
+  const char *from_name;   /**< name of `from`, for example "supine at rest" */
+  const char *title;       /**< UTF-8 */
+  /** Content of the lungs: a basis with the same modes and vector displacements; NULL for none. */
+  const export_source *inside;
+  const export_parts *parts; /**< parts of `inside`; unused if `inside` is NULL */
+  bool live;                 /**< true to show also the states that 'supine stream' sends */
 } export_page;
 
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a
- * network. Vertices, displacements and triangles are compressed by meshoptimizer. Positions in
- * lungs of up to 650 mm differ from the library's by at most 0.02 mm. A write error sets the error
+ * network. Vertices, displacements and triangles are compressed by meshoptimizer. In lungs up to
+ * 650 mm long, positions differ from the library's by at most 0.02 mm. A write error sets the error
  * indicator of `file`.
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis is a vector basis or has more than
- *                                   EXPORT_PAGE_MODES_MAX modes, or meshoptimizer is not installed
+ * @retval SUPINE_ERROR_UNSUPPORTED  displacements are vectors, there are more modes than
+ *                                   EXPORT_PAGE_MODES_MAX, or meshoptimizer is not installed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_html_print(FILE *file, const export_source *source,
                                        const export_page *shown, supine_error *error);

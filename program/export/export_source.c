@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Open a basis to export, and compute poses during a breath. */
+/* Open a basis file to export, and compute poses during a breath. */
 #include <math.h>
 
 #include <supine/sh.h>

@@ -12,8 +12,8 @@
 
 static const double step_mm = 0.045; /* smallest unit of quantized positions */
 
-/* Compute the largest displacement of each vertex between supine and another lying posture, at the
- * start of a breath, mm. Return the maximum. Overwrites glb.xyz and glb.normals. */
+/* Compute the largest displacement of each vertex, mm, from supine to another lying posture at the
+ * start of a breath. Return the maximum over all vertices. Overwrites glb.xyz and glb.normals. */
 static double find_displacements(const glb *g, float *displacement) {
   static const double lying[][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
   float *from = g->normals;
@@ -35,7 +35,7 @@ static double find_displacements(const glb *g, float *displacement) {
   return largest;
 }
 
-/* Compute vertex colours, linear RGBA, from displacements. The colour map ends at `end` mm. */
+/* Compute vertex colours, linear RGBA. The last colour shows a displacement of `end` mm. */
 static void colour(const float *displacement, size_t count, double end, uint8_t *colours) {
   for (size_t i = 0; i < count; ++i) {
     double rgb[3];
@@ -48,8 +48,8 @@ static void colour(const float *displacement, size_t count, double end, uint8_t 
   }
 }
 
-/* Compute the colours and normals of the lungs' vertices. Set `end` to the displacement at the end
- * of the colour map, mm. */
+/* Compute vertex colours and normals, and `end`, the displacement that the last colour shows, mm.
+ */
 static supine_status prepare(glb *g, double *end, supine_error *error) {
   const size_t n = g->source->info->vertex_count;
   float *displacement = calloc(n, sizeof *displacement);
@@ -74,7 +74,7 @@ static supine_status prepare(glb *g, double *end, supine_error *error) {
 }
 
 /* Append the patient with the lungs, the animations, the table and the arrow. Set `roots` to the
- * root nodes of the scene, and `end` to the displacement at the end of the colour map, mm. */
+ * root nodes of the scene, and `end` to the displacement that the last colour shows, mm. */
 static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *error) {
   float q[4];
   const supine_status status = prepare(g, end, error);
@@ -96,8 +96,8 @@ static supine_status add_all(glb *g, double *end, json_t **roots, supine_error *
   return g->status == SUPINE_OK ? SUPINE_OK : supine_error_set(error, g->status, "out of memory");
 }
 
-/* Build the file's JSON. A compressed file has a second buffer, the fallback of
- * EXT_meshopt_compression: it has the size of the decoded arrays, but no data. */
+/* Build the file's JSON. A compressed file has a second buffer, the fallback that
+ * EXT_meshopt_compression requires: it has the size of the decompressed arrays, but no data. */
 static json_t *make_root(glb *g, size_t bytes, double end, json_t *roots) {
   static const char packed[] = "EXT_meshopt_compression";
   json_t *root =
@@ -152,7 +152,7 @@ static supine_status write_file(const char *path, const char *text, const char *
   return status;
 }
 
-/* Build the chunks in memory, then write the file. Set `total` to the file's size, bytes. */
+/* Build both chunks in memory, then write the file. Set `total` to the size of the file, bytes. */
 static supine_status make_and_write(glb *g, const char *path, size_t *total, supine_error *error) {
   char *numbers = NULL;
   size_t bytes = 0;
@@ -199,7 +199,7 @@ supine_status supine_export_glb_write(const char *path, const export_source *sou
     *parts[i] = json_array();
   }
   status = supine_export_targets_choose(source, options->breath, &g->targets, error);
-  g->step = options->plain ? 1 : fmax(step_mm, g->targets.reach / (INT16_MAX / 2));
+  g->step = options->plain ? 1 : fmax(step_mm, g->targets.half_extent / (INT16_MAX / 2));
   if (status == SUPINE_OK) {
     status = make_and_write(g, path, bytes, error);
   }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Build a glTF binary file: the state and functions that glb.c and glb_*.c share. */
+ * Declare the state and the functions with which glb.c and glb_*.c build a glTF binary file. */
 #ifndef SUPINE_EXPORT_GLB_H
 #define SUPINE_EXPORT_GLB_H
 
@@ -16,10 +16,10 @@ typedef enum glb_kind {
   GLB_CORNERS,  /**< uint32_t: vertex indices, three for each triangle */
   GLB_PLACES,   /**< float [3]: positions or displacements in units of glb.step */
   GLB_NORMALS,  /**< float [3]: unit normals */
-  GLB_CHANGES,  /**< float [3]: vectors that a target adds to normals */
+  GLB_CHANGES,  /**< float [3]: vectors that a morph target adds to normals */
   GLB_COLOURS,  /**< uint8_t [4]: RGBA, linear */
   GLB_TIMES,    /**< float: times of an animation's frames, s */
-  GLB_WEIGHTS,  /**< float: weights of targets in an animation, 0 to 1 */
+  GLB_WEIGHTS,  /**< float: weights of morph targets in an animation, 0 to 1 */
   GLB_ROTATIONS /**< float [4]: quaternions x, y, z, w */
 } glb_kind;
 
@@ -31,17 +31,17 @@ typedef struct glb {
   export_order order;
   float *xyz;       /**< [N, 3] workspace */
   float *normals;   /**< [N, 3] unit normals of the base mesh */
-  float *added;     /**< [targets, N, 3] vectors that targets add to the normals at weight 1 */
+  float *added;     /**< [targets.count, N, 3] vectors that a target at weight 1 adds to normals */
   uint8_t *colours; /**< [N, 4] linear RGBA of vertices */
   double step;      /**< unit of GLB_PLACES, mm; 1 if options->plain */
   json_t *views, *accessors, *meshes, *nodes, *materials, *animations;
-  FILE *numbers;        /**< binary chunk */
-  size_t unpacked;      /**< size of the compressed arrays after decoding, bytes */
+  FILE *numbers;        /**< binary chunk of the file */
+  size_t unpacked;      /**< size of all compressed arrays after decompression, bytes */
   supine_status status; /**< SUPINE_ERROR_MEMORY if an allocation failed */
 } glb;
 
 /** Append an array of `count` rows and return the index of its accessor.
- * @param order  [count] indices of the rows to append; NULL if they are 0, 1, 2, ... */
+ * @param order  [count] indices in `rows` of the rows to append; NULL for 0, 1, 2, ... */
 json_int_t supine_export_glb_put(glb *g, glb_kind kind, const void *rows, const uint32_t *order,
                                  size_t count);
 
@@ -51,7 +51,7 @@ json_int_t supine_export_glb_put_zeros(glb *g, glb_kind kind, size_t count);
 /** Append a mesh and a node that shows it; return the node's index. Positions of the mesh are in
  * LPS axes, relative to the centre of the lungs, in units of glb.step. The node converts them to
  * metres with y up.
- * @param mesh  `g` takes ownership */
+ * @param mesh  JSON of the mesh, which `g` then owns */
 json_int_t supine_export_glb_show(glb *g, const char *name, json_t *mesh);
 
 /** Append the mesh of a lung, with morph targets; return the index of its node. */
@@ -60,18 +60,18 @@ json_int_t supine_export_glb_add(glb *g, size_t lung);
 /** Append a material and return its index. */
 json_int_t supine_export_glb_material(glb *g, const char *name, const double rgb[3]);
 
-/** Return the extras of the file, which say how to compute weights from gravity and volume.
- * @param end  displacement at the end of the colour map, mm */
+/** Return the `extras` of the file, which say how to compute weights from gravity and volume.
+ * @param end  displacement that the last colour of the colour map shows, mm */
 json_t *supine_export_glb_extras(const glb *g, double end);
 
-/** Return the extras of a lung's mesh: its constants in the formulas of the file's extras. */
+/** Return the `extras` of a lung's mesh: constants for the formulas in the `extras` of the file. */
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung);
 
 /** Compute the rotation of the node "patient" as a quaternion x, y, z, w. The patient lies on the
- * table, turned about the body's long axis by `roll` radians: 0 is supine, pi / 2 the left side. */
+ * table, turned by `roll` radians about the body's long axis: 0 is supine, pi / 2 the left side. */
 void supine_export_glb_rotation(double roll, float q[4]);
 
-/** Append the animations. Node 0 must be the patient, and node 1 + i must be lung i. */
+/** Append the animations of breathing. Node 0 must be the patient, node 1 + i lung i. */
 void supine_export_glb_animate(glb *g);
 
 /** Append a table and an arrow that shows gravity. Return the root nodes of the scene: the patient,

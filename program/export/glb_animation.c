@@ -9,8 +9,8 @@
 static const double pi = 3.14159265358979323846;
 enum { RATE = 6 /* frames per second */, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
 
-/* At roll t, gravity in the patient's axes is (sin t, cos t, 0). In glTF's axes the patient turns
- * by t about y, the body's long axis, then by -90 degrees about x to lie down. */
+/* At a roll of t radians, gravity in the patient's axes is (sin t, cos t, 0). In glTF's axes the
+ * patient turns by t about y, the body's long axis, then by -90 degrees about x to lie down. */
 void supine_export_glb_rotation(double roll, float q[4]) {
   const double c = cos(roll / 2) * sqrt(0.5);
   const double s = sin(roll / 2) * sqrt(0.5);
@@ -20,22 +20,22 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the roll at a time of the animation, radians. Of the SECONDS of each posture, the patient
- * stays in it for the first half and turns to the next posture in the second half. */
+/* Return the patient's roll, radians, in the animation of turning. Each posture takes SECONDS: the
+ * patient keeps it for the first half, then turns to the next posture. */
 static double roll_at(double seconds) {
   const double stage = floor(seconds / SECONDS);
   const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
   return pi / 2 * (stage + x * x * (3 - 2 * x));
 }
 
-/* Compute the weights of all lungs in one frame, `seconds` after the start of a breath. They belong
- * in an array [lungs, frames, targets], in which `rows` points to this frame of lung 0. */
+/* Compute one frame: the weights of all lungs' targets, `seconds` after the start of a breath.
+ * `rows` points to this frame of lung 0 in an array [lungs, frames, targets]. */
 static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
   const double gravity[3] = {sin(roll), cos(roll), 0};
   const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
   double weights[EXPORT_TARGETS_MAX];
   supine_pose pose;
-  /* No failure is expected: supine_export_targets_choose has posed both ends of the breath. */
+  /* No failure is expected, because supine_export_targets_choose has checked this breath. */
   (void)supine_export_breath_pose(g->source, g->options->breath, gravity, fraction, &pose, NULL);
   for (size_t i = 0; i < g->source->info->lung_count; ++i) {
     supine_export_targets_weights(g->source, &g->targets, &pose, i, weights);
@@ -45,7 +45,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
   }
 }
 
-/* Append an animation of breathing at `roll` radians, or during a full turn if `roll` is NAN. */
+/* Append an animation of breathing at `roll` radians, or during one full turn if `roll` is NAN. */
 static void add(glb *g, const char *name, double roll, size_t seconds) {
   const size_t count = g->source->info->lung_count;
   const size_t frames = RATE * seconds + 1;

@@ -63,14 +63,14 @@ static unsigned char *store(glb_kind kind, const layout *l, const void *rows, co
       const size_t bytes = l->stride / (l->columns == 3 ? 4 : 1);
       const double value = (double)values[k] * (kind == GLB_PLACES ? 1 : l->limit);
       const int32_t counts = (int32_t)rint(fmax(-l->limit, fmin(l->limit, value)));
-      memcpy(row + k * bytes, &counts, bytes); /* the low bytes: the machine is little-endian */
+      memcpy(row + k * bytes, &counts, bytes); /* low bytes, because the machine is little-endian */
     }
   }
   return stored;
 }
 
-/* Write stored rows and return their buffer view. `mode` is the mode of EXT_meshopt_compression, or
- * NULL for no compression. */
+/* Write the rows that store() has returned, and return their buffer view. `mode` is the mode of
+ * EXT_meshopt_compression, or NULL for no compression. */
 static json_t *write_rows(glb *g, glb_kind kind, const layout *l, const unsigned char *stored,
                           size_t count, const char *mode) {
   const size_t bytes = count * l->stride;

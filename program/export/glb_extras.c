@@ -6,8 +6,8 @@
 #include "program/export/glb.h"
 #include "program/export/template.h"
 
-/* With more targets, the extras omit the constants of the volume: K modes need K^3. */
-enum { FORMS_MAX = 32 };
+/* With more targets, the extras omit the volume's formula, which has K^3 constants for K modes. */
+enum { VOLUME_TARGETS_MAX = 32 };
 
 static const char frame_text[] =
     "Vertices of a lung's mesh are in the patient's axes, LPS (x left, y back, z head), from "
@@ -35,7 +35,7 @@ static const char resting_text[] =
     "minus referenceVolume is max(0, -g_z)^2 * fullUprightGain * referenceVolume. Above rest, "
     "all lungs have covered the same fraction of the way from rest to full inflation.";
 
-/* Return the names of the targets: "mode_3" for a mode, "bend_3" for the bend of that mode. */
+/* Return the names of the morph targets, such as "mode_3" and "bend_3". */
 static json_t *target_names(const glb *g) {
   const size_t k = g->source->info->mode_count;
   json_t *names = json_array();
@@ -63,7 +63,7 @@ static json_t *origin(const export_source *source) {
 json_t *supine_export_glb_extras(const glb *g, double end) {
   const export_source *s = g->source;
   const char *full = supine_basis_metadata(s->basis, "full_upright_gain");
-  const double unit = 1e-7; /* modes are written as integers of this unit, to save text */
+  const double unit = 1e-7; /* unit of the integers in `modes` */
   json_t *modes = json_array();
   for (size_t k = 0; k < s->info->mode_count; ++k) {
     json_t *row = json_array();
@@ -79,7 +79,7 @@ json_t *supine_export_glb_extras(const glb *g, double end) {
       supine_template_numbers(s->info->bend, 3), "middle",
       supine_template_numbers(g->targets.middle, 3), "millimetresPerUnit", g->step, "breathVolume",
       g->options->breath, "largestDisplacementColoured", end, "basis", origin(s));
-  if (g->targets.count <= FORMS_MAX) {
+  if (g->targets.count <= VOLUME_TARGETS_MAX) {
     (void)json_object_set_new(supine, "volume", json_string(volume_text));
   }
   if (s->info->has_rest) {
@@ -104,7 +104,7 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
     (void)json_object_set_new(supine, "resting",
                               supine_template_numbers(resting, EXPORT_RESTING_TERMS));
   }
-  if (g->targets.count <= FORMS_MAX) {
+  if (g->targets.count <= VOLUME_TARGETS_MAX) {
     (void)json_object_update_new(
         supine,
         json_pack(

@@ -7,7 +7,7 @@
 enum { SIDES = 16, RINGS = 5 };
 
 /* Append a solid of revolution about the vertical axis and return its node. `profile` has the
- * radius and the height of each ring, mm. Without normals, engines shade each facet flat. */
+ * radius and the height of each ring, mm. The mesh has no normals, so that facets look flat. */
 static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2], size_t sides,
                         const double rgb[3]) {
   float places[RINGS * SIDES][3];
@@ -45,7 +45,7 @@ static json_int_t sweep(glb *g, const char *name, const double profile[RINGS][2]
 json_t *supine_export_glb_room(glb *g) {
   static const double grey[3] = {0.45, 0.52, 0.62};
   static const double red[3] = {0.80, 0.25, 0.05};
-  const double r = g->targets.reach;
+  const double r = g->targets.half_extent;
   const double top = -1.15 * r;
   const double table[RINGS][2] = {
       {0, top - 0.06 * r}, {1.5 * r, top - 0.06 * r}, {1.5 * r, top}, {0, top}, {0, top}};

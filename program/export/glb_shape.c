@@ -34,8 +34,8 @@ static void place_target(const glb *g, size_t lung, size_t j, size_t vertex, dou
   }
 }
 
-/* Compute the position of a vertex of the base mesh, in units of glb.step. Correct it for the
- * rounding of the targets, so that the deformed position at the weights `rest` is exact. */
+/* Compute the position of a vertex of the base mesh, in units of glb.step. If the file rounds the
+ * targets, correct the position so that their rounding errors cancel at the weights `rest`. */
 static void place_base(const glb *g, size_t lung, const double *rest, size_t vertex,
                        double xyz[3]) {
   supine_export_targets_base(g->source, &g->targets, lung, vertex, xyz);
@@ -51,13 +51,13 @@ static void place_base(const glb *g, size_t lung, const double *rest, size_t ver
   }
 }
 
-/* Append one lung's rows of an array over all vertices; return the index of the accessor. */
+/* Append one lung's part of an array over all vertices; return the index of the accessor. */
 static json_int_t put(glb *g, size_t lung, glb_kind kind, const void *rows) {
   const size_t *begin = g->source->info->lung_begin + lung;
   return supine_export_glb_put(g, kind, rows, g->order.vertex + begin[0], begin[1] - begin[0]);
 }
 
-/* Append the displacements by target `j`; if `j` is the number of targets, append the base mesh. */
+/* Append a lung's displacements by target `j`, or its base mesh if `j` is the number of targets. */
 static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) {
   const size_t *begin = g->source->info->lung_begin + lung;
   for (size_t i = begin[0]; i < begin[1]; ++i) {
@@ -74,7 +74,7 @@ static json_int_t put_places(glb *g, size_t lung, size_t j, const double *rest) 
   return put(g, lung, GLB_PLACES, g->xyz);
 }
 
-/* Append the vectors that target `j` adds to the normals. */
+/* Append the vectors that target `j` adds to the normals of a lung. */
 static json_int_t put_changes(glb *g, size_t lung, size_t j) {
   const supine_basis_info *info = g->source->info;
   const size_t *begin = info->lung_begin + lung;
@@ -87,7 +87,7 @@ static json_int_t put_changes(glb *g, size_t lung, size_t j) {
   return supine_export_glb_put_zeros(g, GLB_CHANGES, begin[1] - begin[0]);
 }
 
-/* Append a lung's triangles, with 0 as the index of the lung's first vertex. */
+/* Append a lung's triangles; their vertices count from the first vertex of the lung. */
 static json_int_t put_corners(glb *g, size_t lung) {
   const size_t *begin = g->order.corner_begin + lung;
   uint32_t *corners = g->order.corners + begin[0];

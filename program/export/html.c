@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the page: fill page.html with its scripts, its shaders and the basis. */
+/* Write the page: fill page.html with scripts, shaders and the data of the basis. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,15 +15,15 @@ extern const supine_asset supine_export_assets[]; /* the files of program/export
 
 enum { COUNT_MAX = 32767, NORMAL_WORDS = (SUPINE_NORMAL_MODES_MAX + 2) / 3, NORMAL_BIAS = 128 };
 
-/* State while a page is printed. Positions and coefficients are stored as 16-bit multiples of a
- * unit, called counts. */
+/* State while a page is printed. The page stores positions and coefficients as counts: 16-bit
+ * integers that are multiplied by a unit. */
 typedef struct page {
   const export_source *source;
   const export_page *shown;
-  double middle[3];   /* origin of stored positions: centre of the box of all vertices, mm */
-  double place_unit;  /* unit of positions, mm */
+  double middle[3];   /* centre of the bounding box of all vertices, mm: origin of positions */
+  double place_unit;  /* unit of stored positions, mm */
   double unit;        /* unit of the surface's coefficients, mm; directions are unit vectors */
-  double inside_unit; /* unit of the coefficients of the content, mm */
+  double inside_unit; /* unit of the coefficients of shown->inside, mm */
   export_order order; /* order of the surface's vertices and triangles */
   supine_status *status;
 } page;
@@ -84,17 +84,17 @@ static void inside_row(const page *p, const export_source *s, size_t vertex, int
   }
 }
 
-/* Divide a number between plus and minus 1 << bits by 1 << shift and round it. Add NORMAL_BIAS, so
- * that numbers near 0 have the same high byte, which compresses well. */
+/* Divide a number of at most +-(1 << bits) by 1 << shift, round it, and add NORMAL_BIAS, so that
+ * small positive and negative numbers have the same high byte, which compresses well. */
 static int16_t coarse(int32_t number, int bits, int shift) {
   const int32_t most = (1 << (bits - shift)) - 1;
   const int32_t steps = (number + (1 << shift) / 2) >> shift;
   return (int16_t)((steps < most ? steps : most) + NORMAL_BIAS);
 }
 
-/* Fill a row with the normals of a vertex: words of three numbers, from supine_gl_pack_normals. The
+/* Fill a row with the normals of a vertex, from supine_gl_pack_normals' words of three numbers. The
  * row has the first numbers of all words, then the second, then the third ones, without their
- * lowest 2, 2 and 1 bits. takeNormals in basis.js reads the row. */
+ * lowest 2, 2 and 1 bits, respectively. takeNormals in basis.js reads the row. */
 static void normal_row(const page *p, const export_source *s, size_t vertex, int16_t *row) {
   uint32_t words[3 * NORMAL_WORDS];
   const size_t count = (s->info->normal_count + 2) / 3 * 3;
@@ -109,7 +109,7 @@ static void normal_row(const page *p, const export_source *s, size_t vertex, int
 
 typedef void fill_row(const page *p, const export_source *s, size_t vertex, int16_t *row);
 
-/* Write a row of `columns` 16-bit counts for each vertex, padded to an even number of columns. */
+/* Compress and write `columns` counts for each vertex, padded to an even number of columns. */
 static void write_rows(const page *p, FILE *file, const char *name, const export_source *s,
                        size_t columns, fill_row *fill) {
   const size_t n = s->info->vertex_count;
@@ -135,8 +135,8 @@ static void write_corners(const page *p, FILE *file, const char *name, const exp
   write_packed(p, file, name, status, packed);
 }
 
-/* Choose the origin and the units of the counts: units that place vertices within 0.02 mm, or
- * larger units if a count would otherwise exceed COUNT_MAX. */
+/* Choose the origin and the units of the counts. The units are so small that positions are exact to
+ * 0.02 mm, unless a count would then exceed COUNT_MAX. */
 static void find_units(page *p) {
   static const double step = 0.005;
   const export_source *s = p->source;
@@ -166,7 +166,7 @@ static void find_units(page *p) {
   p->inside_unit = fmax(2 * step / (double)k, largest_inside / COUNT_MAX);
 }
 
-/* Write the tensors below, if the basis has them, without compression. */
+/* Write those tensors in `names` that the basis has, as doubles without compression. */
 static void write_doubles(FILE *file, const supine_basis *basis) {
   static const char *const names[] = {"modes",         "normal_weights",   "resting_volume",
                                       "volume_linear", "volume_quadratic", "volume_cubic"};
@@ -182,7 +182,7 @@ static void write_doubles(FILE *file, const supine_basis *basis) {
   }
 }
 
-/* Return the 256 colours of each map as hexadecimal digits. */
+/* Return the 256 colours of each colour map as hexadecimal digits. */
 static json_t *colours(void) {
   static const char *const names[SUPINE_COLOURS_COUNT] = {"displacement", "difference"};
   enum { COLOURS = 256 };
@@ -201,7 +201,7 @@ static json_t *colours(void) {
   return maps;
 }
 
-/* Return `begin` as JSON: where each lung begins, then where the last one ends. */
+/* Return `begin` as a JSON list: the first index of each lung, then the end of the last lung. */
 static json_t *begins(const export_source *s, const size_t *begin) {
   json_t *list = json_array();
   for (size_t i = 0; i <= s->info->lung_count; ++i) {
@@ -210,7 +210,7 @@ static json_t *begins(const export_source *s, const size_t *begin) {
   return list;
 }
 
-/* Return the description of the content as JSON; null if there is none. */
+/* Return the size, the parts and the unit of the lungs' content as JSON; null without content. */
 static json_t *describe_inside(const page *p) {
   if (p->shown->inside == NULL) {
     return json_null();
@@ -284,7 +284,7 @@ static json_t *describe(const page *p) {
       supine_template_numbers(info->bend, 3));
 }
 
-/* Write the tensors in place of {{tensors}}. */
+/* Write the tensors of the page in place of the tag {{tensors}} of page.html. */
 static void write_tensors(const void *context, const char *name, FILE *file) {
   const page *p = context;
   const export_source *s = p->source;
@@ -315,7 +315,7 @@ supine_status supine_export_html_print(FILE *file, const export_source *source,
   const supine_basis_info *info = source->info;
   if (info->vector) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
-                            "a page cannot show a vector basis: export .glb");
+                            "a page cannot show vector displacements: export .glb");
   }
   if (info->mode_count > EXPORT_PAGE_MODES_MAX) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,

@@ -54,9 +54,9 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
   return SUPINE_OK;
 }
 
-/* Sort a lung's triangles from feet to head, then into strips around the long axis, along which
- * neighbours differ least. `level` [N, 3] holds (z, 0, 0) of each vertex; `from` [count] is
- * workspace. */
+/* Sort a lung's triangles from feet to head, then into strips around the long axis, because the
+ * data of neighbours along such strips differ least. `level` [N, 3] has (z, 0, 0) of each vertex;
+ * `from` [count] is workspace. */
 static void sort_triangles(uint32_t *corners, size_t count, const float *level, size_t vertices,
                            uint32_t *from) {
   memcpy(from, corners, count * sizeof *from);
@@ -64,7 +64,7 @@ static void sort_triangles(uint32_t *corners, size_t count, const float *level, 
   meshopt.optimizeVertexCacheStrip(corners, corners, count, vertices);
 }
 
-/* Renumber the vertices of a lung in the order in which its corners first use them, with unused
+/* Renumber the vertices of a lung in the order in which its triangles first use them, with unused
  * vertices last. `place` [N] is workspace. */
 static void number_vertices(const export_source *source, size_t lung, uint32_t *place,
                             export_order *order) {

@@ -16,8 +16,8 @@ typedef struct export_packed {
  * @retval SUPINE_ERROR_UNSUPPORTED  meshoptimizer is not installed */
 supine_status supine_export_pack_begin(supine_error *error);
 
-/** Encode a unit vector as 4 signed integers for the decoder's filter OCTAHEDRAL; the last is 0.
- * @param size     total size of the 4 integers, bytes: 4 or 8
+/** Encode a unit vector as 4 signed integers, the last 0, for the decoder's filter OCTAHEDRAL.
+ * @param size     size of all 4 integers together, bytes: 4 or 8
  * @param numbers  output: the integers */
 void supine_export_pack_direction(const float direction[3], size_t size, void *numbers);
 
@@ -33,16 +33,16 @@ supine_status supine_export_pack_corners(const uint32_t *corners, size_t count, 
 
 /** Order in which vertices and triangles are written, lung by lung. */
 typedef struct export_order {
-  uint32_t *vertex;  /**< [N] index in the basis of each written vertex */
-  uint32_t *corners; /**< [triangles, 3] indices of written vertices */
-  size_t
-      corner_begin[SUPINE_LUNGS_MAX + 1]; /**< where each lung begins in `corners`, then the end */
+  uint32_t *vertex;  /**< [N] vertex[i] is the index in the basis of vertex i in the file */
+  uint32_t *corners; /**< [triangles, 3] vertices of each triangle, by their indices in the file */
+  size_t corner_begin[SUPINE_LUNGS_MAX + 1]; /**< index in `corners` at which each lung begins, then
+                                                the end of the last lung */
 } export_order;
 
 /** Choose an order; free it with supine_export_order_free, also after a failure.
- * @param packed  if true, sort triangles, and vertices by their first triangle, so that they
- *                compress well; supine_export_pack_begin must have been called. If false, keep the
- *                order of the basis
+ * @param packed  true to choose an order that compresses well: triangles are sorted, and vertices
+ *                are in the order in which the triangles first use them; call
+ *                supine_export_pack_begin before. If false, keep the order of the basis
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_export_order_make(const export_source *source, bool packed,
                                        export_order *order, supine_error *error);

@@ -7,11 +7,11 @@
 #include "sh/base/vec3.h"
 
 enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
-/* Part of a weight's range that is added at either end, for directions between the sampled ones. */
+/* Fraction by which each weight's range grows at both ends, for directions between samples. */
 static const double margin = 0.02;
 
-/* Find s and t such that the gain along each axis is s + t bend[axis], from the axes with the least
- * and the largest bend. Write them to `split`. */
+/* Set `split` to {s, t}, such that gains[axis] = s + t bend[axis] along the axes with the smallest
+ * and the largest bend. */
 static void split_gains(const double bend[3], const double gains[3], double split[2]) {
   size_t low = 0;
   size_t high = 0;
@@ -23,7 +23,7 @@ static void split_gains(const double bend[3], const double gains[3], double spli
   split[0] = gains[low] - split[1] * bend[low];
 }
 
-/* Compute the amount of each field of a lung, which targets.h defines. */
+/* Compute amount_j of export_weights for each field j of a lung. */
 static void find_amounts(const export_source *source, size_t count, const supine_pose *pose,
                          size_t lung, double *amounts) {
   const size_t k = source->info->mode_count;
@@ -43,9 +43,9 @@ void supine_export_targets_weights(const export_source *source, const export_tar
   }
 }
 
-/* Set the offset of each field to its smallest amount over all directions and volumes of a breath,
- * and its unit to the range of the amounts. Gains are monotonic in the volume, so the two ends of
- * the breath suffice. */
+/* Set each offset to the smallest amount of its field during a breath in any sampled direction of
+ * gravity, and each unit to the difference between the largest and the smallest amount. Gains are
+ * monotonic in the volume, so that the start and the end of the breath suffice. */
 static supine_status find_ranges(const export_source *source, double breath,
                                  export_targets *targets, supine_error *error) {
   double amounts[EXPORT_TARGETS_MAX];
@@ -75,10 +75,10 @@ static void find_middle(const export_source *source, export_targets *targets) {
   double low[3] = {INFINITY, INFINITY, INFINITY};
   double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   supine_export_box(source, low, high);
-  targets->reach = 0;
+  targets->half_extent = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
     targets->middle[axis] = (low[axis] + high[axis]) / 2;
-    targets->reach = fmax(targets->reach, (high[axis] - low[axis]) / 2);
+    targets->half_extent = fmax(targets->half_extent, (high[axis] - low[axis]) / 2);
   }
 }
 
@@ -108,7 +108,7 @@ void supine_export_targets_field(const export_source *source, size_t vertex, siz
   }
 }
 
-/* Add the sum over j of amount[j] times field j at a vertex to `xyz`, mm. */
+/* Add amount[j] times field_j at a vertex to the position `xyz`, mm, for each j below `count`. */
 static void add_fields(const export_source *source, size_t count, const double *amount,
                        size_t vertex, double xyz[3]) {
   for (size_t j = 0; j < count; ++j) {
@@ -128,8 +128,8 @@ void supine_export_targets_base(const export_source *source, const export_target
   add_fields(source, targets->count, targets->lung[lung].offset, vertex, xyz);
 }
 
-/* Compute the normals of the surface, [N, 3], at the given weights of each lung, with weight `j`
- * increased by `step` in every lung. `xyz` [N, 3] is workspace. */
+/* Compute the normals [N, 3] of the surface at the weights of each lung, after adding `step` to the
+ * weight of target `j` in every lung. `xyz` [N, 3] is workspace. */
 static void find_normals(const export_source *source, const export_targets *targets,
                          double (*weights)[EXPORT_TARGETS_MAX], size_t j, double step, float *xyz,
                          float *normals) {
@@ -151,11 +151,11 @@ static void find_normals(const export_source *source, const export_targets *targ
   supine_normals(source->basis, xyz, normals);
 }
 
-/* Scale the base normals to length 1, which glTF requires. Divide the vectors that targets add by
- * the same lengths, because engines draw normalize(base + sum over j of weight_j added_j). */
+/* Divide each base normal by its length, because glTF requires unit normals, and the vectors that
+ * targets add to it by the same length, because engines normalise the sum. */
 static void make_unit(const export_source *source, const export_targets *targets, float *base,
                       float *added) {
-  static const double least = 0.2; /* smallest length to divide by, so that vectors stay short */
+  static const double least = 0.2; /* smallest divisor of added vectors, to keep them short */
   const size_t n = source->info->vertex_count;
   for (size_t i = 0; i < n; ++i) {
     float *b = base + 3 * i;
@@ -173,13 +173,13 @@ static void make_unit(const export_source *source, const export_targets *targets
   }
 }
 
-/* Round the vectors that targets add to normals to bytes. If a component is near that of the
- * previous vertex in `order`, use that one, because equal rows compress to almost nothing. Correct
- * the base so that the normals at `weights` stay the same. */
+/* Round the vectors in `added` to multiples of 1 / INT8_MAX. Replace a component by that of the
+ * previous vertex in `order` if both are nearly equal, because equal rows compress to almost
+ * nothing. Correct `base` so that the normals at `weights` stay the same. */
 static void round_changes(const export_source *source, const export_targets *targets,
                           double (*weights)[EXPORT_TARGETS_MAX], const uint32_t *order, float *base,
                           float *added) {
-  static const float near = 2; /* smaller differences count as near, in units of a byte */
+  static const float near = 2.0F / INT8_MAX; /* largest difference of nearly equal components */
   const supine_basis_info *info = source->info;
   for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
     lung += i == info->lung_begin[lung + 1];
@@ -190,7 +190,7 @@ static void round_changes(const export_source *source, const export_targets *tar
         const float given = rows[3 * (size_t)order[i]];
         const float before = i > info->lung_begin[lung] ? rows[3 * (size_t)order[i - 1]] : 2;
         const float own = rintf(INT8_MAX * fmaxf(-1, fminf(1, given))) / INT8_MAX;
-        const float kept = fabsf(given - before) <= near / INT8_MAX ? before : own;
+        const float kept = fabsf(given - before) <= near ? before : own;
         b[axis] += (float)weights[lung][j] * (given - kept);
         rows[3 * (size_t)order[i]] = kept;
       }
@@ -207,7 +207,7 @@ supine_status supine_export_targets_normals(const export_source *source, double 
                                             float *base, float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2;    /* change of a weight for central differences */
-  static const double least = 0.044; /* smaller RMS changes of normals become 0, radians */
+  static const double least = 0.044; /* smaller RMS changes of normals, radians, become 0 */
   const size_t n = source->info->vertex_count;
   supine_pose pose;
   double(*weights)[EXPORT_TARGETS_MAX] = malloc(source->info->lung_count * sizeof *weights);

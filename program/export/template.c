@@ -13,7 +13,7 @@ static const supine_asset *find_asset(const supine_asset *assets, const char *na
   return NULL;
 }
 
-/* A value of the data in which names are looked up, and the scope around it. */
+/* A value in whose members names are looked up, and the scope around it, which is searched next. */
 typedef struct scope {
   const json_t *value;
   const struct scope *outer;
@@ -88,7 +88,7 @@ static void write_named(const supine_template *t, const tag *named, const scope 
   if (value != NULL) {
     write_value(value, file);
   } else if (asset != NULL && strstr(asset->name, ".html") != NULL) {
-    /* Omit the last newline: one follows the tag. */
+    /* Omit the last newline of the asset, because another one follows the tag. */
     const size_t size = asset->size - (asset->bytes[asset->size - 1] == '\n');
     fill(t, asset->bytes, asset->bytes + size, around, file);
   } else if (asset != NULL) {

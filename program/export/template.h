@@ -21,7 +21,7 @@
  * the name NULL. */
 typedef struct supine_asset {
   const char *name;  /**< for example "page.css" */
-  const char *bytes; /**< content, followed by a zero that `size` does not count */
+  const char *bytes; /**< content, followed by a zero byte, which `size` does not count */
   size_t size;
 } supine_asset;
 
@@ -29,13 +29,13 @@ typedef struct supine_asset {
 typedef struct supine_template {
   const supine_asset *assets;
   const json_t *data;
-  /** Write the text of a tag whose name is neither data nor an asset; NULL writes nothing. */
+  /** Write the text of a tag that names neither data nor an asset; if NULL, nothing is written. */
   void (*write)(const void *context, const char *name, FILE *file);
   const void *context;
 } supine_template;
 
-/** Write the asset `name` with its tags filled. Unknown names write nothing; supine_embed refuses
- * them when the program is built. A write error sets the error indicator of `file`. */
+/** Write the asset `name` with its tags filled. Tags with unknown names write nothing; supine_embed
+ * refuses such tags when the program is built. A write error sets the error indicator of `file`. */
 void supine_template_fill(const supine_template *filling, const char *name, FILE *file);
 
 /** Return `count` numbers as a JSON array. */

@@ -16,30 +16,30 @@ enum { SUPINE_COMPARISON_SLABS = 10 };
 typedef struct supine_compared_posture {
   supine_pose pose;
   supine_distance_statistics displacement;   /* displacement from the reference pose, mm */
-  double expected_error;                     /* of the displacement, mm RMS; 0 if unknown */
+  double expected_error;                     /* expected RMS error, mm; 0 if unknown */
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */
   double gain[SUPINE_LUNGS_MAX];             /* volume that each lung gains in the breath, mL */
-  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* slabs of all lungs together, uppermost first */
-  double expansion[SUPINE_COMPARISON_SLABS]; /* gain of each slab divided by its volume */
-  double share[SUPINE_COMPARISON_SLABS];     /* gain of each slab divided by that of all lungs */
+  supine_slab slab[SUPINE_COMPARISON_SLABS]; /* horizontal slabs, uppermost first */
+  double expansion[SUPINE_COMPARISON_SLABS]; /* each slab's gain divided by the slab's volume */
+  double share[SUPINE_COMPARISON_SLABS];     /* each slab's gain divided by all lungs' gain */
 } supine_compared_posture;
 
 typedef struct supine_comparison {
-  const char *path;    /* basis file */
-  const char *command; /* command to name in messages */
+  const char *path;    /* path of the basis file */
+  const char *command; /* name of the command, for messages */
   const char *made_by; /* command line, which the report prints */
   bool allow_folds;
   const supine_basis *basis;
-  supine_state state; /* supine; all postures have the volume of this state */
+  supine_state state; /* supine state; all postures have its volume */
   supine_from from;
   double breath; /* volume that a breath adds, mL */
   supine_posture_list postures;
   supine_reference_pose reference; /* pose from which displacements are measured */
   supine_compare *compare;
   supine_compared_posture *posture; /* [postures.count] */
-  size_t directions;                /* number of sampled directions where the volume is in reach */
-  double farthest[3];               /* direction of gravity that differs most from supine */
-  double farthest_rms;              /* supine_report_from_supine(farthest), mm */
+  size_t directions;                /* number of sampled directions that allow state.volume */
+  double farthest[3];  /* direction of gravity with the largest RMS distance from supine */
+  double farthest_rms; /* RMS distance from supine at `farthest`, mm */
 } supine_comparison;
 
 /* Compute `reference` and the members after it. Free them with supine_report_free, also after a
@@ -49,11 +49,11 @@ supine_status supine_report_find(supine_comparison *comparison, supine_error *er
 /* Free the members that supine_report_find allocated. */
 void supine_report_free(supine_comparison *comparison);
 
-/* Write the volume of the comparison to `text`, for example "at rest + 300 mL". */
+/* Write the volume of `comparison->state` to `text`, for example "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
 /* Return the RMS distance of the surface from its supine position, mm, for a direction of gravity
- * and the volume of the comparison; NaN if the lungs cannot reach that volume. */
+ * at the volume of `comparison->state`; NaN if the lungs cannot reach that volume. */
 double supine_report_from_supine(const supine_comparison *comparison, const double gravity[3]);
 
 /* Return whether the expected error of any posture is known. */

@@ -12,13 +12,13 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Return the value that a profile shows for a slab, %. */
+/* Return a slab's share of the breath, or its regional expansion, %. */
 static double percent(const supine_comparison *c, bool share, size_t posture, size_t slab) {
   const supine_compared_posture *p = &c->posture[posture];
   return 100.0 * (share ? p->share : p->expansion)[slab];
 }
 
-/* Box of the plot in profile.html, SVG units. */
+/* Edges of the plot in profile.html, SVG units. */
 enum { LEFT = 46, RIGHT = 404, TOP = 14, BOTTOM = 286 };
 
 static double across(double value, double low, double high) {
@@ -71,12 +71,12 @@ json_t *supine_report_profiles(const supine_comparison *c) {
                    profile(c, "share of the volume gained, %", true));
 }
 
-/* Numbers of cells of the map; side of a cell and position of the map in map.html, SVG units. */
+/* Size of the map in cells; side of a cell and position of the map in map.html, SVG units. */
 enum { COLUMNS = 60, ROWS = 30, CELL = 13, MAP_LEFT = 66, MAP_TOP = 8 };
 
-/* Compute the position of a direction of gravity on the map, SVG units. From left to right: roll,
- * from prone over the right side, supine and the left side to prone. From top to bottom: tilt, from
- * head down to feet down. */
+/* Compute the position of a direction of gravity on the map, SVG units. The roll increases from
+ * left to right: prone, right side, supine, left side, prone. The tilt changes from head down at
+ * the top to feet down at the bottom. */
 static void place(const double g[3], double *x, double *y) {
   const double roll = atan2(g[0], g[1]) / pi; /* in half turns: 0 supine, 1/2 left side */
   const double tilt = asin(fmin(1.0, fmax(-1.0, g[2]))) / pi;
@@ -126,7 +126,7 @@ json_t *supine_report_direction(const double g[3]) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     const double cosine = supine_dot(named, g);
-    /* If two are equally near, keep the first: a name precedes its DICOM code. */
+    /* If two postures are equally near, keep the first: a name precedes its DICOM code. */
     if (cosine > nearest + 1e-9) {
       nearest = cosine;
       name = supine_posture_name(i);

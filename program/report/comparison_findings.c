@@ -15,7 +15,7 @@ static const struct {
     {"left", "0 and +25 %"},
 };
 
-/* Compute the change of each lung's volume from the reference pose, in % and in mL. */
+/* Compute the change of each lung's volume between the reference pose and a posture, % and mL. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent, double *ml) {
   double held[SUPINE_LUNGS_MAX];
   supine_basis_volumes(c->basis, &c->reference.pose, held);
@@ -106,7 +106,7 @@ json_t *supine_report_findings(const supine_comparison *c) {
   return list;
 }
 
-/* Print the title of a profile: a heading, and the name and value of each posture up to `last`. */
+/* Print the title of a profile: a heading, then name and value of the postures 0 to `last`. */
 static void print_profile(const supine_comparison *c, size_t last, bool share, FILE *to) {
   (void)fputs(share ? "Share of the lower half in a breath:"
                     : "Expansion of the lowest 30 % of the height over that of the uppermost:",

@@ -57,7 +57,7 @@ static json_t *provenance(const supine_comparison *c, json_t *file) {
   return list;
 }
 
-/* Return the data of the report's heading, of its section on all directions, and {{provenance}}. */
+/* Return {{provenance}}, and the data of the report's heading and section on all directions. */
 static json_t *facts(const supine_comparison *c) {
   const char *slash = strrchr(c->path, '/');
   json_t *file = supine_options_json_text(slash != NULL ? slash + 1 : c->path);

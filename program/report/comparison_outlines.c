@@ -19,7 +19,7 @@ static const slice slices[] = {{"Axial, upper third", 2, 2.0 / 3, 1, 1},
                                {"Coronal, front third", 1, 1.0 / 3, 2, -1},
                                {"Coronal, back third", 1, 2.0 / 3, 2, -1}};
 
-/* Compute where the edge from `a` to `b` crosses the plane at `at`, in the picture's axes, mm. */
+/* Compute the point where the edge from `a` to `b` crosses the slice at the coordinate `at`, mm. */
 static void cross(const slice *s, double at, const float *a, const float *b, double point[2]) {
   const double t = (at - (double)a[s->axis]) / ((double)b[s->axis] - (double)a[s->axis]);
   point[0] = (double)a[0] + t * ((double)b[0] - (double)a[0]);
@@ -27,7 +27,7 @@ static void cross(const slice *s, double at, const float *a, const float *b, dou
   point[1] = s->sign * ((double)a[v] + t * ((double)b[v] - (double)a[v]));
 }
 
-/* Print the outline as an SVG path, with a line for each triangle that the plane crosses. Return
+/* Print the outline as an SVG path, with a line for each triangle that the slice crosses. Return
  * the area inside the outline, mm^2. */
 static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
                     FILE *path) {
@@ -51,7 +51,7 @@ static double trace(const supine_basis_info *info, const slice *s, double at, co
   return fabs(twice) / 2;
 }
 
-/* Return the outline in a pose as an SVG path; set `area` to the area inside it, mm^2. */
+/* Return the outline of the lungs in a pose as an SVG path; set `area` to the area inside, mm^2. */
 static json_t *outline(const supine_comparison *c, const slice *s, double at,
                        const supine_pose *pose, float *xyz, double *area) {
   char *text = NULL;

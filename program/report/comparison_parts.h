@@ -15,7 +15,7 @@ json_t *supine_report_hex(supine_colours map, double t);
 const char *supine_report_line(size_t posture);
 
 /* Return the data of bar.html, a colour bar from 0 to `largest` with the caption `words`. If
- * `beyond`, some values are larger, and the bar has a pointed end. */
+ * `beyond` is true, some values are larger, and the bar has a pointed end. */
 json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const char *words);
 
 /* Return a direction of gravity as text: the name of its posture, or its angle from the nearest
@@ -23,22 +23,22 @@ json_t *supine_report_bar(supine_colours map, double largest, bool beyond, const
 json_t *supine_report_direction(const double g[3]);
 
 /* Return {{findings}}: a sentence on each of the first three postures that differ from the
- * reference. */
+ * reference pose. */
 json_t *supine_report_findings(const supine_comparison *comparison);
 
 /* Return {{postures}}: for each posture a table row of volumes, their changes, displacements and
  * published values. */
 json_t *supine_report_postures(const supine_comparison *comparison);
 
-/* Return the title of a profile, with a value for each of the first four postures. If `share`, the
- * value is the share of the breath in the lower half of the lungs. Otherwise it is the expansion of
- * the three lowest slabs divided by that of the three uppermost slabs. */
+/* Return the title of a profile, with a value for each of the first four postures. If `share` is
+ * true, the value is the share of the breath in the lower half of the lungs. Otherwise it is the
+ * expansion of the three lowest slabs divided by that of the three uppermost slabs. */
 json_t *supine_report_profile_finding(const supine_comparison *comparison, bool share);
 
-/* Return {{profiles}}: charts of regional expansion and of the share of the breath by height. */
+/* Return {{profiles}}: two charts by height, regional expansion and share of the breath. */
 json_t *supine_report_profiles(const supine_comparison *comparison);
 
-/* Return {{map}}: the RMS distance from supine for every direction of gravity. */
+/* Return {{map}}: the RMS distance from supine for all directions of gravity. */
 json_t *supine_report_map(const supine_comparison *comparison);
 
 /* Return {{outlines}}: for each slice, the outlines in all postures and in the reference pose. */

@@ -38,9 +38,9 @@ static json_t *draw(supine_renderer *renderer, const supine_scene *scene, supine
   return made;
 }
 
-/* Add gravity to the data of a picture. {{along}} is its direction in the picture, in degrees
- * clockwise from the right, and {{turn}} the rotation in degrees that makes it point down. If
- * gravity is almost normal to the picture, add {{towards}} or {{away}} (the viewer) instead. */
+/* Add gravity to `shot`, the data of a picture: its angle {{along}} in degrees clockwise from the
+ * right, and the clockwise rotation {{turn}} that makes it point down. If gravity is almost normal
+ * to the picture, add {{towards}} or {{away}} (the viewer) instead. */
 static void set_gravity(const double g[3], json_t *shot) {
   double axes[3][3];
   double seen[3] = {0.0, 0.0, 0.0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute CRC-64: 256 or 64 bytes per step with carry-less multiplication, else byte by byte. */
+/* Compute CRC-64 by carry-less multiplication, 256 or 64 bytes at a time, or else byte by byte. */
 #include <pthread.h>
 #include <stdbool.h>
 
@@ -12,12 +12,12 @@
 
 static const uint64_t polynomial = 0x42F0E1EBA9EA3693u; /* P of message.h without its term x^64 */
 
-/* Distances, in bytes, over which fold() moves a part of the message. */
+/* Indices of `distance`: by how many bytes fold() moves a part of the message. */
 enum { NEAR, FAR, FARTHEST, STEPS };
 static const size_t distance[STEPS] = {16, 64, 256};
 
-/* Tables mod P, computed once: table[b] = b(x) x^64, where b(x) has the bits of b as coefficients;
- * power[i] = {x^n, x^(n + 64)}, where n = 8 distance[i]. */
+/* Tables modulo the polynomial P, computed once. table[b] = b(x) x^64, where b(x) has the bits of b
+ * as coefficients. power[i] = {x^n, x^(n + 64)}, where n = 8 distance[i]. */
 static struct { uint64_t table[256], power[STEPS][2]; } known;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
@@ -33,7 +33,7 @@ static uint64_t multiply(uint64_t a, uint64_t b) {
   return product;
 }
 
-/* Compute x^(8 size) mod P. Appending `size` bytes to a message multiplies its checksum by this. */
+/* Compute x^(8 size) mod P, the factor by which `size` appended zero bytes multiply a checksum. */
 static uint64_t power_of(size_t size) {
   uint64_t power = 1;
   uint64_t square = 1u << 8; /* in turn x^8, x^16, x^32, ... */
@@ -86,8 +86,8 @@ WIDE static lanes take_wide(const void *at) {
   return _mm512_shuffle_epi8(_mm512_loadu_si512(at), _mm512_broadcast_i32x4(REVERSED));
 }
 
-/* Return 128 bits congruent to a x^n + next mod P: the low and high half of `a` times the two
- * `powers`, x^n and x^(n + 64), plus `next`. */
+/* Return 128 bits congruent to a x^n + next mod P. `powers` has the factors of the low and the high
+ * half of `a`: x^n and x^(n + 64). */
 CARRY_LESS static lane fold(lane a, lane powers, lane next) {
   return _mm_xor_si128(next, _mm_xor_si128(_mm_clmulepi64_si128(a, powers, 0x11),
                                            _mm_clmulepi64_si128(a, powers, 0x00)));
@@ -111,7 +111,7 @@ CARRY_LESS static uint64_t by_folding(uint64_t crc, const unsigned char *at, siz
   for (; size != 0; at += 16, size -= 16) {
     sum = fold(sum, near, take(at));
   }
-  const lane remainder = take(&sum); /* congruent to the whole message mod P */
+  const lane remainder = take(&sum);
   return by_bytes(0, (const void *)&remainder, sizeof remainder);
 }
 

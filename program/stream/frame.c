@@ -32,13 +32,13 @@ struct supine_stream_frames {
   size_t strips_size; /* bytes */
   size_t strips_count;
   uint64_t strips_crc;
-  supine_stream_frame *unused; /* list of frames without users */
+  supine_stream_frame *unused; /* list of frames that can be reused */
 };
 
 const char *const supine_stream_content_names[] = {"weights", "points", "surface", "nothing", NULL};
 
 /* Convert the triangles to strips. Corners i, i + 1 and i + 2 of a strip form a triangle, whose
- * orientation is reversed if i is odd. Degenerate triangles only join the others. */
+ * orientation is reversed if i is odd. Triangles with two equal corners only join the others. */
 static supine_status make_strips(supine_stream_frames *f, supine_error *error) {
   static const uint32_t restart = UINT32_MAX; /* separates strips in the output of stripify() */
   const size_t corners = 3 * f->info->triangle_count;
@@ -80,8 +80,8 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
   f->info = supine_basis_get_info(basis);
   strncpy(f->device, device, sizeof f->device - 1);
   f->ras = ras;
-  /* Compute the strips now, which takes 0.1 s for a million triangles. At the first request for a
-   * surface, this would make every peer wait. */
+  /* Compute the strips now. For a million triangles this takes 0.1 s, and every peer would have to
+   * wait if it were done at the first request for a surface. */
   const supine_status status = make_strips(f, error);
   if (status != SUPINE_OK) {
     supine_stream_frames_destroy(f);
@@ -124,7 +124,7 @@ supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
       return NULL;
     }
     if (page == HUGE_PAGE) {
-      (void)madvise(points, whole, MADV_HUGEPAGE); /* fewer pages need fewer address translations */
+      (void)madvise(points, whole, MADV_HUGEPAGE);
     }
     frame->points = points;
     frame->errors = (unsigned char *)(points + 3 * count);
@@ -144,7 +144,7 @@ void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_fra
   }
 }
 
-/* Convert points to big-endian floats. If the frames are in RAS, also convert them to RAS. */
+/* Convert points in LPS to big-endian floats, in RAS if `f->ras` is true. */
 static void encode_points(const supine_stream_frames *f, size_t count, float *xyz) {
   for (size_t i = 0; f->ras && i < count; ++i) {
     xyz[3 * i] = -xyz[3 * i];
@@ -153,7 +153,7 @@ static void encode_points(const supine_stream_frames *f, size_t count, float *xy
   supine_stream_encode_floats(3 * count, xyz);
 }
 
-/* Compute the positions and expected errors of located lungs; return false on failure. */
+/* Compute positions and expected errors from snapshot.location; return false on failure. */
 static bool compute_located_points(supine_stream_frames *f, supine_stream_frame *frame) {
   const size_t count = f->info->vertex_count;
   float *sigma = (void *)(frame->errors + supine_stream_attribute_head(count, frame->errors));
@@ -172,7 +172,7 @@ typedef struct points_work {
   const supine_stream_frames *frames;
   const supine_stream_frame *frame;
   uint64_t crc[THREADS_MAX];
-  size_t size[THREADS_MAX]; /* size of each thread's part, bytes; 0 if it has none */
+  size_t size[THREADS_MAX]; /* size of each thread's part, bytes; 0 for threads without a part */
 } points_work;
 
 static void compute_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -187,7 +187,7 @@ static void compute_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Compute the points of a frame from its location; if it has none or that fails, from its pose. */
+/* Compute a frame's points from snapshot.location; if NULL or unusable, from snapshot.pose. */
 static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) {
   points_work p = {.frames = f, .frame = frame};
   if (frame->snapshot.location != NULL && compute_located_points(f, frame)) {
@@ -225,7 +225,7 @@ void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame 
                               supine_stream_content content, bool triangles,
                               supine_stream_packet *packet) {
   const bool weights = content == SUPINE_STREAM_WEIGHTS;
-  if (!weights && !frame->has_points) { /* compute once for all peers */
+  if (!weights && !frame->has_points) {
     compute_points(frames, frame);
     frame->has_points = true;
   }

@@ -2,10 +2,10 @@
 /** @file
  * Encode a state of the lungs as OpenIGTLink messages, once for any number of peers.
  *
- * A weights message is an NDARRAY of K + 3 G floats: the K weights, then the gains x, y, z of each
- * of the G lungs. A surface message is a POLYDATA; if the lungs were located from observed points,
- * it has the expected error of each vertex as an attribute. The triangle strips and their checksum
- * are computed once. The checksum of a message is combined from the checksums of its parts. */
+ * A weights message is an NDARRAY of floats: the weight of each mode, then the gains x, y, z of
+ * each lung. A surface message is a POLYDATA; if the lungs were located from observed points, it
+ * has the expected error of each vertex as an attribute. The triangle strips and their checksum are
+ * computed once. The checksum of a message is combined from the checksums of its parts. */
 #ifndef SUPINE_STREAM_FRAME_H
 #define SUPINE_STREAM_FRAME_H
 
@@ -18,7 +18,7 @@
 /** Content sent to a peer. */
 typedef enum supine_stream_content {
   SUPINE_STREAM_WEIGHTS = 0,
-  SUPINE_STREAM_POINTS,  /**< POLYDATA with triangles in the first frame only */
+  SUPINE_STREAM_POINTS,  /**< POLYDATA, with triangles only in the first frame for a peer */
   SUPINE_STREAM_SURFACE, /**< POLYDATA with triangles in every frame, as most viewers require */
   SUPINE_STREAM_SILENCE,
   SUPINE_STREAM_CONTENT_COUNT
@@ -29,27 +29,26 @@ extern const char *const supine_stream_content_names[SUPINE_STREAM_CONTENT_COUNT
 
 /** State of the lungs at one time. */
 typedef struct supine_stream_snapshot {
-  double gravity[3]; /**< unit vector in body axes */
+  double gravity[3]; /**< direction of gravity, a unit vector in body axes */
   double volume;     /**< volume of all lungs together, gas and tissue, mL */
-  double above;   /**< volume above rest in the posture, or above the scan if rest is unknown, mL */
-  uint64_t stamp; /**< time of the newest pose, as in supine_stream_header */
-  double received; /**< time of receipt of the newest message, s by supine_clock_seconds; negative
-                      if none was received since the previous frame */
-  double pose_received; /**< time of the newest pose or observed point, s; negative if none */
+  double above;      /**< volume minus that at rest (in the scan if rest is unknown), mL */
+  uint64_t stamp;    /**< stamp of the newest pose or observed point, as in supine_stream_header */
+  double received;   /**< time of receipt of the newest message, s by supine_clock_seconds; negative
+                        if none was received since the previous frame */
+  double pose_received; /**< time of receipt of the newest pose or observed point; -1 if none */
   supine_pose pose;
-  const supine_location *location; /**< location from observed points; NULL if there is none */
+  const supine_location *location; /**< location of the lungs from observed points, or NULL */
 } supine_stream_snapshot;
 
-/** A frame, which peers share. */
+/** A state of the lungs, which is encoded once and sent to several peers. */
 typedef struct supine_stream_frame {
-  size_t users;    /**< number of peers being sent the frame, plus 1 while it is the newest */
+  size_t users; /**< number of peers that are being sent the frame, plus 1 for the newest frame */
   uint64_t number; /**< serial number: 1, 2, ... */
   supine_stream_snapshot snapshot;
-  bool has_points; /**< `points` and `points_crc` are computed */
+  bool has_points; /**< true if `points` and `points_crc` are computed */
   float *points;   /**< [N, 3] positions as sent, big-endian */
   uint64_t points_crc;
-  unsigned char
-      *errors; /**< message part with the expected errors; valid if the lungs were located */
+  unsigned char *errors; /**< expected errors as sent; valid unless snapshot.location is NULL */
   struct supine_stream_frame *next; /**< next frame in the list of unused frames */
 } supine_stream_frame;
 
@@ -65,21 +64,20 @@ supine_status supine_stream_frames_create(const supine_basis *basis, const char 
 /** Release the data and every frame; NULL is legal. */
 void supine_stream_frames_destroy(supine_stream_frames *frames);
 
-/** Return a frame of a snapshot, with one user; NULL if out of memory. May reuse an unused
- * frame. */
+/** Return a new or reused frame that shows a snapshot and has one user; NULL if out of memory. */
 supine_stream_frame *supine_stream_frame_acquire(supine_stream_frames *frames,
                                                  const supine_stream_snapshot *snapshot);
-/** Remove one user of a frame; NULL is legal. */
+/** Remove one user of a frame. A frame without users may be reused. NULL is legal. */
 void supine_stream_frame_release(supine_stream_frames *frames, supine_stream_frame *frame);
 
-/** Largest number of pieces of a message; size of the first piece, bytes. The first piece is large
- * enough for a whole message of weights. */
+/** Largest number of pieces of a message, and size of the first piece, bytes, which has room for a
+ * whole message of weights. */
 enum {
   SUPINE_STREAM_PIECES = 4,
   SUPINE_STREAM_FRONT = SUPINE_STREAM_HEADER + 40 + 4 * (SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX)
 };
 
-/** A message to send, in pieces; `front` is the first piece. */
+/** A message to send, in pieces. `front` has the bytes of the first piece. */
 typedef struct supine_stream_packet {
   unsigned char front[SUPINE_STREAM_FRONT];
   struct iovec piece[SUPINE_STREAM_PIECES];
@@ -89,7 +87,7 @@ typedef struct supine_stream_packet {
 
 /** Make the message of a frame, with a header of version 1, which all peers can read. The positions
  * of a frame are computed when a message first contains them.
- * @param content    not SUPINE_STREAM_SILENCE
+ * @param content    any but SUPINE_STREAM_SILENCE
  * @param triangles  true if a POLYDATA must also contain the triangles */
 void supine_stream_frame_pack(supine_stream_frames *frames, supine_stream_frame *frame,
                               supine_stream_content content, bool triangles,

@@ -8,8 +8,8 @@
 #include "program/options/breath_turn.h"
 #include "program/stream/gravity.h"
 
-/* A matrix counts as exact if it deviates from a rotation by at most this. Rounding to 32-bit
- * floats causes 1e-6, the arithmetic of trackers up to about 1e-4. */
+/* Largest deviation from a rotation with which a matrix counts as exact. Rounding to 32-bit floats
+ * causes deviations of 1e-6, the arithmetic of trackers up to about 1e-4. */
 static const double exact_max = 1e-3;
 static const double repaired_max = 0.1; /* largest stretch or shear that is repaired */
 

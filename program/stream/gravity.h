@@ -27,20 +27,20 @@ bool supine_stream_rotation(const double quaternion[4], double rotation[9]);
 typedef enum supine_stream_verdict {
   SUPINE_STREAM_EXACT = 0,
   SUPINE_STREAM_REPAIRED, /**< not a rotation, but close enough to one to be used */
-  SUPINE_STREAM_REFUSED   /**< unusable; `gravity` keeps its value */
+  SUPINE_STREAM_REFUSED   /**< unusable; no direction of gravity is computed */
 } supine_stream_verdict;
 
 /** Compute the direction of gravity from the matrix R, row by row. A matrix within 0.001 of a
  * rotation is exact. A matrix with another scale, or with stretch or shear of at most a tenth, is
  * repaired; the direction then errs by less than 13 degrees. A matrix that is not finite, is
  * singular, contains a reflection, or has more stretch or shear is refused.
- * @param why  set to the reason if the pose is repaired or refused, else to NULL */
+ * @param why  set to the reason if the matrix is repaired or refused, otherwise to NULL */
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why);
 
-/** Compute the direction of gravity from a quaternion (w, x, y, z). It is refused if it is zero or
- * not finite, and repaired if its length differs from 1 by more than 0.001. */
+/** Compute the direction of gravity from a quaternion (w, x, y, z). The quaternion is refused if it
+ * is zero or not finite, and repaired if its length differs from 1 by more than 0.001. */
 supine_stream_verdict supine_stream_gravity_quaternion(const supine_stream_setup *setup,
                                                        const double quaternion[4],
                                                        double gravity[3], const char **why);

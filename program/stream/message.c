@@ -46,7 +46,7 @@ supine_status supine_stream_header_read(const unsigned char bytes[SUPINE_STREAM_
 void supine_stream_header_write(const supine_stream_header *header,
                                 unsigned char bytes[SUPINE_STREAM_HEADER]) {
   put(bytes, 2, header->version);
-  memcpy(bytes + 2, header->type, sizeof header->type - 1); /* the zeros after the text, too */
+  memcpy(bytes + 2, header->type, sizeof header->type - 1);
   memcpy(bytes + 14, header->device, sizeof header->device - 1);
   put(bytes + 34, 8, header->stamp);
   put(bytes + 42, 8, header->size);
@@ -71,7 +71,7 @@ size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, si
 }
 
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
-  /* The protocol requires an even length; this text and its NUL have 18 bytes. */
+  /* The protocol requires an even length; the text and its NUL have 18 bytes. */
   static const char text[] = "expected_error_mm";
   _Static_assert(6 + sizeof text == SUPINE_STREAM_ATTRIBUTE, "size of type, count and name");
   put(bytes, 2, 1); /* type 0 (a scalar) and 1 component */
@@ -127,7 +127,7 @@ static double real64(cursor *c) {
   return value;
 }
 
-/* Read a quaternion, received as x, y, z, w, into w, x, y, z. */
+/* Read a quaternion, which is sent as x, y, z, w, into m->number as w, x, y, z. */
 static void quaternion(cursor *c, supine_stream_message *m) {
   m->kind = SUPINE_STREAM_QUATERNION;
   for (int i = 1; i < 4; ++i) {
@@ -206,7 +206,7 @@ static void array(cursor *c, supine_stream_message *m, supine_stream_kind kind, 
 }
 
 static void string(cursor *c, supine_stream_message *m, supine_stream_kind kind) {
-  (void)pass(c, 2); /* skip the encoding: valid text is ASCII in every encoding */
+  (void)pass(c, 2); /* skip the encoding, because valid texts are ASCII in every encoding */
   const size_t length = (size_t)whole(c, 2);
   const unsigned char *text = pass(c, length);
   if (c->overrun == 0 && length < sizeof m->text) {

@@ -42,12 +42,12 @@ void supine_stream_header_write(const supine_stream_header *header,
 
 /** Content of a message. */
 typedef enum supine_stream_kind {
-  SUPINE_STREAM_NOTHING = 0, /**< message of another type or device, to be ignored */
+  SUPINE_STREAM_NOTHING = 0, /**< message that is ignored because of its type or device */
   SUPINE_STREAM_ROTATION,    /**< number[0..8]: matrix from tracker to world axes, row by row;
                                   number[9..11]: position, mm; text: name of the device */
-  SUPINE_STREAM_POSITION,    /**< like ROTATION, but from a device whose pose is not followed */
-  SUPINE_STREAM_POINT_LIST,  /**< points: decoded by supine_stream_message_point */
-  SUPINE_STREAM_QUATERNION,  /**< number[0..3]: w, x, y, z of the rotation to world axes */
+  SUPINE_STREAM_POSITION,    /**< like ROTATION, but only the position is to be used */
+  SUPINE_STREAM_POINT_LIST,  /**< points: supine_stream_message_point reads one of them */
+  SUPINE_STREAM_QUATERNION,  /**< number[0..3]: w, x, y, z of the tracker-to-world rotation */
   SUPINE_STREAM_DOWN,        /**< number[0..2]: direction of gravity in tracker axes */
   SUPINE_STREAM_VOLUME,      /**< number[0]: volume above rest in the posture, mL */
   SUPINE_STREAM_VOLUME_TEXT, /**< text: a volume such as rest+500 or 2600mL */
@@ -58,11 +58,11 @@ typedef struct supine_stream_message {
   supine_stream_kind kind;
   double number[12];
   char text[64];
-  const unsigned char *points; /**< [point_count] points as received, part of the body */
+  const unsigned char *points; /**< [point_count] points as received, which lie in the body */
   size_t point_count;
 } supine_stream_message;
 
-/** Decode the name and position, mm, of one point of a POINT_LIST, whose body must still exist. */
+/** Decode the name and position, mm, of one of message->points. The body must still exist. */
 void supine_stream_message_point(const supine_stream_message *message, size_t point, char name[65],
                                  double position[3]);
 
@@ -77,7 +77,7 @@ int supine_stream_message_is_known(const supine_stream_header *header);
  *     "VOLUME"  NDARRAY of 1 (mL above rest), STRING (such as rest+500)
  *     "SEND"    STRING (name of the content that the peer asks for)
  *
- * @param device  name of the device whose poses are followed; NULL for every device
+ * @param device  device that gives the patient's pose; NULL if every device does
  * @retval SUPINE_ERROR_FORMAT  the checksum is wrong, or lengths contradict each other */
 supine_status supine_stream_message_read(const supine_stream_header *header,
                                          const unsigned char *body, const char *device,
@@ -93,8 +93,8 @@ size_t supine_stream_ndarray_head(size_t count, unsigned char *bytes);
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes);
 
-/** Write the first bytes of the attribute "expected_error_mm", which precede one float for each
- * point; return their number, SUPINE_STREAM_ATTRIBUTE. */
+/** Write the first SUPINE_STREAM_ATTRIBUTE bytes of the attribute "expected_error_mm", which
+ * precede one float for each point; return SUPINE_STREAM_ATTRIBUTE. */
 enum { SUPINE_STREAM_ATTRIBUTE = 24 };
 size_t supine_stream_attribute_head(size_t points, unsigned char *bytes);
 
@@ -105,12 +105,13 @@ void supine_stream_encode_floats(size_t count, float *values);
  *
  *     crc(M) = M(x) x^64 mod P,     P = x^64 + 0x42F0E1EBA9EA3693
  *
- * It is linear: the checksum of a whole follows from the checksums of its parts. */
+ * The bits of the message M are the coefficients of M(x). */
 
 /** Extend `crc`, the checksum of the bytes so far, by `size` bytes; begin with 0. Thread-safe. */
 uint64_t supine_stream_crc64(uint64_t crc, const void *bytes, size_t size);
 
-/** Return the checksum of bytes A followed by `size` bytes B: crc(A) x^(8 size) + crc(B). */
+/** Return the checksum of bytes A and then B from `first` = crc(A), `second` = crc(B) and the
+ * `size` of B: crc(A) x^(8 size) + crc(B) mod P. */
 uint64_t supine_stream_crc64_join(uint64_t first, uint64_t second, size_t size);
 
 #endif

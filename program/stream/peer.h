@@ -37,16 +37,16 @@ typedef struct supine_stream_peer {
   bool connecting;
   /* received data */
   unsigned char header_bytes[SUPINE_STREAM_HEADER];
-  size_t received; /**< bytes received of the body if `in_body`, else of the header */
+  size_t received; /**< bytes received, of the body if `in_body`, otherwise of the header */
   bool in_body;
   supine_stream_header header;
   uint64_t to_skip;    /**< bytes of a skipped body that are still to be received */
   unsigned char *body; /**< [SUPINE_STREAM_BODY_MAX] */
-  double emptied;      /**< time at which the socket was last empty, s by supine_clock_seconds */
+  double emptied;      /**< time at which the socket last had no data, s by supine_clock_seconds */
   /* data to send */
   supine_stream_content content;
-  bool knows_triangles;        /**< the peer has the triangles, so that POINTS messages omit them */
-  uint64_t last_frame;         /**< number of the last frame given to the peer */
+  bool knows_triangles;        /**< true if POINTS messages may omit the triangles */
+  uint64_t last_frame;         /**< serial number of the last frame given to the peer */
   supine_stream_frame *frame;  /**< frame being sent; NULL if none */
   supine_stream_packet packet; /**< unsent part of the message of `frame` */
 } supine_stream_peer;
@@ -67,13 +67,13 @@ supine_status supine_stream_peer_begin(supine_stream_peer *peer, int socket, boo
 /** Close the socket and release the frame and the body. */
 void supine_stream_peer_end(supine_stream_peer *peer, supine_stream_frames *frames);
 
-/** Called for each message of a known type; its body is in `peer->body`. */
+/** Function that is called for each message of a known type; the body is in `peer->body`. */
 typedef void supine_stream_receive(void *context, supine_stream_peer *peer);
 
 /** Read up to 64 KiB of received bytes, and call `receive` for each complete message. Messages of
  * unknown types, or with larger bodies than SUPINE_STREAM_BODY_MAX, are skipped.
  * @param skipped  incremented for each skipped message
- * @param error    set if the peer sent invalid data or more than 256 MiB at once, else unchanged */
+ * @param error    set if the peer sent an invalid header or a body above 256 MiB, else unchanged */
 supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double now,
                                               supine_stream_receive *receive, void *context,
                                               uint64_t *skipped, supine_error *error);
@@ -81,12 +81,11 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
 /** Return whether the kernel has sent all bytes of earlier frames. */
 bool supine_stream_peer_ready(const supine_stream_peer *peer);
 
-/** Prepare the message of a frame, which supine_stream_peer_send then sends. */
+/** Prepare the message of a frame for supine_stream_peer_send. */
 void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
                              supine_stream_frame *frame);
 
-/** Send as much as the socket's buffer accepts. When all is sent, the caller releases
- * `peer->frame`. */
+/** Send what the socket's buffer accepts. The caller releases `peer->frame` when all is sent. */
 supine_stream_outcome supine_stream_peer_send(supine_stream_peer *peer);
 
 #endif

@@ -14,11 +14,10 @@
 #include "program/stream/tracked_patient.h"
 #include "sh/base/clock.h"
 
-/* Intervals in seconds. */
-static const double frame_interval = 15e-3; /* between frames while lungs move and no pose comes */
-static const double send_interval = 20e-3;  /* between checks whether a socket's queue is empty */
-static const double connect_interval = 1.0; /* between attempts to connect or accept */
-static const double stop_interval = 0.1;    /* between calls of options->stop */
+static const double frame_interval = 15e-3; /* s between frames if lungs move without new poses */
+static const double send_interval = 20e-3;  /* s between checks whether a frame has left */
+static const double connect_interval = 1.0; /* s before the next attempt to connect a peer */
+static const double stop_interval = 0.1;    /* s between calls of options->stop */
 
 /* All times are in seconds by supine_clock_seconds. */
 struct supine_stream_server {
@@ -38,13 +37,13 @@ struct supine_stream_server {
   struct pollfd *polled;          /* [options->peers + 2] peers, listener, live page */
   supine_stream_peer **owner;     /* [options->peers + 2] peer of each polled socket, or NULL */
   size_t replayed;                /* number of recorded poses replayed so far */
-  double replay_begun;            /* time at which the replay began; negative before */
+  double replay_begun;            /* time at which the replay began; negative before that */
   double wait_begun;              /* time at which ppoll() was last called */
   double woke;                    /* time at which ppoll() last returned */
-  supine_stream_latency *latency; /* [2]: first of weights, then of points and surfaces */
+  supine_stream_latency *latency; /* [2] for weights; for points and surfaces */
 };
 
-/* Return whether a peer must still be sent the newest frame. */
+/* Return whether a peer is ready for a frame and has not been sent the newest one. */
 static bool needs_frame(const supine_stream_server *s, const supine_stream_peer *peer) {
   return peer->socket >= 0 && !peer->connecting && peer->frame == NULL &&
          peer->content != SUPINE_STREAM_SILENCE && s->latest != NULL &&
@@ -59,7 +58,7 @@ static void end_peer(supine_stream_server *s, supine_stream_peer *peer) {
   supine_stream_peer_end(peer, s->frames);
 }
 
-/* Initialise a peer in a free slot; if there is none, close the socket and return NULL. */
+/* Initialise a peer in a free slot. If no slot is free, close the socket and return NULL. */
 static supine_stream_peer *begin_peer(supine_stream_server *s, int socket, bool connecting) {
   supine_error error;
   for (size_t i = 0; i < s->options->peers; ++i) {
@@ -83,7 +82,7 @@ static void accept_peers(supine_stream_server *s) {
     const int socket = accept4(s->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket < 0) {
       if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNABORTED) {
-        s->accept_at = s->woke + connect_interval; /* an error such as too many open files */
+        s->accept_at = s->woke + connect_interval;
       }
       return;
     }
@@ -97,7 +96,7 @@ static void connect_peer(supine_stream_server *s) {
   s->connect_at = s->connected == NULL ? s->woke + connect_interval : (double)INFINITY;
 }
 
-/* Complete or abandon a connection whose socket became writable. */
+/* Complete a connection to a peer, or abandon the connection if it failed. */
 static void connection_made(supine_stream_server *s, supine_stream_peer *peer) {
   int failure = 0;
   socklen_t size = sizeof failure;
@@ -137,9 +136,10 @@ static void receive(void *context, supine_stream_peer *peer) {
     take_request(s, peer, message.text);
     return;
   }
-  /* If ppoll() returned at once, the message may have waited since the socket was last empty. */
-  const bool waited = s->woke - s->wait_begun > 50e-6;
-  supine_stream_patient_receive(&s->patient, &message, waited ? s->woke : peer->emptied,
+  /* If ppoll() waited, the message has just arrived. Otherwise it may have arrived at any time
+   * since the socket was last empty. */
+  const bool ppoll_waited = s->woke - s->wait_begun > 50e-6;
+  supine_stream_patient_receive(&s->patient, &message, ppoll_waited ? s->woke : peer->emptied,
                                 peer->header.stamp);
 }
 
@@ -182,7 +182,7 @@ static double frame_due(const supine_stream_server *s) {
   if (!supine_stream_patient_moves(&s->patient)) {
     return (double)INFINITY;
   }
-  /* Messages that arrive trigger frames by themselves: wait two intervals, in case they stop. */
+  /* While messages arrive, each one triggers a frame: allow two intervals for the next message. */
   const bool driven = s->woke - s->patient.received < 2.0 * frame_interval;
   return fmax(soonest, s->frame_time + (driven ? 2.0 : 1.0) * frame_interval);
 }
@@ -190,8 +190,7 @@ static double frame_due(const supine_stream_server *s) {
 static bool make_frame(supine_stream_server *s) {
   supine_stream_snapshot snapshot;
   supine_stream_patient_snapshot(&s->patient, s->woke, &snapshot);
-  supine_stream_frame_release(
-      s->frames, s->latest); /* the new frame then reuses memory that is in the cache */
+  supine_stream_frame_release(s->frames, s->latest);
   s->latest = supine_stream_frame_acquire(s->frames, &snapshot);
   if (s->latest == NULL) {
     return false;
@@ -270,7 +269,7 @@ static struct timespec find_timeout(const supine_stream_server *s, double end) {
       next = fmin(next, s->woke + send_interval);
     }
   }
-  const double left = fmax(0.0, next - supine_clock_seconds()); /* at most stop_interval */
+  const double left = fmax(0.0, next - supine_clock_seconds());
   return (struct timespec){0, (long)(1e9 * left)};
 }
 
@@ -295,7 +294,7 @@ static nfds_t gather(supine_stream_server *s) {
   return count;
 }
 
-/* Read from all sockets that ppoll() reported, and take the poses of a replay that are due. */
+/* Read from all sockets that ppoll() reported, and store the recorded poses that are due. */
 static void receive_all(supine_stream_server *s, nfds_t count) {
   for (nfds_t i = 0; i + 2 < count; ++i) {
     if (s->polled[i].revents != 0) {

@@ -50,7 +50,7 @@ void supine_stream_poses_add(FILE *file, const supine_stream_pose *pose);
 typedef struct supine_stream_counts {
   uint64_t poses;       /**< poses accepted, whether a frame showed them or not */
   uint64_t positions;   /**< positions of observed points accepted */
-  uint64_t repaired;    /**< poses repaired to rotations */
+  uint64_t repaired;    /**< poses used although they were not exact rotations */
   uint64_t refused;     /**< poses refused */
   uint64_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
   uint64_t skipped;     /**< messages of unknown types, or too large */
@@ -62,7 +62,7 @@ typedef struct supine_stream_counts {
   uint64_t turned_away; /**< connections refused, as there were too many peers */
 } supine_stream_counts;
 
-/** Number of bins, each 1 us wide; the last bin also counts longer latencies. */
+/** Number of 1 us bins of a latency histogram; the last bin also counts longer latencies. */
 enum { SUPINE_STREAM_LATENCY_BINS = 65536 };
 
 typedef struct supine_stream_latency {
@@ -83,7 +83,7 @@ typedef struct supine_stream_options {
   const char *listen;  /**< "PORT" (for this machine alone) or "ADDRESS:PORT"; port 0 chooses a free
                           port; NULL if the server does not listen */
   const char *connect; /**< "HOST:PORT" of a peer, tried until it accepts; NULL if none */
-  const char *device;  /**< name of the device whose poses are followed; NULL for every device */
+  const char *device;  /**< device that gives the patient's pose; NULL if every device does */
   const char *name;    /**< device name in the messages sent */
   supine_stream_setup setup;
   supine_stream_volume *volume;      /**< volume or breath at the start; messages may change it */

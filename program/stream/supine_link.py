@@ -32,7 +32,7 @@ _TABLE = _crc_table()
 
 
 def crc64(data, crc=0):
-    """Extend `crc`, a CRC-64 (ECMA-182, most significant bit first), by data."""
+    """Extend the checksum `crc`, a CRC-64 (ECMA-182, most significant bit first), by the bytes of `data`."""
     for byte in data:
         crc = ((crc << 8) & 0xFFFFFFFFFFFFFFFF) ^ _TABLE[(crc >> 56) ^ byte]
     return crc
@@ -88,9 +88,9 @@ def corners(words):
     while begin < len(words):
         strip = words[begin + 1:begin + 1 + words[begin]]
         begin += 1 + len(strip)
-        for i in range(len(strip) - 2):  # every other triangle is reversed
+        for i in range(len(strip) - 2):  # every second triangle is reversed
             triangle = (strip[i], strip[i + 1 + i % 2], strip[i + 2 - i % 2])
-            if len(set(triangle)) == 3:  # degenerate triangles only join others
+            if len(set(triangle)) == 3:  # triangles with equal corners only join others
                 yield from triangle
 
 
@@ -114,7 +114,7 @@ def unpack(kind, content):
 
 
 class Link:
-    """A connection. `newest` returns the last frame received and drops earlier frames."""
+    """A connection to the server. `newest` returns the last frame received and drops earlier frames."""
 
     def __init__(self, host="localhost", port=18944, version=1, check=False):
         self.socket = socket.create_connection((host, port), timeout=10)

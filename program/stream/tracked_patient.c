@@ -221,8 +221,8 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
-/* Compute the gains for the current volume, or keep the last gains if that is out of reach. Then
- * compute the resulting volumes. */
+/* Compute the gains for the current volume, or keep the last gains if the lungs cannot reach it.
+ * Then compute the resulting volumes. */
 static void find_gains(supine_stream_patient *patient, double now,
                        supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;

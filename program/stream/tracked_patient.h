@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Store the newest pose, volume and observed points, and compute the state of the lungs from them.
- */
+ * Store the newest pose, volume and observed points, and compute the state of the lungs. */
 #ifndef SUPINE_STREAM_PATIENT_H
 #define SUPINE_STREAM_PATIENT_H
 
@@ -16,7 +15,7 @@ struct supine_stream_volume {
   supine_pv_breath breath;
 };
 
-/** Let the volume follow a breath that begins at time 0. Statuses as supine_breath_evaluate. */
+/** Let the volume follow a breath that begins at time 0. Return as supine_breath_evaluate does. */
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error);
 
@@ -36,14 +35,14 @@ typedef struct supine_stream_patient {
   /* Times are in seconds by supine_clock_seconds. */
   double breath_begun;
   double first_pose;          /* time of the first pose, at which a recording begins */
-  double pose_received;       /* time of the newest pose or observed point; negative if none */
+  double pose_received;       /* time of receipt of the newest pose or observed point; -1 if none */
   double received;            /* time of receipt of the newest message */
-  bool pending;               /* no frame shows the newest message yet */
+  bool pending;               /* true until a frame shows the newest message */
   uint64_t stamp;             /* time stamp in the header of the newest pose or point; 0 if none */
   double gravity[3];          /* direction of gravity in the newest pose */
   double smoothed_gravity[3]; /* direction of gravity that frames show */
   double smoothed_at;
-  bool turning; /* `smoothed_gravity` has not reached `gravity` yet */
+  bool turning; /* true until `smoothed_gravity` reaches `gravity` */
   double warned_at;
   double gains[SUPINE_LUNGS_MAX][3]; /* gains of the last volume that could be reached */
 } supine_stream_patient;

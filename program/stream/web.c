@@ -44,7 +44,7 @@ struct supine_stream_web {
   atomic_size_t viewers;
   pthread_mutex_t lock; /* protects the fields below */
   uint64_t number;      /* serial number of the state in `text`: 1, 2, ... */
-  char text[TEXT];      /* state as JSON, to which sending appends the age and the final brace */
+  char text[TEXT];      /* state as JSON, without the age and the final brace */
   double pose_received; /* as in supine_stream_snapshot */
 };
 
@@ -81,7 +81,7 @@ static bool is_ours(struct lws *wsi) {
   return from != NULL && strcmp(from + 3, host) == 0;
 }
 
-/* Pass the pose of a message {"gravity":[x,y,z]} to the pipe; ignore other messages. */
+/* Pass the pose of a message {"gravity":[x,y,z]} to the pipe, unless it is full; ignore others. */
 static void receive(supine_stream_web *web, const char *bytes, size_t size) {
   json_t *pose = json_loadb(bytes, size, 0, NULL);
   const json_t *gravity = json_object_get(pose, "gravity");
@@ -93,7 +93,7 @@ static void receive(supine_stream_web *web, const char *bytes, size_t size) {
     good = json_is_number(value) && isfinite(taken.gravity[i]);
   }
   json_decref(pose);
-  if (good) { /* if the pipe is full, this pose is lost, but newer poses follow */
+  if (good) {
     (void)!write(web->poses[1], &taken, sizeof taken);
   }
 }
@@ -140,7 +140,7 @@ static int view(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
     return 0;
   case LWS_CALLBACK_SERVER_WRITEABLE:
     return send_state(web, wsi, s);
-  case LWS_CALLBACK_RECEIVE: /* a message in several fragments is too long to be valid */
+  case LWS_CALLBACK_RECEIVE: /* ignore messages in fragments, which are too long */
     if (lws.is_first_fragment(wsi) != 0 && lws.is_final_fragment(wsi) != 0) {
       receive(web, in, size);
     }

@@ -14,7 +14,7 @@ function fromBase64(text) {
   return bytes;
 }
 
-/** Return the bytes of a tensor and remove its text from the page. */
+/** Return the bytes of a tensor, and remove the element that holds them as text from the page. */
 function takeBytes(name) {
   const element = document.getElementById(`tensor-${name}`);
   const text = element.textContent;
@@ -32,7 +32,7 @@ function takeCounts(name, rows, columns, filter) {
   return new Int16Array(bytes.buffer);
 }
 
-/** Return a tensor of numbers, each middle[column] plus `unit` times the stored count. */
+/** Return a tensor as numbers: the number in a column is middle[column] plus `unit` times the stored count. */
 function takeRows(name, rows, columns, unit, middle = new Array(columns).fill(0)) {
   const counts = takeCounts(name, rows, columns);
   const numbers = new Float32Array(rows * columns);
@@ -100,12 +100,12 @@ function readBasis() {
   return basis;
 }
 
-const recurrences = new Map(); // results of recurrenceOf, by band
-/** Return the factors of the recurrence in harmonics() up to a band, computed once. */
+const recurrences = new Map(); // results of recurrenceOf for each band
+/** Return the factors of the recurrence in harmonics() for all bands up to `band`. They are computed once. */
 function recurrenceOf(band) {
   if (!recurrences.has(band)) {
     const tops = new Float64Array(band + 1);
-    const steps = new Float64Array((band + 1) ** 2); // factor of (l, m) at l * l + l + m
+    const steps = new Float64Array((band + 1) ** 2); // the factor of Y_lm has the index l * l + l + m
     for (let m = 0; m <= band; ++m) {
       tops[m] = m === 0 ? Math.sqrt(1 / (4 * Math.PI)) : tops[m - 1] * (m === 1 ? Math.sqrt(3) : Math.sqrt((2 * m + 1) / (2 * m)));
       for (let l = m; l <= band; ++l) steps[l * l + l + m] = Math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1 - m) * (l + 1 + m)));
@@ -153,9 +153,9 @@ function weightsFor(basis, gravity) {
   });
 }
 
-/** Return the form of a lung at weights `w`: coefficients f such that, at the gains x, y, z, the volume of the lung
- * minus that of its reference surface is f . (x, y, z, yz, xz, xy, xyz), mL. If all gains are equal (volumeAxes 1),
- * the coefficients of y, z, xz and xy are 0. */
+/** Return the coefficients f of the volume of a lung at the weights `w` of the modes. At the gains x, y, z, the volume
+ * of the lung minus that of its reference surface is f . (x, y, z, yz, xz, xy, xyz), mL. If all gains are equal
+ * (volumeAxes 1), the coefficients of y, z, xz and xy are 0. */
 function lungForm(basis, lung, w) {
   const k = basis.modes;
   const dot = (tensor, at) => { let sum = 0; for (let i = 0; i < k; ++i) sum += tensor[at + i] * w[i]; return sum; };
@@ -172,14 +172,14 @@ function lungForm(basis, lung, w) {
 
 const formAt = (f, [x, y, z]) => x * f[0] + y * f[1] + z * f[2] + y * z * f[3] + x * z * f[4] + x * y * f[5] + x * y * z * f[6];
 
-/** Return the coefficients c of the volume formAt(f, [s, s, s]) = c[0] s + c[1] s^2 + c[2] s^3. */
+/** Return the coefficients c such that formAt(f, [s, s, s]) = c[0] s + c[1] s^2 + c[2] s^3. */
 const cubicOf = (f) => [f[0] + f[1] + f[2], f[3] + f[4] + f[5], f[6]];
 
 const cubicAt = (c, s) => s * (c[0] + s * (c[1] + s * c[2]));
 const cubicSlope = (c, s) => c[0] + s * (2 * c[1] + 3 * s * c[2]);
 
-/** Return the s nearest to 0, above (side 1) or below it (side -1), at which cubicAt has an extremum; infinite if
- * there is none. */
+/** Return the s nearest to 0 at which cubicAt has an extremum, for s > 0 if `side` is 1 and for s < 0 if it is -1. If
+ * there is none, return an infinite number. */
 function cubicTurn(c, side) {
   const discriminant = c[1] * c[1] - 3 * c[0] * c[2];
   if (discriminant < 0) return side * Infinity;
@@ -218,16 +218,17 @@ function scaleForVolume(c, volume) {
   return s;
 }
 
-/** Return the three gains at `sigma`, relative to the gain at rest, on the path from full inflation (sigma 0)
- * through rest (sigma 1), like supine_volume_bend. */
+/** Return the three gains, relative to the gain at rest, on the path from full inflation (sigma 0) through rest (sigma
+ * 1) to lower volumes, like supine_volume_bend. */
 function pathAt(bend, sigma) {
   const cube = sigma * sigma * sigma;
   const e = sigma <= 1 ? (cube - sigma) / 2 : (sigma - 1) / (cube * cube);
   return bend.map((c) => sigma + 2 * c * e);
 }
 
-/** Return the three gains at which a lung of this form has the volume `volume`, on its path through the volume `rest`.
- * Both are mL above the reference volume. Return NaN if the surface folds before it reaches `volume`. */
+/** Return the three gains at which a lung with the coefficients `form` of lungForm has the volume `volume`. The gains
+ * follow pathAt, with the volume `rest` at sigma 1. Both volumes are mL above the reference volume. Return NaN if the
+ * surface folds before it reaches `volume`. */
 function gainsForVolume(form, bend, rest, volume) {
   const straight = bend.every((c) => c === 0) || volume === rest;
   const scale = scaleForVolume(cubicOf(form), straight ? volume : rest);
@@ -253,9 +254,9 @@ function gainsForVolume(form, bend, rest, volume) {
 
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
-/** Return volumes for a direction of gravity, mL above the reference volumes: `full`, of each lung at full
- * inflation, and `rest`, of each lung at rest. If all lungs have the same gains, `rest` has one element, for all
- * lungs together. If rest is unknown, `rest` is the volume in the scan. */
+/** Return volumes for a direction of gravity, mL above the reference volumes. `full` has the volume of each lung at
+ * full inflation, `rest` the volume of each lung at rest. If all lungs have the same gains, `rest` has one element, the
+ * volume of all lungs together. If rest is unknown, `rest` is the volume in the scan. */
 function volumesFor(basis, gravity) {
   const y = harmonics(2, gravity);
   const rows = basis.resting ? basis.resting.length / y.length : 1;
@@ -267,8 +268,9 @@ function volumesFor(basis, gravity) {
 /** Return the volume of all lungs at rest for gravity along a unit vector, mL above the reference volume. */
 const restFor = (basis, gravity) => sumOf(volumesFor(basis, gravity).rest);
 
-/** Return the volume of each lung for a volume `total` of all lungs, mL above the reference volumes. Above rest,
- * all lungs have covered the same fraction of the way from rest to full. Below rest, all shrink by the same factor. */
+/** Return the volume of each lung if all lungs together have the volume `total`, mL above the reference volumes. Above
+ * rest, all lungs have covered the same fraction of the way from rest to full inflation. Below rest, the volumes of all
+ * lungs have shrunk by the same factor. */
 function shareOut({ references }, { rest, full }, total) {
   const [all, resting] = [sumOf(references), sumOf(rest)];
   const part = (total - resting) / (sumOf(full) - resting);
@@ -284,9 +286,9 @@ function gainsFor(basis, forms, volumes, total) {
   return forms.map(() => gains);
 }
 
-/** Compute a moment: the lungs at a direction of gravity and a volume `depth` mL above rest. `weights` has a weight
- * for each mode, `gains` three gains for each lung, `held` the volume of each lung with its tissue, mL. `folds` is
- * true if the surface folds before it reaches that volume. */
+/** Compute a moment: the state of the lungs for a direction of gravity and a volume `depth` mL above rest. It has a
+ * weight for each mode in `weights`, three gains for each lung in `gains`, and the volume of each lung with its tissue,
+ * mL, in `held`. `folds` is true if the surface folds before it reaches that volume. */
 function momentFor(basis, gravity, depth) {
   const weights = weightsFor(basis, gravity);
   const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
@@ -297,9 +299,10 @@ function momentFor(basis, gravity, depth) {
 }
 
 /** Return the uniforms of supine.glsl: the weights w of the modes, three gains of each lung, and `turns`, the weights
- * of the normals' modes: vector j of a lung has the weights of the modes j, j + words and j + 2 words. The weight of a
- * mode is a sum over the axes of polynomials with the terms 1, a w_k, b w_k and a b w_k w_l, where a and b are the
- * gains along the other two axes. If all gains are equal, it is one polynomial, without the terms b w_k. */
+ * of the modes of the normals. Vector j of a lung in `turns` has the weights of the modes j, j + words and j + 2 words.
+ * Each of these weights is a sum over the axes of polynomials with the terms 1, a w_k, b w_k and a b w_k w_l, where a
+ * and b are the gains along the other two axes. If all gains are equal, the weight is one polynomial, without the terms
+ * b w_k. */
 function uniformsOf(basis, moment) {
   const { modes: k, words, lungs, normalModes } = basis;
   const weights = new Float32Array(4 * Math.ceil(k / 4));
@@ -333,7 +336,7 @@ function lungOf({ lungBegin }, vertex) {
   return lung;
 }
 
-/** Compute the position of a vertex in a moment, mm. */
+/** Compute the position of a vertex, mm. */
 function placeOf(basis, { weights, gains }, vertex) {
   const lung = lungOf(basis, vertex);
   let amount = 0;
@@ -341,7 +344,7 @@ function placeOf(basis, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => basis.surface[3 * vertex + axis] + gains[3 * lung + axis] * amount * basis.direction[3 * vertex + axis]);
 }
 
-/** Compute the positions of all vertices in a moment, mm. */
+/** Compute the positions of all vertices, mm. */
 function placesOf({ surface, direction, coefficients, modes, lungBegin, lungs }, { weights, gains }) {
   const places = new Float32Array(surface.length);
   for (let lung = 0; lung < lungs; ++lung) {

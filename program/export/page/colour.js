@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Compute colours, ranges and ticks, by the same rules as 'supine render' and 'supine compare'.
 
-/** Return the interval between ticks: a round number, 1/10 to 1/4 of `value`. */
+/** Return the interval between the ticks of a scale that ends at `value`: a round number, 1/10 to 1/4 of `value`. */
 function tickStep(value) {
   if (!(value > 0)) return 0.2;
   const power = 10 ** Math.floor(Math.log10(value / 4));
@@ -9,7 +9,7 @@ function tickStep(value) {
   return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
 }
 
-/** Return the end of a range: `value` rounded up to a tick. */
+/** Return the upper end of a range of colours: `value` rounded up to a tick. */
 function rangeEnd(value) {
   const step = tickStep(value);
   return value > 0 ? step * Math.ceil(value / step - 1e-9) : 5 * step;

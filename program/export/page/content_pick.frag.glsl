@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Write what is under the pointer: a NaN whose low bits are the index of the part plus 1, then the position.
+// Write what is under the pointer: a NaN whose low bits are the index of the part plus 1, and the position.
 in vec3 body;
 flat in uint part;
 out uvec4 picked;

@@ -49,7 +49,7 @@ function fill(slider) {
 /** Set the text of an element if it has changed. */
 function write(id, text) {
   const element = $(id);
-  if (element.written === text) return; // reading textContent is slower
+  if (element.written === text) return; // comparing with textContent would be slower
   element.written = text;
   element.textContent = text;
 }
@@ -100,7 +100,7 @@ function makePostureButtons(choose) {
   });
 }
 
-/** Show the colour bar and its ticks, with pointed ends where values lie beyond the range. */
+/** Show the colour bar and its ticks. The ends of the bar are pointed where values lie beyond the range. */
 function drawLegend(kind, range, title, colours) {
   $('colours').style.background = gradient(colours);
   $('colours').classList.toggle('beyond', range.beyond);

@@ -21,11 +21,12 @@ const BODY = [
 const AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 for (const part of BODY) part.squares = part.size.map((x) => x * x);
 
-/** Direction of each end of the patient's axes, by letter. */
+/** Direction of each end of the patient's axes. */
 const ENDS = { L: [1, 0, 0], R: [-1, 0, 0], A: [0, -1, 0], P: [0, 1, 0], H: [0, 0, 1], F: [0, 0, -1] };
 
-const lights = new WeakMap(); // results of lightsOf, by context
-/** Return the gradients that shade a ball of radius 1 in each tone, made once for a canvas and theme. */
+const lights = new WeakMap(); // results of lightsOf for each context
+/** Return the gradients that shade a ball of radius 1, one for each tone. They are made once for a canvas and a theme.
+ */
 function lightsOf(context, tones) {
   const made = lights.get(context);
   if (made?.tones === tones) return made;
@@ -108,8 +109,8 @@ const css = (name) => theme[name.slice(2)];
 const GLYPH = 18; // side of a letter's box, CSS pixels
 
 let glyphsMade = null;
-/** Return a canvas with the ball's letters: a row for letters in front, and a row for letters behind. They are
- * drawn once for a theme, because drawing text is slow. */
+/** Return a canvas on which the letters of the ball are drawn: one row for letters in front, and one row for letters
+ * behind. It is made once for a theme, because drawing text is slow. */
 function glyphsOf() {
   const ratio = Math.min(3, window.devicePixelRatio || 1);
   if (glyphsMade?.tones === theme.tones && glyphsMade.ratio === ratio) return glyphsMade;
@@ -131,7 +132,7 @@ function glyphsOf() {
 
 let drawn = [];   // size, theme, rotation and gravity of the ball as drawn
 let glass = null; // gradient of the ball, made once for a size and theme
-/** Draw the ball: the patient inside, gravity as an arrow. The quaternion `toEye` rotates the patient's axes to
+/** Draw the ball with the patient inside and gravity as an arrow. The quaternion `toEye` rotates the patient's axes to
  * the eye's axes. */
 function drawBall(canvas, toEye, gravity) {
   const { width: size } = sizeOf(canvas);

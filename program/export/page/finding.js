@@ -6,7 +6,7 @@ const signed = (value) => `${value < 0 ? '\u2212' : value > 0 ? '+' : ''}${Math.
 /** Published changes of each lung's volume at rest from supine, %: mean and standard deviation, by posture. */
 const PUBLISHED = { left: { source: 'Little 2021, n 10', 'left lung': [0, 44], 'right lung': [25, 11] } };
 
-/** Return the volume of each lung in a moment, gas and tissue, mL. */
+/** Return the volume of each lung, gas and tissue, mL. */
 const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
 
 /** Return a weight for each vertex, proportional to the area of the triangles around it. */
@@ -20,8 +20,8 @@ function areasOf({ surface, corners, vertices }) {
   return areas;
 }
 
-/** Return statistics of the displacement from the moment `from` to `now`, mm, over every `stride`th vertex: the
- * mean over the area, the 95th percentile (rounded up to a 2000th of the largest) and the largest. */
+/** Return statistics of the displacement from the state `from` to the state `now`, mm, over every `stride`th vertex:
+ * the mean over the area, the 95th percentile (rounded up to a 2000th of the largest) and the largest. */
 function displacementBetween(basis, now, from, stride) {
   basis.areas ??= areasOf(basis);
   const { modes, coefficients, direction, areas } = basis;
@@ -65,8 +65,8 @@ function lungWords(basis, held, before) {
     .map(({ name, ml, percent }) => `the ${name} ${Math.abs(percent) < 2 ? 'keeps its volume' : `${ml < 0 ? 'loses' : 'gains'} ${Math.abs(ml)} mL`} (${signed(percent)} %)`);
 }
 
-/** Return two sentences on a moment, one on volumes and one on displacements. `volume` is a phrase such as "500 mL
- * above rest", or empty. */
+/** Return two sentences on the state of the lungs, one on volumes and one on displacements. `volume` is a phrase such
+ * as "500 mL above rest", or empty. */
 function findingOf(basis, moment, gravity, volume, stride) {
   const { from } = basis;
   const { mean, p95, largest } = displacementBetween(basis, moment, from, stride);
@@ -78,10 +78,10 @@ function findingOf(basis, moment, gravity, volume, stride) {
   return [`${where} ${lungWords(basis, moment.held, basis.fromHeld).join('; ')}.`, displacement.replace(/^t/, 'T')];
 }
 
-/** Return the expected error of the displacement u from the moment `from` to `now`, mm RMS over the vertices, like
- * the library. The squared error of a vertex is |u| min(expected_error_mm, RMS of u). If the volume at rest is
- * assumed, add the squared change of u when that volume grows by 5 % of the reference volume. `fuller` has both
- * moments with 1 % more volume, or is null if the volume at rest is known. */
+/** Return the expected error of the displacement u from the state `from` to the state `now`, mm RMS over the vertices,
+ * as the library defines it. The squared error of a vertex is |u| min(expected_error_mm, RMS of u). If the volume at
+ * rest is assumed, add the squared change of u when that volume grows by 5 % of the reference volume. `fuller` has both
+ * states with 1 % more volume, or is null if the volume at rest is known. */
 function expectedError(basis, now, from, fuller) {
   const [a, b] = [placesOf(basis, now), placesOf(basis, from)];
   const more = fuller?.map((moment) => placesOf(basis, moment));
@@ -101,7 +101,7 @@ function expectedError(basis, now, from, fuller) {
   return Math.sqrt((Math.min(Number(basis.metadata.expected_error_mm), Math.sqrt(squares / n)) * lengths + slopes * (0.05 / 0.01) ** 2) / n);
 }
 
-/** Return a sentence on the expected error of a moment `depth` mL above rest. It is empty if the basis states no
+/** Return a sentence on the expected error at a volume `depth` mL above rest. It is empty if the basis states no
  * expected error, or if displacements are not measured from supine at rest. */
 function errorWords(basis, moment, depth) {
   const { metadata, from } = basis;
@@ -112,7 +112,7 @@ function errorWords(basis, moment, depth) {
   return `Expected error ${expectedError(basis, moment, from, fuller).toFixed(1)} mm (RMS), an extrapolation.`;
 }
 
-/** Return the changes of volume and the mean displacement in a moment, for a card: "L \u22121 %, R +18 %, 6.9 mm". */
+/** Return the changes of volume and the mean displacement for the card of a posture: "L \u22121 %, R +18 %, 6.9 mm". */
 function answerOf(basis, moment) {
   const { mean, largest } = displacementBetween(basis, moment, basis.from, 1);
   if (largest < 0.05) return 'reference';
@@ -133,7 +133,7 @@ function writeFinding(element, text) {
   }));
 }
 
-/** Bars of the lungs' volumes: grey for the volume before, then orange for a gain or hatched for a loss. */
+/** Bars of the lungs' volumes: grey for the earlier volume, then orange for a gain or hatched for a loss. */
 class Holds {
   constructor(parent, { lungNames }) {
     this.rows = lungNames.map(() => {

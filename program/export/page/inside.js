@@ -47,7 +47,7 @@ function normalsOf({ reference, vertices, corners }) {
   return normals;
 }
 
-/** Return the position of a vertex that follows the displacement field, mm. */
+/** Return the position of a vertex, mm, that follows the displacement field. */
 function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex) {
   return [0, 1, 2].map((axis) => {
     let sum = 0;
@@ -56,9 +56,9 @@ function fieldPlace({ reference, fields, modes: k }, { weights, gains }, vertex)
   });
 }
 
-/** Return the rows of the rotation that maps old positions of points to new ones with least squares of error. `h` is
- * the 3 x 3 sum of old times new positions, each relative to the mean. The rotation's quaternion is the eigenvector of
- * the largest eigenvalue of a symmetric matrix; a power iteration finds it (like runtime/rigid.c). */
+/** Return the rows of the rotation that maps old to new positions of points with the least sum of squared distances.
+ * `h` is the 3 x 3 sum of old times new positions, each relative to the mean. The quaternion of the rotation is the
+ * eigenvector of the largest eigenvalue of a symmetric matrix, found by power iteration as in runtime/rigid.c. */
 function rotationOf(h) {
   const m = [[h[0] + h[4] + h[8], h[5] - h[7], h[6] - h[2], h[1] - h[3]], [h[5] - h[7], h[0] - h[4] - h[8], h[1] + h[3], h[6] + h[2]],
     [h[6] - h[2], h[1] + h[3], h[4] - h[0] - h[8], h[5] + h[7]], [h[1] - h[3], h[6] + h[2], h[5] + h[7], h[8] - h[0] - h[4]]];
@@ -92,8 +92,8 @@ function insidePlace(inside, moment, vertex) {
   return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
 }
 
-/** Return the mean position of the vertices of a part in the moment `now`, and the mean of their displacements from
- * the moment `from`, mm. */
+/** Return the mean position of the vertices of a part in the state `now`, and their mean displacement from the state
+ * `from`, mm. */
 function insidePart(inside, part, now, from) {
   const [places, before] = [now, from].map((moment) => insidePlaces(inside, moment, part));
   const place = [0, 0, 0];
@@ -106,7 +106,7 @@ function insidePart(inside, part, now, from) {
   return { place, displacement };
 }
 
-/** Return the vertex of a part nearest to the position `place`, mm, in a moment. */
+/** Return the vertex of a part that is nearest to the position `place`, mm. */
 function insideNearest(inside, part, moment, place) {
   let [best, least] = [inside.members[part][0], Infinity];
   insidePlaces(inside, moment, part).forEach((at, j) => {
@@ -169,7 +169,8 @@ class InsideTable {
     this.redraw();
   }
 
-  /** Write the positions in the moment `now` and the displacements from `from`, unless the table shows them. */
+  /** Write the positions in the state `now` and the displacements from the state `from`, unless the table shows them
+   * already. */
   show(now, from) {
     if (this.written?.now === now && this.written.from === from) return;
     this.written = { now, from };

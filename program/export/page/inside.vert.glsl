@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compute the position of each vertex of the content, for transform feedback. picture.js appends attributes,
-// the coefficients of the displacement along each axis, and `amount(axis)`, which sums them with the weights.
+// Compute the position of each vertex of the content, for transform feedback. picture.js appends attributes with the
+// coefficients of the displacement along each axis, and `amount(axis)`, which multiplies them by the weights and adds.
 layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 out vec4 moved;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Write the view to a link and read it back; save the picture as PNG.
 
-/** Fields of State that a link lists under `show`. */
+/** Fields of State that a link lists under `show` if they are true. */
 const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside'];
 
 const round = (x, digits = 3) => String(Number(x.toFixed(digits)));

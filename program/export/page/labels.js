@@ -23,8 +23,8 @@ const placed = (element, at, shown) => {
 const LETTER_RADIUS = 12; // radius of a letter and the space around it, CSS pixels
 const ARROW_RADIUS = 13;  // radius of the head of gravity's arrow, CSS pixels
 
-/** Return the position of a letter, moved off a plate that it would overlap: up, down, right or left, by the shortest
- * way that stays in the picture. */
+/** Return the position of a letter. If it would overlap a plate, which covers a part of the picture, move it up, down,
+ * right or left, by the shortest way that stays in the picture. */
 function offPlate(at, plate, box) {
   const r = LETTER_RADIUS;
   if (at.x < plate.left - r || at.x > plate.right + r || at.y < plate.top - r || at.y > plate.bottom + r) return at;
@@ -34,7 +34,8 @@ function offPlate(at, plate, box) {
   return candidates.reduce((best, place) => (far(place) < far(best) ? place : best), candidates[0] ?? at);
 }
 
-/** Return the position of a letter, moved to the side of an arrow, [from, to], that it would overlap. */
+/** Return the position of a letter. If the letter would overlap the arrow [from, to], move it to the side of the arrow.
+ */
 function offArrow(at, [from, to], box) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   const along = Math.max(0, Math.min(1, ((at.x - from.x) * dx + (at.y - from.y) * dy) / Math.max(dx * dx + dy * dy, 1e-9)));

@@ -25,7 +25,7 @@ window.supineLive = (() => {
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  /** Rotate the orientation q (x, y, z, w) by the least angle after which gravity has the direction `gravity`. */
+  /** Rotate the orientation q (x, y, z, w) by the least angle such that gravity gets the direction `gravity`. */
   function turned(q, gravity) {
     const now = window.supine.gravityOf(q);
     let [axis, w] = [cross(gravity, now), 1 + dot(gravity, now)];

@@ -6,7 +6,7 @@
  * points [u, v] on the other two axes, mm; it stays open if it meets a hole of the surface. */
 function linesAcross({ corners, vertices }, places, axis, at) {
   const [first, second] = [0, 1, 2].filter((i) => i !== axis);
-  const links = new Map(); // for each edge that crosses the plane, those that share a triangle with it
+  const links = new Map(); // for each edge that crosses the plane, the edges that share a triangle with it
   const points = new Map(); // for each edge, the point where it crosses the plane
   for (let t = 0; t < corners.length; t += 3) {
     const over = [0, 1, 2].map((i) => places[3 * corners[t + i] + axis] > at);
@@ -78,7 +78,7 @@ class Outlines {
     return i === 0 ? `axial, ${(body.high[2] - slices[0]).toFixed(0)} mm from the apex` : `coronal, ${(slices[1] - body.low[1]).toFixed(0)} mm from the front`;
   }
 
-  /** Draw the outlines in the moment `now`, and dashed outlines in the moment `from`. */
+  /** Draw the outlines in the state `now`, and dashed outlines in the state `from`. */
   show(now, from) {
     const { basis, state, kept } = this;
     if (kept.from !== from) Object.assign(kept, { from, before: placesOf(basis, from) });

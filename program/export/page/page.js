@@ -133,7 +133,7 @@ function start() {
   }
   const pane_lowest = (name, moment) => pane_depth(name, moment).value;
 
-  /** Return the matrix from the box of makeTable to the table of a posture in the eye's axes; null if there is no
+  /** Return the matrix that maps the box of makeTable to the table of a posture, in the eye's axes; null if there is no
    * table. The table tilts with the patient. */
   function pane_table(name, moment, toRoom, offset) {
     const { down, table } = pane_depth(name, moment);
@@ -152,7 +152,8 @@ function start() {
     return [makePane('pinned', state.pinned, state.pinnedQ, [0, 0, half, h]), makePane('now', state.moment, state.q, [half, 0, w - half, h])];
   }
 
-  /** Return the pane at a position on the canvas, CSS pixels, and x and y of the position in the pane, -1 to 1. */
+  /** Return the pane at a position on the canvas, CSS pixels, and the coordinates x and y of the position in the pane,
+   * -1 to 1. */
   function paneAt({ x, y }) {
     const [px, py] = [x * ratio(), canvas.height - y * ratio()];
     const pane = panes.find(({ box }) => px >= box[0] && px < box[0] + box[2]) ?? panes[0];
@@ -251,7 +252,7 @@ function start() {
     $('probes-clear').hidden = state.probes.length === 0;
   }
 
-  /* Content of the lungs: its table, and names in the picture. */
+  /* Content of the lungs: a table, and names in the picture. */
   const insideTable = inside && new InsideTable(inside, state, redraw);
   const insideNames = new InsideNames($('letters'));
 
@@ -317,7 +318,7 @@ function start() {
   const lungHeights = (gravity) => basis.lungMiddles.map((middle) => -dot(gravity, middle));
 
   let described = null; // the moment that the sentences describe, and the stride of the vertices that they use
-  /** Write the sentences, bars and outlines of the moment, with displacements over every `stride`th vertex. */
+  /** Write the sentences, bars and outlines, with displacements over every `stride`th vertex. */
   function tellFinding(stride) {
     if (described?.moment === state.moment && described.stride <= stride) return;
     described = { moment: state.moment, stride };
@@ -342,7 +343,8 @@ function start() {
   const volumeWords = () => (Math.round(state.depth) ? `${restOrScan} + ${amount(state.depth)}` : restOrScan); // for example "rest + 500 mL"
 
   const last = {};
-  /** Call act(value) if a value differs from the last one. `last` keeps it because reading the page is slower. */
+  /** Call act(value) if a value differs from the last one, which `last` stores because reading it from the page is
+   * slower. */
   const changed = (what, value, act) => {
     if (last[what] === value) return;
     last[what] = value;
@@ -483,7 +485,8 @@ function start() {
   }
 
   let inHeadset = false;
-  /** Advance the state to a time, ms, and return the pane that a headset shows; null if there is no moment yet. */
+  /** Advance the state to a time, ms, and return the pane that a headset shows; null before the first state is
+   * computed. */
   function headsetFrame(now) {
     if (state.advance(inHeadset && before !== null ? (now - before) / 1000 : 0) || stale || !inHeadset) {
       state.compute();
@@ -518,7 +521,8 @@ function start() {
     state.camera.pan = [state.camera.pan[0] + dx * mm, state.camera.pan[1] - dy * mm];
     redraw();
   };
-  /** Zoom by a ratio. The point at the position `at` on the canvas, in the depth of the pivot, does not move. */
+  /** Zoom by a ratio. The point that is seen at the position `at` on the canvas, at the depth of the pivot, does not
+   * move. */
   const zoom = (ratioOfSizes, at) => {
     const { width, height } = boxSize();
     const aspect = width / height;

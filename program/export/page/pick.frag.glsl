@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Write what is under the pointer: the value, whose lowest 4 bits are the index of the lung, then the position.
+// Write what is under the pointer: the value with the index of the lung in its lowest 4 bits, and the position.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;

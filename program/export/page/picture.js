@@ -31,13 +31,13 @@ class Picture {
     this.gpuTime = NaN;
   }
 
-  /** Return supine.glsl after lines that define the sizes of this basis. */
+  /** Return supine.glsl preceded by lines that define the sizes of this basis. */
   sized() {
     const { basis } = this;
     return [`#define SUPINE_LUNGS ${basis.lungs}`, `#define SUPINE_VECTORS ${Math.ceil(basis.modes / 4)}`, `#define SUPINE_WORDS ${Math.max(1, basis.words)}`, source('supine.glsl')];
   }
 
-  /** Return the shader that deforms the surface, with the words of the normals as attributes from location 6 on. */
+  /** Return the shader that deforms the surface. The attributes from location 6 on are the words of the normals. */
   library() {
     const all = Array.from({ length: this.basis.words }, (_, j) => j);
     return [...this.sized(), source('vertex.vert.glsl'),
@@ -45,8 +45,8 @@ class Picture {
       `vec3 turned_by_words() { return ${all.map((j) => `supine_normal(reference, ${j}, n${j})`).join(' + ') || 'vec3(0.0)'}; }`].join('\n');
   }
 
-  /** Return the shader that deforms the content, with attributes from location 1 on, each for one axis and four
-   * modes. */
+  /** Return the shader that deforms the content. Each attribute from location 1 on has the coefficients for one axis
+   * and four modes. */
   insideLibrary() {
     const vectors = Math.ceil(this.basis.modes / 4);
     const all = [0, 1, 2].flatMap((axis) => Array.from({ length: vectors }, (_, j) => ({ axis, j, name: `c${axis}_${j}` })));
@@ -86,7 +86,8 @@ class Picture {
     return made;
   }
 
-  /** Return a vertex array. Each attribute is [buffer, size, stride, offset, divisor, integer], or null for none. */
+  /** Return a vertex array. Each attribute is [buffer, size, stride, offset, divisor, integer], or null if it is not
+   * used. */
   array(attributes) {
     const { gl } = this;
     const made = gl.createVertexArray();
@@ -104,9 +105,9 @@ class Picture {
     return made;
   }
 
-  /** Make the inputs of vertex.vert.glsl for all vertices, and for the few that have arrows: reference position and
-   * lung, direction, up to 16 coefficients, and the words of the normals. Missing coefficients read as (0, 0, 0, 1),
-   * but their weights are 0. */
+  /** Make the inputs of vertex.vert.glsl for all vertices, and for the few vertices that have arrows: reference
+   * position and lung, direction, up to 16 coefficients, and the words of the normals. Missing coefficients read as (0,
+   * 0, 0, 1), but their weights are 0. */
   makeInputs() {
     const { basis } = this;
     const k = basis.modes;
@@ -293,7 +294,7 @@ class Picture {
     gl.bindVertexArray(null);
   }
 
-  /** Deform the surface and the content to a moment, and keep both as the state `name`. */
+  /** Deform the surface and the content to a moment, and store both under the name `name`. */
   deform(name, moment) {
     const { moved, turned, few, inside } = this.state(name);
     this.capture(moment, this.inputs, [moved, turned], this.basis.vertices);
@@ -311,7 +312,7 @@ class Picture {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** Return the uniforms of a moment. The uniforms of the last moment are kept. */
+  /** Return the uniforms of a moment. The last result is kept for the next call. */
   uniforms(moment) {
     if (this.uniformsMoment !== moment) {
       this.uniformsMoment = moment;
@@ -374,7 +375,7 @@ class Picture {
     set('spacing', pane.contours ? pane.range.step : 0);
     set('dark', pane.dark ? 1 : 0);
     set('flatly', 0);
-    /** Draw the state from which displacements are measured: as a shell (1) or as an outline (2). */
+    /** Draw the lungs in the state from which displacements are measured: as a shell (1) or as an outline (2). */
     const ghost = (how) => {
       if (!pane.ghost) return;
       gl.bindVertexArray(this.shown('from', 'from'));
@@ -516,8 +517,8 @@ class Picture {
     this.endTiming();
   }
 
-  /** Ask what is at the position (x, y) in a pane, both from -1 to 1. picked() has the answer a frame or two later,
-   * so that no frame waits for it. */
+  /** Ask what is at the position (x, y) in a pane, both from -1 to 1. The method picked() has the answer a frame or two
+   * later, so that no frame waits for it. */
   pick(pane, x, y) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.pickPlace);

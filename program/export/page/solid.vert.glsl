@@ -7,7 +7,7 @@ layout(location = 2) in vec3 tail;     // start of each arrow, mm
 layout(location = 3) in vec3 head;     // end of each arrow, mm
 uniform mat4 toEye;
 uniform mat4 projection;
-uniform float thick; // largest scale across an arrow from tail to head, mm; 0 if toEye alone places the solid
+uniform float thick; // largest width of an arrow from tail to head, mm; 0 for solids that toEye alone places
 out vec3 facing;
 out vec3 body;
 

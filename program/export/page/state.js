@@ -59,7 +59,7 @@ const FADED = 0.35; // opacity of translucent lungs
 
 const FIRST_CAMERA = { azimuth: -0.4, elevation: 0.16, zoom: 1, pan: [0, 0], pivot: null };
 
-/** Names of the views, by the letter of the end of the axis that points to the viewer. */
+/** Names of the views. Each key is the letter of the end of the axis that points to the viewer. */
 const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 'From the right', H: 'From the head', F: 'From the feet' };
 
 class State {
@@ -142,7 +142,7 @@ class State {
     return this.kind === 'difference' || this.beside;
   }
 
-  /** Compute the moment; return false and keep the old moment if the surface would fold. */
+  /** Compute the lungs' state `moment`. If the surface would fold, keep the old moment and return false. */
   compute() {
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (moment.folds) return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Colour the surface by value. Shading is weak, so that colours match the bar.
+// Colour the surface by `value`. Shading is weak, so that colours match the colour bar.
 in vec3 eye;
 in vec3 facing;
 in vec3 body;
@@ -16,7 +16,7 @@ out vec4 colour;
 
 void main() {
   if (dot(body, cut.xyz) > cut.w) discard;
-  // Without normals in the basis, use those of the triangles.
+  // If the basis has no normals, use those of the triangles.
   vec3 n = normalize(dot(facing, facing) > 0.0 ? facing : cross(dFdx(eye), dFdy(eye)));
   vec3 view = normalize(-eye);
   n = dot(n, view) < 0.0 ? -n : n;
