@@ -18,7 +18,7 @@
 
 static const char name[] = "breathe";
 
-static const double budget = 15e-3; /* compute time allowed per frame, s */
+static const double budget = 15e-3; /* longest compute time allowed for one frame, s */
 
 typedef struct request {
   supine_orientation orientation;
@@ -33,7 +33,7 @@ typedef struct request {
   double duration; /* s; 0 if not given */
 } request;
 
-/* Names of the courses, indexed by supine_pv_course. */
+/* Names of the courses of pressure or volume in a breath, indexed by supine_pv_course. */
 static const char *const courses[] = {"cosine", "ramp", "flow", NULL};
 
 static const supine_option table[] = {
@@ -52,8 +52,8 @@ static const supine_option table[] = {
      SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
-     "tidal volume of both lungs, in mL, which is added to rest in the posture, or to the scan if "
-     "rest is unknown; default 500",
+     "tidal volume of both lungs, in mL, added to the volume at rest in the posture or, if rest is "
+     "unknown, to the volume in the scan; default 500",
      SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
@@ -80,7 +80,7 @@ static const supine_option table[] = {
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
 
-/* Check the options, set the turn, and compute the number of frames. */
+/* Check the options, set the start and the end of gravity's turn, and count the frames. */
 static supine_status complete(request *wanted, size_t *count, supine_error *error) {
   enum { FRAMES_MAX = 1000000 };
   supine_pv_breath *breath = &wanted->breath;
@@ -116,16 +116,16 @@ static supine_status complete(request *wanted, size_t *count, supine_error *erro
 typedef struct playing {
   const request *wanted;
   supine_basis *basis;
-  size_t frame_count, lung_count; /* T and G below */
-  double *time;                   /* [T] s */
-  double *above;    /* [T] volume above rest, or above the scan if rest is unknown, mL */
-  double *gravity;  /* [T, 3] unit vectors */
-  double *volumes;  /* [T, G] gas and tissue, mL */
-  supine_mesh mesh; /* triangles and, for VTP, the positions of the current frame */
-  float *normals;   /* [N, 3] normals of the current frame, for VTP */
-  float *positions; /* [1 + T, N, 3] mm: the current frame; for safetensors, all T frames follow */
-  double *compute_time; /* [T] s */
-  double *origin;       /* [N, 3] positions that displacements start from, mm */
+  size_t frame_count, lung_count;
+  double *time;     /* [frames] s */
+  double *above;    /* [frames] mL above the volume at rest or, if that is unknown, in the scan */
+  double *gravity;  /* [frames, 3] unit vectors */
+  double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
+  supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
+  float *normals;   /* [N, 3] normals of the current frame, for VTP output */
+  float *positions; /* [N, 3] mm: the current frame; for safetensors output, all frames follow it */
+  double *compute_time; /* [frames] s */
+  double *origin;       /* [N, 3] positions from which displacements are measured, mm */
   char vtp_comment[512];
 } playing;
 
@@ -139,7 +139,7 @@ static void end(playing *p) {
   supine_basis_close(p->basis);
 }
 
-/* Allocate memory for `count` frames; for a VTP `series`, p->positions holds one frame only. */
+/* Allocate memory for `count` frames. A VTP `series` keeps only the current frame in memory. */
 static supine_status begin_frames(playing *p, size_t count, bool series, supine_error *error) {
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->frame_count = count;
@@ -185,14 +185,14 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
     supine_error cause;
     status = find_pose(p, t, &pose, &cause);
     if (status != SUPINE_OK) {
-      return supine_error_set(error, status, "at %.3f s: %s", p->time[t], cause.message);
+      return supine_error_set(error, status, "frame at %.3f s: %s", p->time[t], cause.message);
     }
     supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
   }
   return status;
 }
 
-/* Return the volume of all lungs in a frame, mL. */
+/* Return the total volume of the lungs in frame t, mL. */
 static double volume_at(const playing *p, size_t t) {
   double sum = 0.0;
   for (size_t lung = 0; lung < p->lung_count; ++lung) {
@@ -201,7 +201,7 @@ static double volume_at(const playing *p, size_t t) {
   return sum;
 }
 
-/* Find the frames of smallest and largest volume. */
+/* Set ends[0] to the frame of smallest total volume, and ends[1] to the frame of largest. */
 static void find_ends(const playing *p, size_t ends[2]) {
   ends[0] = ends[1] = 0;
   for (size_t t = 1; t < p->frame_count; ++t) {
@@ -222,7 +222,7 @@ static void report(const playing *p) {
                1e3 * gsl_stats_max(p->compute_time, 1, p->frame_count), 1e3 * budget);
 }
 
-/* Compute all frames.
+/* Compute all frames. find_volumes must have computed their poses without an error.
  * @param series  receives each frame; NULL to store all frames in p->positions */
 static supine_status play_frames(playing *p, supine_mesh_series *series, supine_error *error) {
   const size_t frame = 3 * p->mesh.vertex_count;
@@ -231,7 +231,7 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
   for (size_t t = 0; t < p->frame_count && status == SUPINE_OK; ++t) {
     supine_pose pose;
     const double start = supine_clock_seconds();
-    (void)find_pose(p, t, &pose, NULL); /* cannot fail: find_volumes has computed this pose */
+    (void)find_pose(p, t, &pose, NULL);
     supine_deform(p->basis, &pose, p->positions);
     p->compute_time[t] = supine_clock_seconds() - start;
     if (series != NULL) {
@@ -253,9 +253,10 @@ static supine_status play_frames(playing *p, supine_mesh_series *series, supine_
 }
 
 /* Compute the frames, and write them as VTP.
- * @param save  has its axes, unit and comment set */
+ * @param save  axes, unit and comment of the output; the other options are set here */
 static supine_status write_series(playing *p, supine_mesh_save_options save, supine_error *error) {
-  /* Positions are rounded to multiples of this, mm; the basis itself errs by up to 0.005 mm. */
+  /* Positions are rounded to multiples of this length, mm; a basis itself errs by up to 0.005
+   * mm. */
   static const double rounding = 1.0 / 256.0;
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
@@ -304,7 +305,7 @@ static supine_status write_tensors(playing *p, const char *made_by, supine_error
              : status;
 }
 
-/* Check that the surfaces in the frames of smallest and largest volume are plausible. */
+/* Check the surfaces of smallest and of largest volume with supine_options_pose_check. */
 static supine_status check_ends(const playing *p, supine_error *error) {
   size_t ends[2];
   find_ends(p, ends);

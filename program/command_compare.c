@@ -54,12 +54,12 @@ typedef struct structures {
   const supine_basis *basis;
   const supine_posture_list *postures;
   supine_command_names names;
-  float *displacement;   /* [N, 3] displacement of each vertex in one posture, mm */
-  double *mean;          /* [postures, names, 3] mean displacement from the reference surface, mm */
-  double *square_errors; /* [names] mean squared expected error, mm^2; NAN if unknown */
+  float *displacement; /* [N, 3] displacement of each vertex in one posture, mm */
+  double *mean; /* [postures, structures, 3] mean displacement from the reference surface, mm */
+  double *square_errors; /* [structures] mean squared expected error, mm^2; NAN if unknown */
 } structures;
 
-/* Average values [N, width] over the vertices of each name; 0 for a name without vertices. */
+/* Average values [N, width] over each structure's vertices; the mean over no vertices is 0. */
 static void average(const structures *c, size_t width, const float *values, double *mean) {
   const supine_command_names *names = &c->names;
   for (size_t part = 0; part < names->count; ++part) {
@@ -75,7 +75,7 @@ static void average(const structures *c, size_t width, const float *values, doub
   }
 }
 
-/* Compute the mean displacement of each name's vertices in posture i. */
+/* Compute the mean displacement of each named structure in posture i. */
 static supine_status find_means(const structures *c, const supine_state *state, size_t i,
                                 supine_error *error) {
   supine_pose pose;
@@ -88,7 +88,7 @@ static supine_status find_means(const structures *c, const supine_state *state, 
   return status;
 }
 
-/* Compute the mean squared expected error of each name's displacement between two states. */
+/* Compute the mean squared expected error of each structure's displacement between two states. */
 static supine_status find_square_errors(const structures *c, const supine_state *to,
                                         const supine_state *from, supine_error *error) {
   const size_t n = supine_basis_get_info(c->basis)->vertex_count;
@@ -107,7 +107,7 @@ static supine_status find_square_errors(const structures *c, const supine_state 
   return status;
 }
 
-/* Append the displacement of each name from one posture to another to a list. */
+/* Append to a list the displacement of each named structure from one posture to another. */
 static void add_pair(const structures *c, size_t from, size_t to, json_t *list) {
   for (size_t part = 0; part < c->names.count; ++part) {
     const char *const text[] = {c->postures->item[from].name, c->postures->item[to].name,
@@ -124,7 +124,7 @@ static void add_pair(const structures *c, size_t from, size_t to, json_t *list) 
   }
 }
 
-/* Append the displacements between every two postures to a list. */
+/* Append to a list the displacement of each named structure between every two postures. */
 static supine_status find_pairs(const structures *c, const supine_state *volume, json_t *list,
                                 supine_error *error) {
   supine_state state[SUPINE_POSTURE_LIST_MAX];

@@ -23,8 +23,8 @@ typedef struct request {
   supine_from from;
   bool as_scanned;
   supine_deform_content content;
-  const char *states; /* CSV file; NULL if the options give one state */
-  char *output;       /* file named by a row of `states`; owned by the request */
+  const char *states; /* CSV file of states; NULL if the options give one state */
+  char *output; /* output file named in a row of the file `states`; the request owns this text */
 } request;
 
 #define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
@@ -153,13 +153,13 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   return status;
 }
 
-/* Fill a request with the state and the output of a row of --states. */
+/* Fill a request with the state and the output file in a row of the CSV file of --states. */
 static supine_status read_row(const supine_csv *csv, request *row, supine_error *error) {
   const char *const output = supine_csv_text(csv, 1);
   const char *const volume = supine_csv_text(csv, 2);
   supine_state *state = &row->volume.state;
   supine_error reason;
-  state->gravity[1] = 1.0; /* default: supine */
+  state->gravity[1] = 1.0; /* supine, unless the row names another posture */
   supine_status status = supine_state_parse(supine_csv_text(csv, 0), state, &reason);
   if (status == SUPINE_OK && volume != NULL && volume[0] != '\0') {
     status = supine_state_parse_volume(volume, state, &reason);

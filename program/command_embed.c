@@ -15,15 +15,15 @@
 
 static const char name[] = "embed";
 
-/* Margin of a grid around the lungs, mm, in which 'supine deform' fades a field to 0. */
+/* A grid extends this far beyond the lungs, mm. Displacements fall to 0 over this distance. */
 static const double margin = 60.0;
 
 enum { LABELS_MOST = 64 };
 
-/* Labels to embed, and a name for each, from --labels. */
+/* Labels given by --labels, and a name for each. */
 typedef struct label_list {
   bool given;
-  size_t count; /* 0 if all labels of the map are wanted */
+  size_t count; /* 0 for all labels of the label map */
   unsigned label[LABELS_MOST];
   char name[LABELS_MOST][32];
 } label_list;
@@ -38,7 +38,7 @@ typedef struct request {
   supine_mesh_load_options load;
 } request;
 
-/* Parse "all", "7" or "7=nodule,8=vessels". */
+/* Parse a list of labels, such as "all", "7" or "7=nodule,8=vessels". */
 static supine_status read_labels(const char *text, void *field, supine_error *error) {
   label_list *list = field;
   (void)error;
@@ -91,7 +91,7 @@ static const supine_option table[] = {
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
-/* Make the nodes of a regular grid, or, if an image is named, choose them from its voxels. */
+/* Make the nodes of a regular grid or, unless `image_path` is NULL, take voxels of that image. */
 static supine_status read_grid(const supine_inside_shells *shells, const request *wanted,
                                const char *image_path, supine_inside_content *content,
                                supine_error *error) {
@@ -230,9 +230,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   if (labels && (!image || wanted->has_grid)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            image
-                                ? "--labels embeds surfaces, --grid embeds nodes: give one of them"
-                                : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
+                            image ? "--labels embeds surfaces, --grid embeds nodes: give only one"
+                                  : "--labels needs a label map: name one (.nrrd, .nii, .nii.gz)");
   }
   if (!labels && given->count > 1 && (image ? given->count > 2 : wanted->has_grid)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

@@ -15,7 +15,7 @@ typedef struct request {
   const char *path;
   const char *title;
   supine_from from;
-  bool glb_only; /* an option was given that applies to .glb files only */
+  bool glb_only; /* whether an option was given that applies to .glb files only */
   const char *inside;
   export_glb_options glb;
 } request;

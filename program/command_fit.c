@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine fit: fit a law to one person's scans and landmarks. */
+/* supine fit: fit a displacement law to one person's scans and landmarks. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,15 +22,15 @@ typedef struct request {
   int law;
   supine_source_options source;
 
-  supine_state first, second;           /* states of the two scans */
-  const char *first_path, *second_path; /* surfaces of the two scans; NULL if not given */
+  supine_state first, second;           /* states of the lungs in the two scans */
+  const char *first_path, *second_path; /* surface files of the two scans; NULL if not given */
   size_t further_count;
   supine_state further[SUPINE_PATIENT_OTHERS_MAX];
   const char *further_path[SUPINE_PATIENT_OTHERS_MAX];
 } request;
 
 typedef struct scan_data {
-  supine_lungs lungs[2]; /* the fuller and the emptier scan, once order_states has ordered them */
+  supine_lungs lungs[2]; /* lungs in the two scans; order_states puts the fuller scan first */
   supine_patient_pairs pairs;
   bool second_is_fuller;
 } scan_data;
@@ -109,7 +109,7 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
-/* Print the model. The text leaves out the lists of kriging centres and regions. */
+/* Print the fitted model. The text leaves out kriging centres and the regions' expandability. */
 static supine_status print(const supine_patient_record *record, const char *made_by, bool json,
                            supine_error *error) {
   json_t *root = supine_patient_encode(record, made_by);
@@ -135,7 +135,7 @@ static double volume_of(const supine_lungs *lungs) {
   return lungs->mesh.vertex_count > 0 ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
 }
 
-/* Assign each landmark to the lung whose surface is nearest in the first scan. */
+/* Assign each landmark to the lung whose surface is nearest to it in the first scan. */
 static supine_status find_sides(const supine_lungs *lungs, supine_patient_pairs *pairs,
                                 supine_error *error) {
   supine_inside_surface *tree = NULL;
@@ -184,7 +184,7 @@ static supine_status load_scans(const request *wanted, scan_data *data, supine_e
   return status;
 }
 
-/* Return 1 if the second state is named as the fuller one, -1 if the first is, else 0. */
+/* Return 1 if the options say that the second state is fuller, -1 if the first is, else 0. */
 static int named_order(const supine_state *first, const supine_state *second) {
   const supine_volume *a = &first->volume;
   const supine_volume *b = &second->volume;
@@ -198,11 +198,10 @@ static int named_order(const supine_state *first, const supine_state *second) {
                                                                           : 0;
 }
 
-/* Put the fuller scan first: by the named states, else by the volumes of the surfaces or the growth
- * of the landmarks.
- * */
+/* Put the fuller scan first. If the options do not tell which it is, use the volumes of the
+ * surfaces or, without two surfaces, the change of volume in an affine map of the landmarks. */
 static supine_status order_states(const request *wanted, scan_data *data, supine_error *error) {
-  /* Relative error of the volumes; a smaller difference does not contradict the named states. */
+  /* Relative error of volumes; scans that differ by less do not contradict the options. */
   static const double volume_error = 0.02;
   const double volume[2] = {volume_of(&data->lungs[0]), volume_of(&data->lungs[1])};
   const double growth = volume[0] > 0.0 && volume[1] > 0.0 ? volume[1] / volume[0]
@@ -211,8 +210,8 @@ static supine_status order_states(const request *wanted, scan_data *data, supine
   const int named = named_order(&wanted->first, &wanted->second);
   if ((named > 0 && growth < 1.0 - volume_error) || (named < 0 && growth > 1.0 + volume_error)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the state named as the fuller one has %.0f %% of the volume of the "
-                            "other: exchange --rest and --other, or give --reverse",
+                            "the scan named as fuller has %.0f %% of the volume of the other scan: "
+                            "exchange --rest and --other, or give --reverse",
                             100.0 * (named > 0 ? growth : 1.0 / growth));
   }
   data->second_is_fuller = named > 0 || (named == 0 && growth > 1.0);
@@ -244,8 +243,8 @@ static supine_status fit_landmarks(const request *wanted, const supine_patient_p
   return status;
 }
 
-/* Fit a further state. Its landmarks start in the first scan; if the first scan is the emptier one,
- * they are moved to the fuller scan. */
+/* Fit a state of --state. Its landmarks start in the first scan; if that is the emptier scan, their
+ * starting points are moved to the fuller scan. */
 static supine_status fit_further(const request *wanted, const scan_data *data, size_t which,
                                  const supine_lungs *from, supine_patient_record *record,
                                  supine_error *error) {
@@ -271,12 +270,12 @@ static supine_status fit_further(const request *wanted, const scan_data *data, s
   return status;
 }
 
-/* Fit the further states, and compute from them the part of the force that depends on gravity. */
+/* Fit the states of --state, and compute the part of the force that depends on gravity. */
 static supine_status find_gain(const request *wanted, scan_data *data,
                                supine_patient_record *record, supine_error *error) {
   supine_lungs *from = &data->lungs[0];
   supine_status status = SUPINE_OK;
-  if (from->mesh.vertex_count == 0) { /* only the emptier scan has a surface */
+  if (from->mesh.vertex_count == 0) { /* the fuller scan has no surface */
     from = &data->lungs[1];
     supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_mesh_box(&from->mesh, from->minimum, from->maximum);
@@ -288,8 +287,8 @@ static supine_status find_gain(const request *wanted, scan_data *data,
   return status;
 }
 
-/* If state k was given without a volume, take the volume of its surface: relative to rest or full
- * if the volume of the other state is relative to it, else absolute. */
+/* If state k (0 or 1) has no volume, take its surface's volume: relative to rest or to full
+ * inflation if the other state's volume is, otherwise absolute. */
 static void complete_state(supine_patient_record *record, size_t k) {
   supine_volume *of = &record->state[k].volume;
   const supine_state *other = &record->state[1 - k];
@@ -332,7 +331,8 @@ static void set_states(const request *wanted, const scan_data *data,
 
 /* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
 static void warn_of_rest(const supine_patient_record *record) {
-  /* Smallest reported difference / full inflation; the SD among healthy people is 0.04. */
+  /* Difference between the volumes at rest, as a share of the volume at full inflation, from which
+   * on a warning is printed. The standard deviation among healthy people is 0.04. */
   static const double reported_from = 0.07;
   const supine_resting usual = supine_reference_resting_default();
   const double *g = record->state[1].gravity;
@@ -342,7 +342,7 @@ static void warn_of_rest(const supine_patient_record *record) {
                            supine_reference_resting_total(&shown, g)};
   if (fabs(share[1] - share[0]) > reported_from) {
     supine_options_say(name,
-                       "warning: at rest the lungs hold %.0f %% of full inflation in the two "
+                       "warning: the volume at rest is %.0f %% of full inflation in the two "
                        "scans, but %.0f %% in healthy people: check --rest. 'supine precompute "
                        "--patient' uses the volume in the scans",
                        100.0 * share[1], 100.0 * share[0]);
@@ -395,7 +395,7 @@ static supine_status fit(const request *wanted, supine_patient_record *record,
   return status;
 }
 
-/* Take the operands, and check that they fit the options. */
+/* Take the file names from the command line, and check that they fit the options. */
 static supine_status check(request *wanted, const supine_arguments *given, supine_error *error) {
   bool further_surfaces = false;
   wanted->first_path = given->count > 0 ? given->operand[0] : NULL;
@@ -407,7 +407,7 @@ static supine_status check(request *wanted, const supine_arguments *given, supin
       wanted->landmarks.path == NULL && wanted->second_path == NULL
           ? "nothing to fit to: give --landmarks, the surfaces of both scans, or both"
       : further_surfaces && wanted->first_path == NULL
-          ? "--state names a surface: name the surface of the first scan too"
+          ? "--state with a surface needs a first scan: name the surface of the first scan too"
       : wanted->expandability && wanted->second_path == NULL
           ? "--expandability needs surfaces: give those of both scans"
       : wanted->expandability && wanted->has_law && wanted->law == SUPINE_PATIENT_DEEP
@@ -426,7 +426,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (status == SUPINE_OK) {
     status = print(&record, given->made_by, wanted->json, error);
   }
-  /* Write last, so that a failure leaves no file. */
+  /* Write the file last, so that a failure leaves no file. */
   if (status == SUPINE_OK && wanted->path != NULL) {
     status = supine_patient_write(wanted->path, &record, given->made_by, error);
   }
@@ -438,11 +438,12 @@ const supine_command supine_command_fit = {
     "fit a model to a person's scans and landmarks",
     .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
              "SCAN SCAN [--state STATE:FILE]... -o patient.json [OPTIONS]",
-    .about = "Fits a model to one person's lungs in two scans: a law of motion, and its residual "
-             "interpolated by kriging. Reports the measured and the expected error at held-out "
-             "points. Landmarks determine the motion best; surfaces alone do not show sliding "
-             "along them, so their expected error includes the sliding seen in other patients. "
-             "'supine precompute --patient' makes a basis from the model and either scan.",
+    .about =
+        "Fits a model to one person's lungs in two scans: a displacement law, and its residual "
+        "interpolated by kriging. Reports the measured and the expected error at held-out "
+        "points. Landmarks determine the motion best; surfaces alone do not show sliding "
+        "along them, so their expected error includes the sliding seen in other patients. "
+        "'supine precompute --patient' makes a basis from the model and either scan.",
     .options = table,
     .notes =
         "Residuals are given for no motion, a translation, an affine map, the law, and the law "

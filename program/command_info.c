@@ -10,7 +10,7 @@
 
 #include "program/options/basis_input.h"
 
-/* Compute the share of each band in the squared displacement; all 0 if the surface has no area. */
+/* Compute each harmonic band's share of the squared displacement; 0 if the surface has no area. */
 static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
   supine_compare *compare = NULL;
   const supine_status status = supine_compare_create(basis, &compare, error);
@@ -30,7 +30,7 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
   return SUPINE_OK;
 }
 
-/* Keys of metadata that are printed under the same key. */
+/* Keys of the basis's metadata that are printed under the same name. */
 static const char *const facts[] = {"content",        "assumed",
                                     "patient",        "scanned",
                                     "resting_shares", "law",
@@ -45,7 +45,7 @@ static const char *const errors[] = {"error_directions",  "error_rms_percent", "
                                      "error_max_percent", "error_volume_ml",   "error_rest_part",
                                      "error_rms_mm",      "error_p95_mm",      "error_max_mm"};
 
-/* Add an entry of the metadata if the basis has it; if its text is a number, add it as a number. */
+/* Add the value of a metadata key to a JSON object, as a number if possible; skip missing keys. */
 static void add_fact(json_t *object, const char *name, const supine_basis *basis, const char *key) {
   const char *text = supine_basis_metadata(basis, key);
   double value;
@@ -56,7 +56,7 @@ static void add_fact(json_t *object, const char *name, const supine_basis *basis
   }
 }
 
-/* Add the numbers of embedded vertices in each lung and outside the lungs, and of rigid parts. */
+/* Add the counts of embedded vertices in each lung and outside the lungs, and of rigid parts. */
 static void add_content(json_t *root, const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *depth = supine_basis_tensor(basis, "depth");
@@ -81,8 +81,8 @@ static void add_content(json_t *root, const supine_basis *basis) {
   (void)json_object_set_new(root, "embedded", counts);
 }
 
-/* Add the expected errors, if known, of the displacements from the scan to supine and to prone at
- * the default volume. Return SUPINE_OK or SUPINE_ERROR_MEMORY. */
+/* Add the expected errors, if known, of two displacements: from the scan to supine, and from the
+ * scan to prone, both at the default volume. Return SUPINE_OK or SUPINE_ERROR_MEMORY. */
 static supine_status add_expected(json_t *root, const supine_basis *basis, supine_error *error) {
   const supine_state scan = supine_basis_scan(basis);
   json_t *rows = json_array();
@@ -105,7 +105,7 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
   return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK;
 }
 
-/* Add a list of errors, by highest band (error_harmonics) or by number of modes (error_modes). */
+/* Add a list of compression errors: "error_harmonics" by band, "error_modes" by number of modes. */
 static void add_errors(json_t *root, const supine_basis *basis, const char *key) {
   const supine_tensor *tensor = supine_basis_tensor(basis, key);
   const bool valid = tensor != NULL && tensor->dtype == SUPINE_F64 && tensor->rank == 1;

@@ -20,7 +20,7 @@ static const char name[] = "locate";
 typedef struct request {
   const char *output, *points;
   supine_orientation orientation;
-  supine_state state; /* its volume is fitted if it is of kind SUPINE_VOLUME_DEFAULT */
+  supine_state state; /* the volume is fitted if its kind is SUPINE_VOLUME_DEFAULT */
   double noise;
   bool rigid, json;
 } request;
@@ -49,7 +49,7 @@ typedef struct observations {
   supine_observation *points;
 } observations;
 
-/* Find the vertex of the point that a row names. */
+/* Find the vertex of the point that the current row of a CSV file names. */
 static supine_status find_vertex(const supine_csv *csv, const supine_command_names *names,
                                  size_t *vertex, supine_error *error) {
   const char *text = supine_csv_text(csv, 0);
@@ -129,20 +129,20 @@ static const char *const postures[POSTURES] = {"supine", "prone",   "left",
                                                "right",  "upright", "inverted"};
 
 static const double negligible = 0.01; /* probability below which a posture is ignored */
-static const double determined = 0.95; /* probability from which a posture counts as determined */
+static const double determined = 0.95; /* from this probability on, a posture is determined */
 
 typedef struct lungs_found {
   size_t count; /* number of postures tried */
   supine_location location[POSTURES];
   double probability[POSTURES];
-  const supine_location *best;       /* element of `location` for the most probable posture */
-  supine_locate_residual *residuals; /* [POSTURES, points] */
-  float *xyz;                        /* [N, 3] positions in the best posture, mm */
-  float *sigma;                      /* [N] expected errors, weighted over all postures, mm */
-  void *space;                       /* workspaces of supine_locate */
+  const supine_location *best;       /* the element of `location` for the most probable posture */
+  supine_locate_residual *residuals; /* [postures, points] */
+  float *xyz;                        /* [N, 3] positions in the most probable posture, mm */
+  float *sigma;                      /* [N] expected errors of the positions, mm */
+  void *space;                       /* a workspace of supine_locate for each posture */
 } lungs_found;
 
-/* Fit the given posture, or all postures; one that cannot be fitted gets probability 0. */
+/* Fit the lungs in the given posture or in all six; a failed fit gets probability 0. */
 static supine_status try_postures(const supine_locate_task *task, bool posture_given,
                                   lungs_found *located, supine_error *error) {
   const size_t n = task->count;
@@ -179,8 +179,9 @@ static supine_status try_postures(const supine_locate_task *task, bool posture_g
   return SUPINE_OK;
 }
 
-/* Compute the positions x in the best posture, and the expected errors, weighted over all postures
- * k: sigma^2 = sum over k of p_k (sigma_k^2 + |x_k - x|^2), where p_k is the probability of k.
+/* Compute the positions x in the most probable posture, and the expected errors sigma. If posture k
+ * has probability p_k, positions x_k and expected errors sigma_k, then sigma^2 is the mean of
+ * sigma_k^2 + |x_k - x|^2 over all k, weighted by p_k.
  * @param xyz, sigma  [N, 3] and [N], workspace */
 static supine_status find_positions(const supine_basis *shown, float *xyz, float *sigma,
                                     lungs_found *located, supine_error *error) {
@@ -212,8 +213,8 @@ static supine_status find_positions(const supine_basis *shown, float *xyz, float
   return status;
 }
 
-/* Fit the lungs to the points, and compute the positions of the basis `shown`. If no posture was
- * given, try the six named postures. */
+/* Fit the lungs to the points, and compute the positions of the vertices of `shown`. If no posture
+ * was given, try six postures. */
 static supine_status find(const supine_locate_task *task, bool posture_given,
                           const supine_basis *shown, lungs_found *located, supine_error *error) {
   const size_t n = supine_basis_get_info(shown)->vertex_count;
@@ -363,7 +364,7 @@ static supine_status locate(const request *wanted, const supine_basis *lungs,
                                    .rigid = wanted->rigid};
   supine_status status = find(&task, wanted->orientation.given, shown, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
-    /* The points do not determine a rotation: an error of the file, not of an option. */
+    /* The points do not determine a rotation. This is an error in the file, not in an option. */
     status = error->status = SUPINE_ERROR_FORMAT;
   }
   if (status == SUPINE_OK) {

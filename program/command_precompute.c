@@ -110,7 +110,7 @@ static void report_result(const char *path, const supine_lungs *lungs,
   }
 }
 
-/* Print the errors by band, and the bands that the directions determine. */
+/* Print which bands the directions determine, and the leave-one-out error of each band. */
 static void report_fit(const char *path, const supine_fields *fields,
                        const supine_fit_report *fit) {
   const size_t highest = fit->band_highest;
@@ -186,7 +186,7 @@ static supine_status take_patient(request *wanted, supine_patient_record *record
     return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %s", wanted->patient);
   }
   wanted->model.patient = record;
-  /* The patient model replaces the constants of this law. */
+  /* The patient's constants will replace those of this law. */
   wanted->model.choice.law = SUPINE_LAW_DEEP;
   wanted->basis.patient = *text;
   const supine_patient_fit_report *report = &record->report;
@@ -207,8 +207,8 @@ static void begin(void *chosen) {
   supine_command_model_options_begin(&((request *)chosen)->model);
 }
 
-/* Refuse options that set constants of the law, as the patient's model has its own. Call this
- * before supine_command_model_load, which sets the constants that were not given. */
+/* Refuse options that set constants of the law, because the patient's model has constants of its
+ * own. Call this before supine_command_model_load, which sets all constants that were not given. */
 static supine_status check_patient(const supine_model_choice *choice, supine_error *error) {
   const supine_model *model = &choice->model;
   const bool given = choice->law != SUPINE_LAW_COUNT || !isnan(model->force.base) ||

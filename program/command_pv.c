@@ -58,18 +58,18 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   }
   json_t *root = json_pack("{s:f}", "confidence", chosen->confidence);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
-    if (reports[limb].samples > 0) { /* a limb without samples has the curve of the other limb */
+    if (reports[limb].samples > 0) {
       (void)json_object_set_new(root, supine_breath_limb_name((supine_pv_limb)limb),
                                 json_limb(&pv.limb[limb], &reports[limb]));
     }
   }
   supine_options_print(json_incref(root), chosen->json);
   supine_output output = {0};
-  if (chosen->output != NULL) { /* last, so that a failure leaves no file */
+  if (chosen->output != NULL) { /* the file is written last, so that a failure leaves no file */
     status = supine_output_open(chosen->output, &output, error);
   }
   if (status == SUPINE_OK && chosen->output != NULL) {
-    (void)json_dumpf(root, output.file, JSON_INDENT(2)); /* the commit reports a failure */
+    (void)json_dumpf(root, output.file, JSON_INDENT(2));
     status = supine_output_commit(&output, error);
   }
   json_decref(root);

@@ -24,11 +24,11 @@ typedef struct request {
   const char *output;
   const char *postures;
   supine_volume_options volume;
-  supine_from from;     /* state that displacements are measured from */
-  const char *inside;   /* file of structures inside; NULL if not given */
+  supine_from from;     /* state from which displacements are measured */
+  const char *inside;   /* file of structures inside the lungs; NULL if not given */
   double largest;       /* end of the colour bar, mm; 0 if automatic */
-  double opacity;       /* of the lungs, 0 to 1; 0 if not given */
-  size_t width, height; /* of the picture, pixels; 0 if automatic */
+  double opacity;       /* opacity of the lungs, 0 to 1; 0 if not given */
+  size_t width, height; /* size of the picture, pixels; 0 if automatic */
   supine_view view[SUPINE_VIEWS_MAX];
   size_t view_count;
   bool turns;
@@ -38,24 +38,24 @@ typedef struct request {
 /* A state of the lungs that a panel of the picture shows. */
 typedef struct drawn {
   supine_pose pose;
-  float *value; /* [N] displacement, mm */
+  float *value; /* [N] length of the displacement, mm */
   char subtitle[96];
   supine_command_marks marks;
 } drawn;
 
-/* The objects that draw a picture or the frames of a turn, and the panels of the picture. */
+/* The panels of a picture or of the current frame of a turn, and the objects that draw them. */
 typedef struct studio {
   const request *wanted;
   supine_basis *basis;
   supine_reference_pose from;
   supine_compare *compare;
   supine_renderer *renderer;
-  supine_basis *inside; /* NULL if there are no structures inside */
+  supine_basis *inside; /* NULL if there are no structures inside the lungs */
   supine_command_names names;
   supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
-  double p95, max; /* statistics of displacement, mm: the largest of the panels so far */
+  double p95, max; /* largest 95th percentile and largest displacement of any panel so far, mm */
   char label[128];
 } studio;
 
@@ -95,7 +95,7 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
   return status;
 }
 
-/* Fill panel i: compute its pose, its displacements and its subtitle. */
+/* Fill panel i: compute the pose, the displacements and the subtitle. */
 static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   const supine_posture_item *item = &s->postures.item[i];
   drawn *shown = &s->shown[i];
@@ -120,7 +120,7 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* After fill_panel, add the marks of the structures inside, if there are any, to panel i. */
+/* Add marks of the structures inside the lungs, if any, to panel i. Call this after fill_panel. */
 static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   supine_command_marks *marks = &s->shown[i].marks;
   if (s->inside == NULL) {
@@ -170,7 +170,7 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   return status;
 }
 
-/* Fill the single panel of an animation for one of the `count` frames of a turn. */
+/* Fill the only panel of an animation for one of the `count` frames of a turn of gravity. */
 static supine_status find_frame(studio *s, size_t frame, size_t count, supine_error *error) {
   const breath_turn *turn = &s->wanted->turn;
   supine_posture_item *item = &s->postures.item[0];
@@ -184,7 +184,7 @@ static supine_status find_frame(studio *s, size_t frame, size_t count, supine_er
 }
 
 /* Append all frames of a turn to an animation.
- * @param extent  extent of each view over the whole turn */
+ * @param extent  for each view, the extent of the lungs over the whole turn */
 static supine_status add_frames(studio *s, size_t count, const double (*extent)[4],
                                 supine_animation *animation, supine_error *error) {
   supine_progress progress = supine_options_progress_begin(name);
@@ -208,7 +208,7 @@ static supine_status add_frames(studio *s, size_t count, const double (*extent)[
 }
 
 /* Draw a turn as an animation. A first pass over the frames finds the largest displacement and the
- * extents, so that the colour bar and the scale are the same in all frames. */
+ * extents of the lungs, so that the colour bar and the scale are the same in all frames. */
 static supine_status draw_turn(studio *s, supine_error *error) {
   static const double none[4] = SUPINE_EXTENT_NONE;
   const char *path = s->wanted->output;
@@ -220,7 +220,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   supine_status status = SUPINE_OK;
   if (!(frames <= FRAMES_MAX)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a turn of %g s exceeds %d frames: give a shorter time", seconds,
+                            "a turn of %g s has more than %d frames: give a shorter turn", seconds,
                             FRAMES_MAX);
   }
   const size_t count = (size_t)frames;
@@ -247,7 +247,7 @@ static supine_status draw_turn(studio *s, supine_error *error) {
   }
   if (status == SUPINE_OK) {
     status = supine_render_animation_write(animation, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* let commit report a failed write */
+    if (status == SUPINE_OK || ferror(output.file) != 0) {
       status = supine_output_commit(&output, error);
     }
   }

@@ -16,7 +16,7 @@ typedef struct request {
   supine_model_options model;
   supine_orientation orientation;
   const char *path;
-  supine_state state; /* its volume is of kind SUPINE_VOLUME_DEFAULT if not given */
+  supine_state state; /* if no volume is given, its kind is SUPINE_VOLUME_DEFAULT */
   bool has_vertex, pitcher_catcher;
   size_t vertex;
 } request;
@@ -43,7 +43,7 @@ static const supine_option table[] = {
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
 
-/* Write one column of the transfer matrix T as CSV. */
+/* Write the response of every vertex to a unit force on the vertex of --unit-force as CSV. */
 static supine_status write_column(const supine_lungs *lungs, const request *wanted,
                                   supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -77,7 +77,7 @@ cleanup:
   return status;
 }
 
-/* Compute each lung's volume minus that of its reference surface, mL, ignoring collapse. */
+/* Compute each lung's volume minus that of its reference surface, mL, as if none were collapsed. */
 static supine_status find_volumes(const supine_reference *reference, const supine_state *state,
                                   double *ml, supine_error *error) {
   const double *g = state->gravity;
@@ -114,7 +114,8 @@ static void fill(double gains[2][3], double gain) {
   }
 }
 
-/* Find the gains of each lung for the volume; all are 1 if it is not given and rest is unknown. */
+/* Find the gains that give each lung its volume. All gains are equal if rest is unknown, and 1 if
+ * no volume is given either. */
 static supine_status find_gains(const supine_lungs *lungs, const request *wanted,
                                 const supine_solution *solution, double gains[2][3],
                                 supine_error *error) {
@@ -124,7 +125,7 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   if (volume->kind == SUPINE_VOLUME_DEFAULT && !reference->known) {
     return SUPINE_OK;
   }
-  if (!reference->known) { /* the volume is added to the scan, with one gain for both lungs */
+  if (!reference->known) {
     const double held =
         volume->kind == SUPINE_VOLUME_ABSOLUTE ? 1e-3 * supine_mesh_volume(&lungs->mesh) : 0.0;
     double scale = 0.0;
@@ -151,10 +152,10 @@ static supine_status find_gains(const supine_lungs *lungs, const request *wanted
   return status;
 }
 
-/* Iteration stops when no node has to pass on more than this share of the largest force. */
+/* Share of the largest force; iteration stops when no vertex has more force left to distribute. */
 static const double pitcher_tolerance = 1e-6;
 
-/* Print the progress each time the number of distributions per vertex has doubled. */
+/* Print the share of force that remains, each time the steps per vertex have doubled. */
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {
@@ -163,7 +164,7 @@ static void report_remaining(void *context, size_t steps, double remaining) {
   }
 }
 
-/* Replace the solved force on each vertex by the result of the iteration of Santhanam 2008. */
+/* Replace the solved forces by those of Santhanam's iteration; print the largest difference. */
 static supine_status iterate(const supine_lungs *lungs, const supine_model *model,
                              const double g[3], supine_solution *solution, supine_error *error) {
   size_t n = lungs->mesh.vertex_count;
@@ -173,9 +174,10 @@ static supine_status iterate(const supine_lungs *lungs, const supine_model *mode
   double *caught = malloc(n * sizeof *caught);
   supine_status status = SUPINE_OK;
   if (model->reach > 0.0 || model->lesions != NULL) {
-    status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "--pitcher-catcher spreads forces over links of the mesh, without "
-                              "lesions: give --law paper and leave --reach and --lesion out");
+    status =
+        supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                         "--pitcher-catcher iterates the paper law without lesions: give --law "
+                         "paper, and leave --reach and --lesion out");
   } else if (force == NULL || caught == NULL ||
              supine_physics_height_range(lungs, model->force.pair, 1, g, range, range + 1) !=
                  SUPINE_OK) {

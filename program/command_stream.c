@@ -28,7 +28,7 @@ typedef struct request {
   bool has_volume;
   const char *pv;
   supine_pv_breath breath;
-  double smooth; /* time constant of smoothing, ms; 0 for no smoothing */
+  double smooth; /* time constant with which poses are smoothed, ms; 0 for no smoothing */
   const char *record, *replay;
   const char *web, *certificate, *key;
   supine_from from;
@@ -163,14 +163,14 @@ static void report(const supine_stream_server *server, const request *wanted) {
   }
 }
 
-/* Observed points, and the file of 'supine embed' with their names. */
+/* The observed points, and the file made by 'supine embed' that names them. */
 typedef struct observed_points {
   supine_basis *inside;
   supine_command_names names;
   supine_stream_observed observed;
 } observed_points;
 
-/* Open the file of --points, and list its parts that are single points. None is observed yet. */
+/* Open the file of --points, and list the single points in it. None has been observed yet. */
 static supine_status open_points(const supine_basis *basis, const request *wanted,
                                  observed_points *points, supine_error *error) {
   const supine_command_names *names = &points->names;
@@ -191,8 +191,9 @@ static supine_status open_points(const supine_basis *basis, const request *wante
     }
   }
   if (count == 0 || count > SUPINE_LOCATE_POINTS_MAX) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %zu points: give 1 to %d",
-                            wanted->points, count, (int)SUPINE_LOCATE_POINTS_MAX);
+    return supine_error_set(error, SUPINE_ERROR_FORMAT,
+                            "%s holds %zu points: give a file with 1 to %d", wanted->points, count,
+                            (int)SUPINE_LOCATE_POINTS_MAX);
   }
   observed->ras = wanted->space == 1;
   observed->inside = points->inside;
@@ -209,7 +210,7 @@ static void close_points(observed_points *points) {
   supine_basis_close(points->inside);
 }
 
-/* Make the live page of a basis file. The caller frees *page. */
+/* Make the page that shows the lungs of a basis file live. The caller frees *page. */
 static supine_status make_page(const char *path, const export_page *shown, char **page,
                                size_t *size, supine_error *error) {
   export_source source = {0};
@@ -227,7 +228,7 @@ static supine_status make_page(const char *path, const export_page *shown, char 
   return status;
 }
 
-/* If --web is given, make the page and serve it. The caller destroys *web, then frees *page. */
+/* If --web is given, serve the live page. The caller destroys *web, then frees *page. */
 static supine_status open_page(const request *wanted, const supine_basis *basis, const char *path,
                                char **page, supine_stream_web **web, supine_error *error) {
   supine_stream_address address;
@@ -351,7 +352,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       !supine_normalise(wanted->world_down, options->setup.down)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "--world-down or --body-from-tracker is zero: give a direction, such "
-                            "as 0,0,-1, and a rotation, such as 1,0,0,0");
+                            "as 0,0,-1, and a quaternion, such as 1,0,0,0");
   }
   supine_basis *basis = NULL;
   supine_status status =

@@ -86,7 +86,7 @@ static json_t *encode(const supine_command_distance of[SUPINE_PATIENT_MAP_COUNT]
   for (int k = 0; k < SUPINE_PATIENT_MAP_COUNT; ++k) {
     json_t *row = json_pack("{s:f, s:f, s:f, s:f}", "mean_mm", of[k].mean, "rms_mm", of[k].rms,
                             "p95_mm", of[k].p95, "largest_mm", of[k].largest);
-    (void)json_object_set_new(row, "explained_percent", /* null if nothing moved */
+    (void)json_object_set_new(row, "explained_percent", /* null if the tissue did not move */
                               isnan(of[k].explained) ? json_null()
                                                      : json_real(100.0 * of[k].explained));
     (void)json_object_set_new(all, supine_command_map_names[k], row);
@@ -140,7 +140,7 @@ static void set_default_posture(supine_state *state, const double gravity[3]) {
   }
 }
 
-/* Set the states to compare. --to is the default for a posture or a volume that was not given. */
+/* Set the states to compare. A posture or a volume that was not given is that of --to. */
 static void set_states(const request *wanted, supine_command_subject *s) {
   static const double supine[3] = {0.0, 1.0, 0.0};
   supine_state to = wanted->to.state;
@@ -198,7 +198,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   if (wanted->path != NULL && wanted->count == 0) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "-o writes the errors of a surface: give --state");
+                            "-o writes the errors of a surface: name a surface with --state");
   }
   for (size_t i = 0; i < wanted->count && wanted->path != NULL; ++i) {
     status = supine_options_check_output(wanted->path, wanted->state[i].path, error);

@@ -12,7 +12,8 @@
 #include "program/field.h"
 #include "program/inside.h"
 
-/* Distance from the lungs over which a field falls to 0, mm. Embedded grids have this margin. */
+/* Distance from the lungs at which a displacement field reaches 0, mm. Grids made by 'supine embed'
+ * extend this far around the lungs. */
 static const double fade = 60.0;
 
 const supine_option supine_command_deform_content_options[] = {
@@ -53,7 +54,7 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
     return supine_error_set(
         error, SUPINE_ERROR_ARGUMENT,
         image ? "%s: with --image or --labels, the name must end in .nrrd, .nii, .nii.gz or .mha"
-              : "%s: the image is missing: give --image FILE or --labels FILE",
+              : "%s: no image to write: give --image FILE or --labels FILE",
         wanted->path);
   }
   if (wanted->inverse && wanted->field == NULL) {
@@ -105,8 +106,8 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   }
 }
 
-/* Write name, lung, position, displacement and expected error of each point as CSV. The ten columns
- * need more than 60 lines of code. */
+/* Write the name, lung, position, displacement and expected error of each point as CSV. The ten
+ * columns take more than 60 lines of code. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, supine_error *error) {
   const supine_mesh_save_options *frame = &moved->save;
@@ -141,7 +142,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
         moved->from.name, axes, unit_name,
         sigma == NULL ? "" : "; expected_error_mm: " SUPINE_EXPECTED_MEANING,
         sigma == NULL ? "" : ",expected_error_mm");
-    for (size_t i = 0; i < n; ++i) { /* sorted by name, then in the input's order */
+    for (size_t i = 0; i < n; ++i) {
       const size_t at = names.order[i];
       const float *p = xyz + 3 * at;
       const float *q = before + 3 * at;
@@ -231,7 +232,8 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
 }
 
 /* Replace `second`, the field from the scan to a state B, by the field u from a state A to B.
- * `first` is the field from the scan to A, and v is its inverse: u(x) = v(x) + second(x + v(x)). */
+ * `first` is the field from the scan to A, and v is its inverse: u(x) = v(x) + second(x + v(x)).
+ * Its depth becomes the depth of the nodes in state A. */
 static supine_status join_fields(const supine_field *first, supine_field *second,
                                  supine_error *error) {
   supine_field back = {0};
@@ -262,7 +264,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   second->nodes.values = u;
   supine_image depth;
   status = supine_field_resample(&back, NULL, false, &second->depth, &depth, error);
-  if (status == SUPINE_OK) { /* depth of the nodes in state A */
+  if (status == SUPINE_OK) {
     supine_image_free(&second->depth);
     second->depth = depth;
   }
@@ -270,7 +272,7 @@ static supine_status join_fields(const supine_field *first, supine_field *second
   return status;
 }
 
-/* Compute the field from the scan, or from the state of --from, to the pose. */
+/* Compute the displacement field from the scan, or from the state of --from, to the pose. */
 static supine_status find_field(const supine_basis *basis, const supine_deformation *moved,
                                 supine_field *field, supine_error *error) {
   supine_field first = {0};

@@ -14,19 +14,19 @@ typedef struct supine_deform_content {
   /* Files of -o, --field-out, --image and --labels; NULL if not given. */
   const char *path, *field, *image, *labels;
   bool inverse, density;
-  supine_image source; /* the image or the label map, once read */
+  supine_image source; /* the image or the label map to move, once it has been read */
 } supine_deform_content;
 
 extern const supine_option supine_command_deform_content_options[];
 
-/* A state of the lungs, and what its outputs need. */
+/* A state of the lungs to write, and what its output files need. */
 typedef struct supine_deformation {
   supine_state state;
   supine_pose pose;
-  supine_reference_pose from; /* state that displacements start from, and that images show */
-  bool from_given;            /* if false, `from` is the scan */
+  supine_reference_pose from; /* displacements are 0 in this state; the input image shows it */
+  bool from_given;            /* whether --from was given; otherwise `from` is the scan */
   supine_expected expected;
-  supine_mesh_save_options save; /* axes and unit of the output, and its comment */
+  supine_mesh_save_options save; /* axes, unit and comment of the output */
 } supine_deformation;
 
 /* Return SUPINE_ERROR_ARGUMENT if an option is missing, or does not fit the others. */
@@ -41,7 +41,7 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
 /* Return whether points, a field or an image are to be written instead of a surface. */
 bool supine_command_deform_content_wanted(const supine_deform_content *wanted);
 
-/* Write the points, field or image, and print what was written. */
+/* Write the points, the field or the image, and print what was written. */
 supine_status supine_command_deform_content(const supine_deform_content *wanted,
                                             const supine_basis *basis,
                                             const supine_deformation *moved, supine_error *error);

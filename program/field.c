@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute a field on the grid of a basis, and fade it out around the lungs. */
+/* Compute the displacement field on the grid of a basis, and reduce it to 0 around the lungs. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -51,7 +51,7 @@ void supine_field_interpolate(const supine_image *image, const supine_field_cell
   }
 }
 
-/* Read and check the tensors of the grid of a basis. */
+/* Read and check the tensors that describe the grid in a basis. */
 static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
                                const uint32_t **part, const float **depth, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
@@ -86,7 +86,7 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   }
   double axes[3] = {0.0, 0.0, 0.0};
   if (valid) {
-    supine_image_locate(nodes, axes, axes); /* not finite if the steps are linearly dependent */
+    supine_image_locate(nodes, axes, axes); /* axes is finite only if the steps are independent */
   }
   if (!valid || !isfinite(axes[0] + axes[1] + axes[2])) {
     return supine_error_set(
@@ -98,8 +98,8 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   return SUPINE_OK;
 }
 
-/* Average the displacements of the neighbours of node i that earlier layers have set; return false
- * if it has no such neighbours. `now` is the mark of the current layer. */
+/* Average the displacements of the neighbours of node i whose mark in `known` is neither 0 nor
+ * `now`, the mark of the layer that is being set. Return false if there are no such neighbours. */
 static bool mean_neighbour(const supine_image *nodes, const unsigned char *known, unsigned char now,
                            size_t i, float mean[3]) {
   const float *u = nodes->values;
@@ -128,8 +128,8 @@ static bool mean_neighbour(const supine_image *nodes, const unsigned char *known
 }
 
 /* Extend the field outwards in layers of nodes, so that it falls linearly to 0 over `fade` mm.
- * `known` is 1 for a node of the basis, else 0. The nodes of new layers are marked 2 and 3
- * alternately. */
+ * `known` holds a mark for each node: at first 1 for a node of the basis, else 0. The nodes of the
+ * newest layer are marked 2 or 3, in turn; when the next layer is set, their mark becomes 1. */
 static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
   float *u = nodes->values;
   const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
@@ -155,7 +155,6 @@ static void fade_out(supine_image *nodes, unsigned char *known, double fade) {
     if (!any) {
       break;
     }
-    /* Only the newest layer keeps its mark; older layers are marked 1. */
     for (size_t i = 0; i < count; ++i) {
       known[i] = known[i] != 0 && known[i] != now ? 1 : known[i];
     }
@@ -189,9 +188,9 @@ supine_status supine_field_create(const supine_basis *basis, const supine_pose *
   } else {
     supine_displace_range(basis, pose, 0, n, moved);
     for (size_t i = 0; i < count; ++i) {
-      below[i] = (float)-fade; /* nodes that the basis lacks are outside the lungs */
+      below[i] = (float)-fade; /* nodes that are not in the basis lie outside the lungs */
     }
-    /* The field starts at the nodes in the scan, but info->vertices are at full inflation. */
+    /* The field gives displacements from the scan, but info->vertices are at full inflation. */
     for (size_t i = 0; i < n; ++i) {
       double node[3];
       supine_image_place(&made.nodes, part[i], node);

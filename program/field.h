@@ -12,12 +12,12 @@
 /** Displacement u(x) at the nodes x of a grid, mm. */
 typedef struct supine_field {
   supine_image nodes; /**< the displacement u: three F32 channels, mm */
-  supine_image depth; /**< depth below the lungs' surface, negative outside: one F32 channel, mm;
-                         its values are NULL in an inverse */
+  supine_image depth; /**< depth below the lungs' surface, negative outside: one F32 channel, mm; an
+                         inverse field has no depth, and depth.values is NULL */
 } supine_field;
 
-/** Compute the field from the scan to a pose. Outside the nodes of the basis the field has no
- * physical meaning; it falls to 0 over `fade` mm.
+/** Compute the displacement field from the scan to a pose. Outside the nodes of the basis the field
+ * has no physical meaning; it falls to 0 over `fade` mm.
  * @param field  release with supine_field_free
  * @retval SUPINE_ERROR_FORMAT  the basis has no grid, or a malformed one
  * @retval SUPINE_ERROR_MEMORY */
@@ -28,15 +28,16 @@ void supine_field_free(supine_field *field);
 /** Interpolate the field at a point. */
 void supine_field_at(const supine_field *field, const double point[3], double u[3]);
 
-/** Residual u(x) + v(x + u(x)) of a field u followed by its inverse v. */
+/** Residual u(x) + v(x + u(x)) of a field u and its inverse v. */
 typedef struct supine_field_residual {
-  double rms, largest; /**< of the residual's length at the nodes x inside the lungs, mm */
-  size_t lost; /**< nodes at which the inverse errs by more than 0.01 mm, as the field folds */
+  double rms, largest; /**< RMS and largest length of the residual inside the lungs, mm */
+  size_t lost; /**< number of nodes at which the inverse errs by more than 0.01 mm, because the
+                  field folds there */
 } supine_field_residual;
 
-/** Invert a field on the same nodes by Newton's method: v(y) = x - y, where x + u(x) = y. A
+/** Invert a field u by Newton's method, on the same nodes: v(y) = x - y, where x + u(x) = y. A
  * resampled image takes the value of its voxel y from the place y + v(y). Cost: about ten
- * evaluations per node, in parallel.
+ * evaluations of u per node, in parallel.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_field_invert(const supine_field *field, supine_field *inverse,
                                   supine_field_residual *residual, supine_error *error);
@@ -46,7 +47,7 @@ supine_status supine_field_invert(const supine_field *field, supine_field *inver
  * inside the lungs are multiplied by det(I + dv/dy). This is the tissue's volume before the motion,
  * divided by its volume after the motion; it keeps the mass.
  * @param inverse  field v, made by supine_field_invert
- * @param depth    depth of the field; NULL to keep densities unscaled
+ * @param depth    depth of the nodes below the lungs' surface; NULL to keep densities unscaled
  * @param labels   whether to take the value of the nearest voxel instead of interpolating
  * @param moved    release with supine_image_free
  * @retval SUPINE_ERROR_MEMORY */
@@ -64,8 +65,8 @@ typedef struct supine_field_cell {
 void supine_field_find_cell(const supine_image *image, const double point[3],
                             supine_field_cell *cell);
 
-/* Interpolate all channels of an F32 image and, unless `slope` is NULL, their derivatives with
- * respect to `share`, [channels, 3]. */
+/* Interpolate all channels of an F32 image. Unless `slope` is NULL, compute the derivatives with
+ * respect to cell->share too, [channels, 3]. */
 void supine_field_interpolate(const supine_image *image, const supine_field_cell *cell,
                               double *values, double (*slope)[3]);
 

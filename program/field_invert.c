@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Invert a field node by node, and measure the residual of the field followed by its inverse. */
+/* Invert a displacement field node by node, and measure the error of the inverse. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,10 +10,10 @@
 #include "program/field.h"
 
 static const double tolerance = 1e-5;   /* residual at which iteration stops, mm */
-static const double lost_beyond = 0.01; /* residual above which a node counts as lost, mm */
+static const double lost_beyond = 0.01; /* residual above which a node has no inverse, mm */
 
-/* Compute the residual x + u(x) - y, mm, and return its length. Unless `slope` is NULL, compute its
- * derivative with respect to x, per step of the grid along each axis. */
+/* Compute the residual x + u(x) - y, mm, and return its length. Unless `slope` is NULL, compute the
+ * derivative of the residual with respect to x, where x is counted in steps of the grid. */
 static double misfit(const supine_field *field, const double x[3], const double y[3],
                      double residual[3], double (*slope)[3]) {
   supine_field_cell cell;
@@ -29,18 +29,18 @@ static double misfit(const supine_field *field, const double x[3], const double 
   return supine_length(residual);
 }
 
-/* Compute the Newton step in units of the grid's steps; return false if `slope` is singular. */
+/* Compute the Newton step, counted in steps of the grid. Return false if `slope` is singular. */
 static bool newton(const double slope[3][3], const double residual[3], double step[3]) {
-  supine_image cell = {.origin = {0.0}}; /* supine_image_locate solves the three equations */
+  supine_image equations = {.origin = {0.0}}; /* solved by supine_image_locate */
   for (size_t k = 0; k < 9; ++k) {
-    cell.step[k % 3][k / 3] = -slope[k / 3][k % 3];
+    equations.step[k % 3][k / 3] = -slope[k / 3][k % 3];
   }
-  supine_image_locate(&cell, residual, step);
+  supine_image_locate(&equations, residual, step);
   return isfinite(step[0] + step[1] + step[2]);
 }
 
-/* Find x with x + u(x) = y, starting from the given x, and return the residual. Each Newton step is
- * halved until it reduces the residual, as the derivative jumps between cells. */
+/* Find x with x + u(x) = y, starting from the given x, and return the length of the residual. Each
+ * Newton step is halved until it reduces the residual, as the derivative jumps between cells. */
 static double solve(const supine_field *field, const double y[3], double x[3]) {
   enum { STEPS = 40, HALVINGS = 6 };
   double residual[3];
@@ -95,7 +95,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
         x[k] = y[k] - u[k];
       }
       double off = solve(work->field, y, x);
-      if (off > lost_beyond) { /* start again from the node itself */
+      if (off > lost_beyond) { /* start again with x = y */
         double other[3];
         memcpy(other, y, sizeof other);
         const double again = solve(work->field, y, other);
@@ -112,7 +112,7 @@ static void invert_rows(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Measure the residual of the field followed by its inverse at every node inside the lungs. */
+/* Measure the residual of a field and its inverse at every node inside the lungs. */
 static void measure(const supine_field *field, const supine_field *inverse,
                     supine_field_residual *residual) {
   const supine_image *nodes = &field->nodes;

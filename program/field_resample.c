@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Move an image by a field: take each voxel from where its tissue was. */
+/* Move an image by a displacement field: each voxel takes the value from where its tissue was. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,9 +24,9 @@ typedef struct resampling {
   bool labels;
 } resampling;
 
-/* The cells that contain RUN points. */
+/* The cells of an image that contain RUN points. */
 typedef struct cells {
-  size_t first[RUN];    /* index of the value at the cell's lowest corner */
+  size_t first[RUN];    /* index of the first value at the cell's lowest corner */
   double share[3][RUN]; /* position of the point in the cell, 0 to 1 along each axis */
 } cells;
 
@@ -123,7 +123,7 @@ INLINE void take_nearest(const supine_image *image, cells in, double *values) {
   size_t stride = 1;
   for (size_t a = 0; a < 3; ++a) {
     for (size_t i = 0; i < RUN; ++i) {
-      in.first[i] += in.share[a][i] > 0.5 ? stride : 0; /* a tie takes the lower voxel */
+      in.first[i] += in.share[a][i] > 0.5 ? stride : 0;
     }
     stride *= image->size[a];
   }

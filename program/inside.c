@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the names of structures made by 'supine embed', and make marks of them for pictures. */
+/* Read the names of structures made by 'supine embed', and make marks that show them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "program/inside.h"
 #include "program/options/basis_input.h"
 
-/* List the vertices by name, in input order within each name; return false if out of memory. */
+/* Sort the vertices by structure, then in input order; return false if out of memory. */
 static bool sort_by_name(supine_command_names *names, size_t n) {
   size_t *begin = calloc(names->count + 2, sizeof *begin);
   names->begin = begin;
@@ -21,7 +21,7 @@ static bool sort_by_name(supine_command_names *names, size_t n) {
   for (size_t name = 0; name < names->count; ++name) {
     begin[name + 2] += begin[name + 1];
   }
-  for (size_t i = 0; i < n; ++i) { /* moves begin[name + 1] to the end of the name's vertices */
+  for (size_t i = 0; i < n; ++i) {
     names->order[begin[names->part[i] + 1]++] = i;
   }
   return true;
@@ -100,12 +100,12 @@ supine_status supine_command_inside_check(const supine_basis *lungs, const supin
   const bool same = b->vector && a->mode_count == b->mode_count && a->band == b->band &&
                     a->lung_count == b->lung_count &&
                     memcmp(a->modes, b->modes, a->mode_count * terms * sizeof *a->modes) == 0;
-  return same
-             ? SUPINE_OK
-             : supine_error_set(
-                   error, SUPINE_ERROR_FORMAT,
-                   "%s: made from another basis: make it again with 'supine embed' from this basis",
-                   path);
+  return same ? SUPINE_OK
+              : supine_error_set(
+                    error, SUPINE_ERROR_FORMAT,
+                    "%s belongs to another basis: make it again with 'supine embed' from "
+                    "the given basis",
+                    path);
 }
 
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
@@ -116,7 +116,7 @@ supine_status supine_command_inside_open(const supine_basis *lungs, const char *
   return status == SUPINE_OK ? supine_command_inside_check(lungs, *inside, path, error) : status;
 }
 
-/* Add the marks of one part: its vertices, and its name at their mean position. */
+/* Add the marks of one structure: its vertices, and its name at their mean position. */
 static void add_part(const supine_command_names *names, size_t part, const float *xyz,
                      const float *from, supine_command_marks *out) {
   const size_t *order = names->order + names->begin[part];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Read the names of structures made by 'supine embed', and make marks of them for pictures. */
+/* Read the names of structures made by 'supine embed', and make marks that show them. */
 #ifndef SUPINE_COMMAND_INSIDE_H
 #define SUPINE_COMMAND_INSIDE_H
 
@@ -7,10 +7,10 @@
 
 typedef struct supine_command_names {
   size_t count;
-  char **text;          /* [count] */
-  const uint32_t *part; /* [N] index in `text` of each vertex's name */
-  size_t *order;        /* [N] vertices, sorted by name, then in input order */
-  size_t *begin;        /* [count + 1] index in `order` of the first vertex of each name */
+  char **text;          /* [count] name of each structure */
+  const uint32_t *part; /* [N] index of each vertex's name in `text` */
+  size_t *order;        /* [N] indices of the vertices, sorted by structure, then in input order */
+  size_t *begin;        /* [count + 1] index of each structure's first vertex in `order` */
   char *space;          /* memory that `text` points into */
 } supine_command_names;
 
@@ -27,8 +27,8 @@ size_t supine_command_lung_of(const supine_basis_info *info, size_t vertex);
 supine_status supine_command_inside_check(const supine_basis *lungs, const supine_basis *inside,
                                           const char *path, supine_error *error);
 
-/* Open structures and their names, and check that they were embedded in `lungs`. *inside and *names
- * must be initialised to zero; close both, also after a failure. */
+/* Open structures and their names, and check that they were embedded in `lungs`. Initialise *inside
+ * and *names to zero before the call; close both after it, even if it fails. */
 supine_status supine_command_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_command_names *names,
                                          supine_error *error);
@@ -40,8 +40,8 @@ typedef struct supine_command_marks {
   char (*label)[48];
 } supine_command_marks;
 
-/* Make the marks of a pose.
- * @param from  pose that displacements start from
+/* Make the marks that show the structures in a pose.
+ * @param from  pose from which displacements are measured
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_command_marks_make(const supine_basis *inside,
                                         const supine_command_names *names, const supine_pose *pose,

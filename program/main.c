@@ -61,8 +61,8 @@ static int unknown_command(const char *name) {
   return SUPINE_EXIT_USAGE;
 }
 
-/* Remove unfinished outputs and end the program, as jansson or GSL is out of memory. jansson would
- * leave out values without a message; GSL only calls its error handler. */
+/* Remove unfinished output files and end the program, because jansson or GSL is out of memory.
+ * jansson would leave out values without a message; GSL only calls its error handler. */
 static _Noreturn void end_without_memory(void) {
   supine_output_abandon_all();
   (void)fputs("supine: out of memory\n", stderr);
@@ -77,7 +77,7 @@ static void *allocate_json(size_t size) {
   return memory;
 }
 
-/* Handle an error of GSL: end if out of memory. Functions of GSL return all other errors. */
+/* Handle an error of GSL: end the program if memory has run out. GSL returns all other errors. */
 static void handle_gsl(const char *reason, const char *file, int line, int code) {
   (void)reason;
   (void)file;
@@ -90,8 +90,8 @@ static void handle_gsl(const char *reason, const char *file, int line, int code)
 int main(int argc, char **argv) {
   (void)gsl_set_error_handler(handle_gsl);
   json_set_alloc_funcs(allocate_json, free);
-  openblas_set_num_threads(1); /* its threads would busy-wait beside the program's own threads */
-  (void)setenv("OMP_THREAD_LIMIT", "1", 0); /* CHOLMOD's loops are too short for threads */
+  openblas_set_num_threads(1); /* OpenBLAS's threads would busy-wait beside the program's own */
+  (void)setenv("OMP_THREAD_LIMIT", "1", 0); /* CHOLMOD's loops are too short to gain from threads */
   supine_options_signals_catch(false);
   if (argc < 2) {
     print_help();
@@ -111,7 +111,7 @@ int main(int argc, char **argv) {
     return unknown_command(name);
   }
   if (!supine_thread_count_is_valid()) {
-    supine_options_say(name, "SUPINE_THREADS is '%s': set it to 1 to 256, or unset it",
+    supine_options_say(name, "SUPINE_THREADS is '%s': set a number from 1 to 256, or unset it",
                        getenv("SUPINE_THREADS")); /* NOLINT(concurrency-mt-unsafe) */
     return SUPINE_EXIT_USAGE;
   }

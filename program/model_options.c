@@ -34,7 +34,7 @@ static supine_status read_resting(const char *text, void *field, supine_error *e
   return status;
 }
 
-/* Read "uniform" or "linear:z:0.5:1.5"; any other text names a file. */
+/* Read "uniform", "linear:z:0.5:1.5" or "exp:z:0.5:1.5"; any other text names a file. */
 static supine_status read_expandability(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -81,7 +81,7 @@ static supine_status read_lesion(const char *text, void *field, supine_error *er
   return SUPINE_OK;
 }
 
-/* Read a collapsed lung, such as "left:0.3". */
+/* Read a collapsed lung and the share of its volume that remains, such as "left:0.3". */
 static supine_status read_lung(const char *text, void *field, supine_error *error) {
   supine_model_choice *choice = field;
   (void)error;
@@ -100,7 +100,7 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
 /* Names of the sexes, indexed by supine_sex. */
 static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
-/* Parts of help texts: a line for each law, and the defaults of each law. */
+/* Parts of help texts: a line that describes each law, and the default constants of each law. */
 #define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) "; default for " name ": " #base
 #define LAW_GAIN(id, name, base, gain, ...) "; default for " name ": " #gain
@@ -239,7 +239,7 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Copy a patient's law and force into the choice; set the state of the scan if none was given. */
+/* Copy a patient's law and force to options->choice, and set the scan's state if not given. */
 static supine_status take_patient(supine_model_options *options, supine_error *error) {
   const supine_patient_record *record = options->patient;
   const supine_lungs *lungs = &options->made_from.lungs;
@@ -262,10 +262,10 @@ static supine_status take_patient(supine_model_options *options, supine_error *e
                               "it is below full inflation is unknown: give its state, such as "
                               "--scanned supine:rest, or use the fuller scan");
     }
-    supine_findings_add(
-        &options->findings,
-        "note: the scan is assumed to be the %s of the two fitted states; --scanned changes this",
-        state == 0 ? "fuller" : "emptier");
+    supine_findings_add(&options->findings,
+                        "note: the scan is assumed to be the %s of the two that were fitted; "
+                        "--scanned changes this",
+                        state == 0 ? "fuller" : "emptier");
   }
   options->patient_arrays = malloc(4 * lungs->mesh.vertex_count * sizeof(double));
   status = options->patient_arrays == NULL
@@ -318,7 +318,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   char *names = strdup(operand);
   char *remaining = names;
   if (names == NULL) {
-    return supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for a name");
+    return supine_error_set(error, SUPINE_ERROR_MEMORY, "out of memory");
   }
   while (remaining != NULL && count <= FILES_MAX) {
     paths[count++] = strsep(&remaining, ",");
@@ -326,7 +326,7 @@ supine_status supine_command_load_lungs(const char *command, const char *operand
   const supine_status status =
       count > FILES_MAX
           ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                             "'%s': more than two surfaces: give one or two", operand)
+                             "'%s' names more than two surfaces: give one or two", operand)
           : supine_precompute_source_load(options, paths, count, &source, &findings, error);
   supine_options_say_findings(command, &findings);
   *lungs = source.lungs;

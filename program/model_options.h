@@ -11,7 +11,7 @@
 
 #include "program/options/command.h"
 
-/* Table of options that fills a supine_model_options. */
+/* Table of the options that fill a supine_model_options. */
 extern const supine_option supine_command_model_options[];
 
 typedef struct supine_model_options {
@@ -19,7 +19,7 @@ typedef struct supine_model_options {
   supine_model_choice choice;
   const supine_patient_record *patient; /* owned by the caller; NULL if there is no patient model */
   double *patient_arrays;               /* [4, N] memory that supine_patient_model fills */
-  supine_source made_from; /* lungs as loaded, with the axes and units of their files */
+  supine_source made_from; /* the loaded lungs, with the axes and units of their files */
   supine_prepared prepared;
   char assumed[800]; /* assumptions about the scan and the model, in words */
   supine_findings findings;
@@ -29,7 +29,7 @@ typedef struct supine_model_options {
 void supine_command_model_options_begin(supine_model_options *options);
 
 /* Load the files, print the findings and prepare the model.
- * @param keep  whether to ignore --scanned, and to take the surface as the reference */
+ * @param keep  whether to ignore --scanned and use the loaded surface as the reference surface */
 supine_status supine_command_model_load(supine_model_options *options, const char *command,
                                         char **paths, size_t count, bool keep, supine_error *error);
 

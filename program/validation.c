@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Predict states of a person and compare them with scans. */
+/* Predict the lungs of a person in other states, and compare them with scans. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,9 +13,10 @@
 
 enum { MEASURED_VERTICES_MAX = 1500, GOLDEN_SECTION_STEPS = 24 };
 
-static const double search_span = 0.5; /* half-width of the search, in units of max(1, |scale|) */
+/* Half-width of the range in which the best scale is searched, in units of max(1, |scale|). */
+static const double search_span = 0.5;
 static const double golden = 0.6180339887498949; /* (sqrt(5) - 1) / 2 */
-static const double same_posture = 1e-9;         /* largest difference of equal components */
+static const double same_posture = 1e-9; /* directions of gravity that differ by less are equal */
 
 void supine_command_subject_free(supine_command_subject *subject) {
   supine_basis_close(subject->basis);
@@ -34,7 +35,7 @@ static bool same_direction(const double a[3], const double b[3]) {
   return off < same_posture;
 }
 
-/* Compute the positions in a pose, [N, 3], which the caller frees. */
+/* Compute the positions of all vertices in a pose, [N, 3]; the caller frees them. */
 static supine_status deform(const supine_basis *basis, const supine_pose *pose, double **positions,
                             supine_error *error) {
   *positions = supine_options_basis_positions(basis, pose);
@@ -55,7 +56,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   if (s->from.text[0] == '\0') {
     s->from.state = supine_basis_scan(s->basis);
   }
-  /* If rest is unknown, a posture without a volume gets the volume of the scan. */
+  /* If rest is unknown, a state without a volume gets the volume of the scan. */
   if (s->from.state.volume.kind == SUPINE_VOLUME_DEFAULT &&
       !supine_basis_get_info(s->basis)->has_rest) {
     s->from.state.volume.kind = SUPINE_VOLUME_SCAN;
@@ -73,7 +74,7 @@ supine_status supine_command_subject_open(const char *path, supine_command_subje
   return status;
 }
 
-/* Compute the gains for a state's volume or, if none was given, for the volume of its surface. */
+/* Compute the gains for the volume of a state or, if it has none, for the volume of its surface. */
 static supine_status find_gains(const supine_command_subject *s, const supine_command_state *state,
                                 const supine_mesh *mesh, supine_command_outcome *outcome,
                                 supine_error *error) {
@@ -116,11 +117,11 @@ static supine_status predict_surface(const supine_command_subject *s,
 typedef struct search {
   const supine_inside_surface *tree;
   size_t vertex_count, measured_count;
-  double *distance; /* [measured_count] from the surface, mm */
+  double *distance; /* [measured_count] distances from the scanned surface, mm */
 } search;
 
-/* Multiply all gains by one factor, so that the first becomes `scale`; compute the RMS distance of
- * the vertices from the surface, mm. */
+/* Multiply all gains by one factor, so that the first gain becomes `scale`. Compute the RMS
+ * distance of the predicted vertices from the scanned surface, mm. */
 static supine_status distance_at(const supine_command_subject *s,
                                  const supine_command_outcome *outcome, double scale,
                                  const search *look, double *rms, supine_error *error) {
@@ -151,7 +152,7 @@ static supine_status distance_at(const supine_command_subject *s,
   return SUPINE_OK;
 }
 
-/* Find the scale with the least distance to the surface, by golden-section search. */
+/* Find by golden-section search the displacement scale at which prediction and scan are nearest. */
 static supine_status find_best(const supine_command_subject *s, const supine_mesh *mesh,
                                supine_command_outcome *outcome, supine_error *error) {
   const size_t n = s->start.vertex_count;
@@ -216,7 +217,7 @@ void supine_command_find_line(supine_command_subject *subject) {
   s->line_off = most > 0.0 ? off / most : 0.0;
 }
 
-/* Predict points inside by biharmonic interpolation of the surface's displacement, mm. */
+/* Predict landmark positions, mm, by biharmonic interpolation of the surface's displacement. */
 static supine_status predict_points(const supine_command_subject *s, size_t which,
                                     const supine_patient_pairs *pairs, double *predicted,
                                     supine_error *error) {
@@ -260,7 +261,7 @@ static supine_status check_points(const supine_command_subject *s,
   return 2 * outside <= pairs->count
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%zu of %zu landmarks lie outside the basis's bounding box: check "
+                                "%zu of %zu landmarks lie outside the lungs' bounding box: check "
                                 "their frame, unit and person, or give --reverse",
                                 outside, pairs->count);
 }
@@ -309,7 +310,8 @@ supine_status supine_command_validate_state(supine_command_subject *subject, siz
   if (status == SUPINE_OK && landmarks != NULL) {
     status = validate_points(s, i, landmarks, reverse, error);
   }
-  if (status == SUPINE_OK && state->path != NULL) { /* last, as it changes outcome->predicted */
+  /* Compare surfaces last, as this changes outcome->predicted. */
+  if (status == SUPINE_OK && state->path != NULL) {
     status = supine_command_compare_surfaces(&s->start, s->moved, outcome->predicted, &lungs.mesh,
                                              outcome->nearest, outcome->surface, error);
     outcome->has_surface = true;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the distances of a prediction and of fitted maps from another state of the same lungs. */
+/* Compute how far a prediction, a translation and an affine map of the lungs are from a scan. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,7 +38,7 @@ static void explain(supine_patient_scan_motion moved,
   }
 }
 
-/* Choose the map to fit; for the prediction, the motion between the scans. */
+/* Return the map to fit: for the prediction, the motion between the scans; otherwise `kind`. */
 static supine_patient_map map_of(int kind, supine_patient_scan_motion moved) {
   return kind != SUPINE_PATIENT_MAP_PREDICTED  ? (supine_patient_map)kind
          : moved == SUPINE_PATIENT_RIGID       ? SUPINE_PATIENT_MAP_RIGID
@@ -77,7 +77,7 @@ supine_status supine_command_compare_points(
   return SUPINE_OK;
 }
 
-/* Summarise the distances of the vertices of each surface from the other surface. */
+/* Compute statistics of the distances from the vertices of each of two surfaces to the other. */
 static supine_status surface_distance(const supine_mesh *start, const double *moved,
                                       const supine_mesh *state,
                                       const supine_inside_surface *state_tree, double *nearest,
@@ -99,8 +99,8 @@ static supine_status surface_distance(const supine_mesh *start, const double *mo
   return status;
 }
 
-/* Fit a map of vertices to a surface by iterated nearest points, and apply it to all n vertices;
- * return false if it is not determined. `space` has memory for 10 FITTED_MAX numbers. */
+/* Fit a map of vertices to a surface by iterated nearest points, and apply it to all n vertices.
+ * Return false if the map is undetermined. `space` holds 10 * FITTED_MAX numbers. */
 static bool fit_map(supine_patient_map kind, size_t n, const double *vertices,
                     const supine_inside_surface *tree, double *space, double *moved) {
   const size_t count = n < FITTED_MAX ? n : FITTED_MAX;

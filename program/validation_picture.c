@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Draw the error of predictions on the surface. */
+/* Draw the lungs, coloured by the distance between predicted and scanned surface. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,11 +9,11 @@
 #include "program/render/render.h"
 #include "sh/base/vec3.h"
 
-/* Smallest end of the colour bar, mm. */
+/* Least value at the end of the colour bar, mm. */
 static const double end_least = 1.0;
 
-/* Compute the distance of each predicted vertex from the scanned surface, mm. Update the maxima
- * over all states: *largest of the distances, *end of the 95th percentiles. */
+/* Compute the distance of each predicted vertex from the scanned surface, mm. Raise *largest to the
+ * largest of these distances, and *end to the 95th percentile in outcome->surface. */
 static void find_values(const supine_command_subject *s, const supine_command_outcome *outcome,
                         float *value, double *largest, double *end) {
   for (size_t i = 0; i < s->start.vertex_count; ++i) {

@@ -126,7 +126,7 @@ grep -q '"explained_percent": null' valid.json || fail "a share is explained whe
 # A scan given as at rest gives a warning if it holds too much gas.
 "$supine" fit s_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
   fail "fit a fuller rest"
-grep -q 'at rest the lungs hold 51 % of full inflation' note || fail "no warning: $(cat note)"
+grep -q 'the volume at rest is 51 % of full inflation' note || fail "no warning: $(cat note)"
 
 # If fit knows only absolute volumes, states relative to rest or full inflation are refused.
 "$supine" fit s_supine_rest.ply q_supine_full.ply --rest 2600mL --other 6000mL -o known.json \

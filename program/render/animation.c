@@ -15,7 +15,7 @@ struct supine_animation {
   WebPAnimEncoder *encoder;
   WebPConfig config;
   size_t width, height;
-  int duration_ms; /* of the pictures so far */
+  int duration_ms; /* duration of the pictures appended so far */
   uint32_t *pixels;
 };
 

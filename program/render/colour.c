@@ -11,7 +11,7 @@
 
 enum { KNOTS = 6, FINE = 4096, COLOURS = 256 };
 
-/* Lightness, chroma and hue (degrees) at the knots of the curves. */
+/* OKLab lightness, chroma and hue (degrees) at the knots of the curve of each colour map. */
 static const double curves[SUPINE_COLOURS_COUNT][KNOTS][3] = {
     {{0.42, 0.14, 288},
      {0.51, 0.125, 258},
@@ -45,7 +45,7 @@ static double encode(double x) {
   return clipped <= 0.0031308 ? 12.92 * clipped : 1.055 * pow(clipped, 1 / 2.4) - 0.055;
 }
 
-/* Compute the OKLab colour of a curve at 0 <= t <= 1 by Catmull-Rom interpolation. */
+/* Compute the OKLab colour at the parameter t of a curve, 0 to 1, by Catmull-Rom interpolation. */
 static void curve_at(const double curve[KNOTS][3], double t, double lab[3]) {
   const double at = t * (KNOTS - 1);
   const int k = (int)fmin(floor(at), KNOTS - 2);

@@ -38,12 +38,12 @@ enum { OVERSAMPLE = 2, SIDE_MAX = 16384, SHADES = 4096, NOTHING = UINT32_MAX, GR
 
 static const double distance_in_radii = 5.0; /* distance from the viewer to the lungs' centre */
 static const double depth_in_radii = 3.0;    /* depth drawn in front of the lungs' centre */
-static const double margin = 1.03;           /* ratio of the picture's size to the extent shown */
+static const double margin = 1.03; /* ratio of the picture's size to the size of the lungs in it */
 static const float gamma_exponent = 2.2F;
 
 typedef struct corner {
   float x, y;      /* position, samples from the left and upper edges of the picture */
-  float nearness;  /* reciprocal of the distance along the view, 1/mm; 0 if too near to be drawn */
+  float nearness;  /* 1 / (depth from the viewer), 1/mm; 0 if too near to be drawn */
   float normal[3]; /* unit normal in the viewer's axes: right, up, towards the viewer */
   float eye[3];    /* vector from the vertex to the viewer, mm, in the viewer's axes */
   float value;
@@ -106,7 +106,7 @@ static camera find_camera(const supine_renderer *r, const supine_scene *scene) {
   return c;
 }
 
-/* Rotate a vector `v` of the body's axes to the viewer's axes. */
+/* Rotate a vector `v` from the body's axes to the viewer's axes. */
 static void turn(const camera *c, const double v[3], double seen[3]) {
   for (size_t row = 0; row < 3; ++row) {
     seen[row] = c->axes[row][0] * v[0] + c->axes[row][1] * v[1] + c->axes[row][2] * v[2];
@@ -154,8 +154,8 @@ static void find_frame(supine_renderer *r, const supine_scene *scene, double fra
   frame[3] = 1 / tall;
 }
 
-/* Project a point `p` in the viewer's axes, mm, to a position `at` in a picture of `size` pixels or
- * samples, from its left and upper edges. */
+/* Project a point `p` in the viewer's axes, mm, to a position `at`, measured from the left and
+ * upper edges of a picture of `size` pixels or samples. */
 static void project(const camera *c, const double frame[4], const double p[3], const double size[2],
                     double at[2]) {
   for (int side = 0; side < 2; ++side) {
@@ -181,9 +181,9 @@ void supine_render_project(supine_renderer *r, const supine_scene *scene, const 
 typedef struct canvas {
   supine_renderer *renderer;
   const supine_scene *scene;
-  size_t width, height;             /* size of the picture, samples */
-  uint32_t *nearest;                /* [height, width] triangle nearest to the viewer, or NOTHING */
-  float *nearness;                  /* [height, width] nearness of that triangle, 1/mm */
+  size_t width, height; /* size of the picture, samples */
+  uint32_t *nearest; /* [height, width] index of the triangle nearest to the viewer, or NOTHING */
+  float *nearness;   /* [height, width] 1 / (depth of the nearest triangle), 1/mm */
   float colours[SHADES + 1][3];     /* colour map, linear RGB, 0 to 1 */
   unsigned char encode[SHADES + 1]; /* [i] byte that encodes the linear light i / SHADES */
   uint32_t *pixels;
@@ -220,7 +220,7 @@ static void find_corners(const canvas *c) {
 
 typedef struct face {
   const corner *at[3];
-  float area; /* twice the area, samples^2; negative if seen from inside the lung */
+  float area; /* twice the triangle's area, samples^2; negative if seen from inside the lung */
 } face;
 
 static face face_of(const canvas *c, size_t triangle) {
@@ -228,7 +228,7 @@ static face face_of(const canvas *c, size_t triangle) {
   const corner *all = c->renderer->corners;
   face f = {{&all[v[0]], &all[v[1]], &all[v[2]]}, 0.0F};
   f.area = (f.at[2]->x - f.at[0]->x) * (f.at[1]->y - f.at[0]->y) -
-           (f.at[1]->x - f.at[0]->x) * (f.at[2]->y - f.at[0]->y); /* y points down */
+           (f.at[1]->x - f.at[0]->x) * (f.at[2]->y - f.at[0]->y);
   return f;
 }
 
@@ -246,7 +246,7 @@ static float nearness_at(const face *f, const float share[3]) {
          share[2] * f->at[2]->nearness;
 }
 
-/* Record a triangle at the samples where it is nearest, in the rows `begin` to `end` - 1. */
+/* Record a triangle in rows `begin` to `end` - 1, at samples where it is the nearest so far. */
 static void draw_face(const canvas *c, size_t triangle, size_t begin, size_t end) {
   const face f = face_of(c, triangle);
   const float left = fminf(f.at[0]->x, fminf(f.at[1]->x, f.at[2]->x));
@@ -300,7 +300,7 @@ static float value_at(const face *f, float x, float y) {
          nearness_at(f, share);
 }
 
-/* Return the share of a sample that contour lines cover, 0 to 1; contour.glsl has thinner lines. */
+/* Return the share of a sample that contour lines cover, 0 to 1. */
 static float contour(const face *f, float x, float y, float value, float spacing) {
   const float steps = value / spacing;
   const float width =
@@ -348,7 +348,7 @@ static void shade(const canvas *c, size_t triangle, float x, float y, unsigned c
   const float spacing = (float)scene->line_step;
   const float facing = fmaxf(0.0F, dot(n, eye));
   float light = 0.46F + 0.14F * n[1] + 0.58F * lambert(n, key) + 0.16F * lambert(n, fill);
-  light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darkens the outline */
+  light *= 0.72F + 0.28F * smoothstep(0.0F, 0.45F, facing); /* darken the outline */
   light *= spacing > 0.0F ? 1.0F - 0.275F * contour(&f, x, y, value, spacing) : 1.0F;
   if (scene->shell) {
     const float cover = 0.12F + 0.7F * powf(1.0F - facing, 2.5F);

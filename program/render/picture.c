@@ -28,12 +28,12 @@
   EACH(cairo_, text_extents) EACH(cairo_, text_path)
 /* clang-format on */
 
-/* Functions of cairo. They are loaded at the first use, as cairo needs the X11 libraries. */
+/* Functions of cairo. They are loaded at the first use, because cairo needs the X11 libraries. */
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
 
-/* Colours of the ends of the background's gradient, of cells and their edges, and of text. */
+/* Colours of the upper and lower end of the background, cells, their edges, text, and gravity. */
 static const double ground_top[3] = {0.985, 0.988, 0.992};
 static const double ground_bottom[3] = {0.925, 0.941, 0.957};
 static const double card[3] = {1, 1, 1};
@@ -108,7 +108,7 @@ static void ground(cairo_t *cr, const supine_picture *picture) {
 }
 
 /* Draw gravity on the ball: an arrow, a circle with a dot if it points towards the viewer, or a
- * circle with a cross if it points away. `seen` is its unit vector in the viewer's axes. */
+ * circle with a cross if it points away. `seen` is gravity's unit vector in the viewer's axes. */
 static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const double seen[3]) {
   const double flat = hypot(seen[0], seen[1]);
   cairo.new_path(cr);
@@ -190,13 +190,13 @@ static void place_name(double (*box)[3], size_t count, double line) {
     const bool beside = own[0] > box[i][0] + box[i][2] || box[i][0] > own[0] + own[2];
     if (!beside && fabs(own[1] - box[i][1]) < line * 0.999) {
       own[1] = box[i][1] + line;
-      i = SIZE_MAX; /* the loop continues with the first name */
+      i = SIZE_MAX; /* the loop starts again with the first name */
     }
   }
 }
 
-/* Draw discs and dots at the marks, then the labels over them. The scene lies at (x, y); `size` is
- * the size of the font, pixels. */
+/* Draw discs and dots at the marks, then the labels over them. (x, y) is the upper left corner of
+ * the scene; `size` is the size of the font, pixels. */
 static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const supine_scene *scene,
                                 const supine_marks *marks, double size, double x, double y) {
   double(*pixel)[2] = malloc((marks->count + 1) * sizeof *pixel);
@@ -247,7 +247,7 @@ static supine_status draw_marks(cairo_t *cr, supine_renderer *renderer, const su
   return SUPINE_OK;
 }
 
-/* Draw a scene on a new surface, which the caller must destroy, even after a failure. */
+/* Draw a scene on a new cairo surface, which the caller must destroy, even after a failure. */
 static supine_status draw_scene(supine_renderer *renderer, const supine_scene *scene,
                                 cairo_surface_t **image, supine_error *error) {
   *image = cairo.image_surface_create(CAIRO_FORMAT_ARGB32, (int)scene->width, (int)scene->height);
@@ -262,8 +262,8 @@ static supine_status draw_scene(supine_renderer *renderer, const supine_scene *s
   return status;
 }
 
-/* Draw the lungs and the marks of a panel in a box of `width` x `height` pixels at (x, y); `size`
- * is the size of the font, pixels. The 13 parameters say what to draw, and where. */
+/* Draw the lungs and the marks of a panel in a box whose upper left corner is (x, y); `size` is the
+ * size of the font; all in pixels. The 13 parameters say what to draw, and where. */
 static supine_status lungs(cairo_t *cr, supine_renderer *renderer, const supine_picture *picture,
                            const supine_panel *panel, supine_view view, const bar_scale *bar,
                            double x, double y, double width, double height, double size,
@@ -487,7 +487,7 @@ supine_status supine_render_picture_save(supine_renderer *renderer, const supine
   }
   if (status == SUPINE_OK) {
     status = write_png(surface, output.file, error);
-    if (status == SUPINE_OK || ferror(output.file) != 0) { /* let commit report a failed write */
+    if (status == SUPINE_OK || ferror(output.file) != 0) {
       status = supine_output_commit(&output, error);
     }
   }

@@ -33,16 +33,16 @@ const char *supine_render_view_name(supine_view view);
  * viewer. */
 void supine_render_view_axes(supine_view view, double axes[3][3]);
 
-/** Colour maps: for the displacement in one state, and for the difference between two. */
+/** Colour maps: for the displacement in one state, and for the difference between two states. */
 typedef enum supine_colours {
   SUPINE_COLOURS_DISPLACEMENT = 0, /**< from violet through teal to yellow */
   SUPINE_COLOURS_DIFFERENCE,       /**< from blue through red to cream */
   SUPINE_COLOURS_COUNT
 } supine_colours;
 
-/** Compute a colour of a map, sRGB 0 to 1, at 0 <= t <= 1. Equal steps of t are equal distances in
- * OKLab [Ottosson2020], and lightness rises with t, so that grey copies keep the order. Pictures,
- * the report and the page use the same maps. */
+/** Compute the colour of a map at t, 0 to 1, as sRGB, 0 to 1. Equal steps of t are equal distances
+ * in OKLab [Ottosson2020], and lightness rises with t, so that grey copies keep the order.
+ * Pictures, the report and the page use the same maps. */
 void supine_render_colour(supine_colours map, double t, double rgb[3]);
 
 /** Buffers for drawings of one basis. Only one thread at a time may use a renderer. */
@@ -64,7 +64,7 @@ typedef struct supine_scene {
   double line_step;   /**< difference of the value between contour lines, mm; 0 for no lines */
   supine_colours colours;
   supine_view view;
-  bool shell; /**< whether to draw a grey, transparent shell with an outline, not colours */
+  bool shell; /**< whether to draw a grey, transparent shell with an outline instead of colours */
   size_t width, height; /**< size of the drawing, pixels */
   const double *extent; /**< [4] made by supine_render_extent; NULL for the extent of this scene */
 } supine_scene;
@@ -93,9 +93,9 @@ supine_status supine_render_png(supine_renderer *renderer, const supine_scene *s
 
 /** A point, or a vertex of a mesh, inside the lungs. */
 typedef struct supine_mark {
-  float xyz[3];      /**< position, mm */
-  float value;       /**< value that the colour shows, mm */
-  bool point;        /**< a point, drawn as a disc; if false, a vertex, drawn as a dot */
+  float xyz[3]; /**< position, mm */
+  float value;  /**< value that the colour shows, mm */
+  bool point;   /**< whether the mark is a point, drawn as a disc; a vertex is drawn as a dot */
   const char *label; /**< text written beside the mark, or NULL */
 } supine_mark;
 
@@ -104,7 +104,7 @@ typedef struct supine_marks {
   const supine_mark *mark;
 } supine_marks;
 
-/** Project marks to the drawing of a scene.
+/** Compute the positions of marks in the drawing of a scene.
  * @param pixel  [count, 2] pixels from the left and upper edges; output */
 void supine_render_project(supine_renderer *renderer, const supine_scene *scene,
                            const supine_marks *marks, double (*pixel)[2]);
@@ -129,11 +129,11 @@ typedef struct supine_picture {
   size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
   double largest;      /**< value that the last colour shows, mm */
-  double transparency; /**< 0 for coloured lungs, else grey shells, which fade from 0.5 to 1 */
+  double transparency; /**< 0: coloured lungs; above 0: grey shells, which fade from 0.5 to 1 */
   const double (*extent)[4]; /**< [view_count] made by supine_render_picture_extent; NULL for the
                                 extents of this picture */
   supine_colours colours;
-  bool beyond; /**< whether values exceed `largest`; the colour bar then has a pointed end */
+  bool beyond; /**< whether values exceed `largest`, so that the colour bar has a pointed end */
   size_t width, height; /**< size of the picture, pixels */
 } supine_picture;
 
@@ -161,7 +161,7 @@ supine_status supine_render_picture_draw(supine_renderer *renderer, const supine
 supine_status supine_render_picture_save(supine_renderer *renderer, const supine_picture *picture,
                                          const char *path, supine_error *error);
 
-/** An animation for a WebP file that repeats forever. */
+/** A WebP animation that repeats forever. */
 typedef struct supine_animation supine_animation;
 
 /** Create an animation; supine_render_animation_close frees it.
