@@ -3,15 +3,15 @@
 # Check that programs linked with an older run-time library still run: tests/abi.sh [REVISION]
 #
 # Compare the library of REVISION with that of HEAD by abidiff (Debian's abigail-tools). The default is the
-# last tag or, if there is none, the commit that set the current version number. Exit with 0 if the interfaces
-# are equal, else with abidiff's report and code.
+# last tag or, if there is none, the commit that set the current version number. If the interfaces are equal,
+# exit with 0. Otherwise print abidiff's report and exit with its code.
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
 revision=${1:-$(git -C "$source" describe --tags --abbrev=0 2>/dev/null ||
   git -C "$source" log -1 --format=%h -G'define SUPINE_VERSION "' -- runtime/include/supine/version.h)}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-# build REVISION NAME: build the library of a revision in $work/NAME.
+# build REVISION NAME: build the library of REVISION in the folder $work/NAME.
 build() {
   mkdir "$work/$2"
   git -C "$source" archive "$1" | tar -x -C "$work/$2"

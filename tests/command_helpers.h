@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run a command of the program in the process of the test. */
+/* Run a command of the program within the process of the test. */
 #ifndef SUPINE_COMMAND_HELPERS_H
 #define SUPINE_COMMAND_HELPERS_H
 
@@ -7,11 +7,11 @@
 
 #include "program/options/command.h"
 
-/* Output streams that command_run captures; it discards the others. */
+/* Output streams that command_run keeps; it discards the other stream. */
 enum { KEPT_OUT = 1, KEPT_ERR = 2, KEPT_BOTH = 3 };
 
-/* Run the command with the arguments `words`, which end with NULL. Set text [size] to its output on
- * the streams `kept`, and return its exit code. */
+/* Run the command with the arguments `words`, the last of which is NULL. Set text [size] to what
+ * the command prints on the streams `kept`, and return its exit code. */
 static inline int command_run(const supine_command *command, const char *const *words, int kept,
                               char *text, size_t size) {
   char *argv[24] = {strdup(command->name)};
@@ -44,7 +44,7 @@ static inline int command_run(const supine_command *command, const char *const *
   return code;
 }
 
-/* Call command_run with the remaining arguments as `words`; `text` must be an array. */
+/* Call command_run with the arguments that follow `text`, which must be an array, not a pointer. */
 #define COMMAND_RUN(command, kept, text, ...)                                                      \
   command_run(command, (const char *const[]){__VA_ARGS__, NULL}, kept, text, sizeof(text))
 

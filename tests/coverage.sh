@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Count the lines that the tests reach: tests/coverage.sh [quick]
 #
-# Build with gcov, and run all tests, or with `quick` those that together take two minutes. Print the lines of each
-# file that no test reaches, and the share of lines that the tests reach. Exit with an error if the share is below
+# Build with gcov, and run all tests. With `quick`, run only tests that together take two minutes. Print the lines of
+# each file that no test reaches, and the share of lines that the tests reach. Exit with an error if the share is below
 # 90 %. Needs Debian's gcovr.
 set -eu
 cd "$(dirname "$0")/.."
-# Tests left out by `quick`: they are slow with gcov and reach few lines that no other test reaches.
+# Tests that `quick` leaves out. They are slow with gcov, and nearly all lines that they reach are reached by others.
 slow='precompute|thread_count|field|patient_expand|program|breathe|projection|deform|deform_lung|cohort'
 slow="$slow|inside|no_data_lost|labels_orientation|lit_angles|faults|bids|reference|validation_lungs|house"
 slow="$slow|readme_example|series_vtk|stream_page|stream_slicer|stream_link|stream_unity.*|export_.*_node|mesh_hostile"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The matrix I - A over all nodes (masses and springs), built entry by entry from equations (3) and
- * (8) of [Santhanam2008]. It is an independent reference for the solver. */
+/* The matrix I - A of [Santhanam2008] over all nodes (masses and springs), computed entry by entry
+ * from equations (3) and (8), as an independent reference for the solver. */
 #ifndef SUPINE_FULL_OPERATOR_H
 #define SUPINE_FULL_OPERATOR_H
 
@@ -12,14 +12,14 @@
 #include "mesh/mesh.h"
 
 typedef struct full_operator {
-  size_t node_count;  /* masses have the lower indices, springs the higher */
-  size_t entry_count; /* entries off the diagonal */
+  size_t node_count;  /* number of masses and springs; masses come first */
+  size_t entry_count; /* number of entries off the diagonal */
   size_t *row, *column;
-  double *value; /* [entries] transfer Te from node `column` to node `row` */
-  double *own;   /* [nodes] share Te[j->j] of the force on node j that it keeps */
+  double *value; /* [entries] share of the force on node `column` that it transfers to node `row` */
+  double *own;   /* [nodes] share of the force on a node that it keeps */
 } full_operator;
 
-/* Compute Te for every pair of linked nodes from the stiffness e [N], without scaling it. */
+/* Compute row, column, value and own from the stiffness e [N], without scaling e. */
 static inline full_operator full_operator_create(const supine_mesh *mesh,
                                                  const supine_topology *topology, const double *e) {
   const size_t n = mesh->vertex_count;
@@ -117,9 +117,9 @@ static inline direct_solver direct_solver_create(const full_operator *op) {
   return d;
 }
 
-/* Set caught [masses] to the catch of each mass under an applied force [masses]. */
+/* Compute the catch (the force that each mass keeps) [masses] from the applied force [masses]. */
 static inline void direct_solver_solve(direct_solver *d, const full_operator *op, size_t masses,
-                                       const double *force, double *caught) {
+                                       const double *force, double *catch_) {
   for (size_t j = 0; j < op->node_count; ++j) {
     d->right[j] = j < masses ? force[j] : 0.0;
   }
@@ -128,7 +128,7 @@ static inline void direct_solver_solve(direct_solver *d, const full_operator *op
     abort();
   }
   for (size_t i = 0; i < masses; ++i) {
-    caught[i] = op->own[i] * d->solution[i];
+    catch_[i] = op->own[i] * d->solution[i];
   }
 }
 

@@ -3,9 +3,10 @@
 
     python3 house.py SOURCE_FOLDER BUILD_FOLDER
 
-Each row of the table names a folder, states its content, and lists folders of earlier rows whose headers its files
-may include. Its files may also include the headers that those folders may include. Check, too, that files do not
-depend on each other in cycles, the prefixes of external names, and the sizes of functions."""
+Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
+include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
+each other in cycles, that external names have the prefix of their folder, and that functions have few lines and few
+parameters."""
 import os
 import re
 import subprocess
@@ -14,7 +15,7 @@ import sys
 source, build = sys.argv[1:3]
 faults = []
 
-# Prefixes of external names in folders where they differ from supine_<folder>_.
+# Prefixes of external names, for folders whose prefix is not supine_<folder>_.
 PREFIX = {"sh/base": ("supine_",), "runtime": ("supine_",), "runtime/safetensors": ("supine_",),
           "mesh/io": ("supine_mesh_", "supine_image_"), "precompute/lungs": ("supine_lungs_", "supine_phantom_", "supine_tissue_"),
           "precompute/physics": ("supine_physics_", "supine_reference_"),
@@ -59,7 +60,7 @@ def tracked():
 
 
 def included(file):
-    """Yield the folder and the name of each included file of the project."""
+    """Yield the folder and the name of each file of the project that `file` includes."""
     with open(os.path.join(source, file), encoding="utf-8") as text:
         for name in re.findall(r'^#\s*include\s+[<"]([^>"]+)[>"]', text.read(), re.M):
             for path in [name] + [f"{folder[:-len('/supine')]}/{name}" for folder in PUBLIC]:
@@ -78,7 +79,7 @@ def check_includes(folders, files):
 
 
 def check_system_headers(files):
-    """Check that in the library only posix.c and windows.c include headers of the operating system."""
+    """Check that no file of the library includes headers of the operating system, except posix.c and windows.c."""
     library = PUBLIC + ("runtime", "runtime/safetensors", "runtime/kernels", "runtime/compare")
     for file in files:
         if os.path.dirname(file) in library and os.path.basename(file) not in ("posix.c", "windows.c"):
@@ -103,7 +104,8 @@ def check_include_cycles(files):
 
 
 def objects():
-    """Yield (source file without its ending, names that it defines, names that it uses) of each object file."""
+    """For each object file, yield the source file without its ending, and lists of the external names that it defines and
+    uses."""
     for folder, _, names in os.walk(build):
         match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
         for name in names if match else []:

@@ -21,7 +21,7 @@ static inline void helper_motion(int mode, const double p[3], double u[3]) {
     u[0] = 0.11 * p[0] - 0.07 * p[1] + 0.013 * p[2] + 2.7;
     u[1] = -0.05 * p[0] - 0.09 * p[1] + 0.021 * p[2] - 1.3;
     u[2] = 0.02 * p[0] + 0.12 * p[1] + 0.15 * p[2] + 5.9;
-  } else if (mode == 1) { /* displacements of at most about 20 mm in a lung */
+  } else if (mode == 1) { /* moves a lung by at most about 20 mm */
     u[0] = 6e-4 * p[0] * p[1] + 3e-4 * p[2] * p[2];
     u[1] = -5e-4 * p[1] * p[1] + 2e-4 * p[0] * p[2];
     u[2] = 8e-4 * p[2] * p[2] - 4e-4 * p[0] * p[1];
@@ -32,10 +32,9 @@ static inline void helper_motion(int mode, const double p[3], double u[3]) {
   }
 }
 
-/* Write a basis whose scan has the given direction of gravity and the given volume in mL beyond the
- * reference, both as text. If they are NULL, the scan is the reference. The weight of mode k has
- * the coefficients 0.5 + 0.1 k and 0.3 for the first two harmonics, so that all modes are active in
- * almost every direction. */
+/* Write a basis of lungs that were scanned with the given direction of gravity and the given
+ * volume, in mL beyond the volume in the file, both as text. If both are NULL, the file has the
+ * lungs as scanned. */
 static inline void helper_write_scanned_basis(const char *path, size_t frequency, size_t lungs,
                                               const char *scan_gravity, const char *scan_volume) {
   supine_mesh mesh[2] = {helper_lump(frequency, 71.3, 3), helper_lump(frequency, -72.9, 4)};
@@ -56,7 +55,7 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
     for (int mode = 0; mode < HELPER_MODES; ++mode) {
       double u[3];
       helper_motion(mode, p, u);
-      /* The displacement of the second lung is multiplied by -0.7. */
+      /* For the second lung, the displacement is multiplied by -0.7. */
       for (size_t k = 0; k < 3; ++k) {
         coefficients[(3 * i + k) * HELPER_MODES + (size_t)mode] =
             (float)(side == 0 ? u[k] : -0.7 * u[k]);
@@ -73,7 +72,6 @@ static inline void helper_write_scanned_basis(const char *path, size_t frequency
     modes[4 * k] = 0.5 + 0.1 * (double)k;
     modes[4 * k + 1] = 0.3;
   }
-  /* Arbitrary linear volume forms, which the file of embedded content must repeat. */
   double linear[2 * HELPER_MODES];
   double quadratic[2 * HELPER_MODES * HELPER_MODES] = {0};
   double cubic[2 * HELPER_MODES * HELPER_MODES * HELPER_MODES] = {0};
@@ -115,7 +113,7 @@ static inline void helper_write_basis(const char *path, size_t frequency, size_t
   helper_write_scanned_basis(path, frequency, lungs, NULL, NULL);
 }
 
-/* Open a basis in exact storage, which leaves the values of the file unchanged. */
+/* Open a basis without rounding the numbers of the file. */
 static inline supine_basis *helper_open(const char *path) {
   const supine_basis_options exact = {.size = sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   supine_basis *basis = NULL;

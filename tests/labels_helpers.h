@@ -10,11 +10,11 @@
 #include "mesh/io/image.h"
 #include "mesh/mesh.h"
 
-/* largest number of times that a row of voxels crosses one surface */
+/* largest number of times that a straight line crosses one surface */
 enum { HELPER_CROSSINGS = 32 };
 
-/* Return an image of zeros that covers a mesh with an irregular margin. Its axes are LPS, and its
- * voxels have the sides `spacing`, mm. */
+/* Return an image of zeros that covers a mesh, with margins of unequal width. The image axes are
+ * LPS, and voxels have the sides `spacing`, mm. */
 static inline supine_image helper_image_over(const supine_mesh *mesh, const double spacing[3]) {
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};
   double low[3];
@@ -35,8 +35,8 @@ static inline int helper_compare_doubles(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* Return the x at which the line along x through (y, z) crosses the triangle p, q, r, or NAN if it
- * does not cross the triangle. */
+/* Return the x at which the line parallel to the x axis through (y, z) crosses the triangle p, q,
+ * r, or NAN if the line misses the triangle. */
 static inline double helper_crossing(const double *p, const double *q, const double *r, double y,
                                      double z) {
   const double whole = (q[1] - p[1]) * (r[2] - p[2]) - (r[1] - p[1]) * (q[2] - p[2]);
@@ -45,8 +45,8 @@ static inline double helper_crossing(const double *p, const double *q, const dou
   return v >= 0.0 && w >= 0.0 && v + w <= 1.0 ? p[0] + v * (q[0] - p[0]) + w * (r[0] - p[0]) : NAN;
 }
 
-/* Set all voxels whose centres are inside the surface of the triangles begin <= t < end to `label`.
- * The image must have 8-bit voxels and LPS axes. */
+/* Set all voxels whose centres are inside the surface of triangles begin <= t < end to `label`. The
+ * image must have 8-bit voxels and LPS axes. */
 static inline void helper_voxelise(const supine_mesh *mesh, size_t begin, size_t end, uint8_t label,
                                    supine_image *image) {
   const size_t rows = image->size[1] * image->size[2];
@@ -88,9 +88,9 @@ static inline void helper_voxelise(const supine_mesh *mesh, size_t begin, size_t
   free(count);
 }
 
-/* Return a label map of two ellipsoids side by side. As in maps by lungmask, label 1 is the right
- * lung and label 2 the left lung. The axes are LPS, and voxels have sides of `spacing` mm. The
- * right ellipsoid is larger. Towards the feet, both are wider and lie further back. */
+/* Return a label map of two ellipsoids side by side, with LPS axes and voxels with sides of
+ * `spacing` mm. Label 1 is the right lung and label 2 the left lung, like in maps by lungmask. The
+ * right ellipsoid is larger. Both ellipsoids are wider and lie further back towards the feet. */
 static inline supine_image helper_two_lungs(double spacing) {
   const double size[3] = {280.0, 180.0, 240.0};
   supine_image image = {.voxel = SUPINE_VOXEL_U8, .channels = 1};

@@ -21,8 +21,8 @@ static inline double helper_random(uint64_t *seed) {
   return 0.5 + 0.5 * random_signed(seed);
 }
 
-/* Return a closed, asymmetric surface, about 250 mm high and centred `x` mm from the midline. It
- * has 10 frequency^2 + 2 vertices. */
+/* Return a closed, asymmetric surface with 10 frequency^2 + 2 vertices. It is about 250 mm high,
+ * and its centre is at the given x, mm. */
 static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed) {
   supine_mesh mesh = {.vertex_count = supine_phantom_geodesic_vertex_count(frequency),
                       .triangle_count = supine_phantom_geodesic_triangle_count(frequency)};
@@ -40,7 +40,8 @@ static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed)
   return mesh;
 }
 
-/* Load real surfaces (tests/README.md) as one supine_lungs. Return false if a file is missing. */
+/* Load one or two surfaces of real lungs (tests/README.md) into one supine_lungs. Return false if a
+ * file is missing. */
 static inline bool helper_real_lungs(const char *const *names, size_t count, supine_axes axes,
                                      supine_lungs *lungs) {
   supine_mesh meshes[2] = {0};

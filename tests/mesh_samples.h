@@ -6,7 +6,7 @@
 #include "mesh/mesh.h"
 #include "test.h"
 
-/* Return a mesh with copies of the arrays; free it by supine_mesh_free. */
+/* Return a mesh with copies of the given arrays. Free the mesh by supine_mesh_free. */
 static inline supine_mesh sample_make(size_t vertex_count, const double *vertices,
                                       size_t triangle_count, const uint32_t *triangles) {
   supine_mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count};
@@ -48,7 +48,7 @@ static inline supine_mesh sample_box(void) {
   "\nproperty float x\nproperty float y\nproperty float z\nelement face " #faces                   \
   "\nproperty list uint int vertex_indices\nend_header\n"
 
-/* Set `path` to the path of a file in the folder of the group, and return it. */
+/* Set `path` to the path of the file `name` in the group's temporary folder, and return `path`. */
 static inline const char *sample_path(void **state, const char *name, char path[256]) {
   (void)snprintf(path, 256, "%s/%s", (const char *)*state, name);
   return path;
@@ -68,7 +68,7 @@ static inline const char *sample_text(void **state, const char *name, const char
   return sample_write(state, name, text, strlen(text), path);
 }
 
-/* Make the folder of a group of tests. Removing it fails if a test has left a file in it. */
+/* Make the temporary folder of a group of tests. No test may leave a file in it. */
 static inline int sample_folder_create(void **state) {
   static char folder[] = "/tmp/supine-mesh-XXXXXX";
   *state = mkdtemp(folder);

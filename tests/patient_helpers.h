@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The known law by which tests of the patient's fit move lungs. */
+/* The known displacement law with which tests of the fit to a patient deform lungs. */
 #ifndef SUPINE_PATIENT_HELPERS_H
 #define SUPINE_PATIENT_HELPERS_H
 
@@ -9,7 +9,7 @@
 
 static const double supine_gravity[3] = {0.0, 1.0, 0.0};
 
-/* Return the true law: constants of the force (18), and c1 to c6 of the directions (15)-(17). */
+/* Return the constants of the force (18) and of the directions (15)-(17) in [Santhanam2008]. */
 static supine_model truth(void) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   model.reach = 10.0;

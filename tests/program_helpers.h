@@ -10,9 +10,10 @@
 
 #include <supine/status.h>
 
-static char printed[65536]; /* output of the last run on stdout and stderr */
+static char printed[65536]; /* output of the last run on stdout and stderr together */
 
-/* Run "supine ARGUMENTS" in the folder; return its exit code, or -1 after a signal or a timeout. */
+/* Run "supine ARGUMENTS" in the temporary folder. Return its exit code, or -1 if a signal or the
+ * time limit ended it. */
 SUPINE_PRINTF(1, 2)
 static int run(const char *format, ...) {
   char arguments[2048];
@@ -32,7 +33,7 @@ static int run(const char *format, ...) {
 
 static void expect(int code, const char *words, int got) {
   if (got != code) {
-    fail_msg("exit code %d, not %d: %s", got, code, printed);
+    fail_msg("exit code %d instead of %d: %s", got, code, printed);
   }
   assert_says(printed, words);
 }

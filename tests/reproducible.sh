@@ -4,7 +4,7 @@
 #
 #     tests/reproducible.sh
 #
-# The date in the package's changelog comes from SOURCE_DATE_EPOCH, as in every reproducible build.
+# The date in the changelog of the package is taken from SOURCE_DATE_EPOCH, as in other reproducible builds.
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
 SOURCE_DATE_EPOCH=$(git -C "$source" log -1 --format=%ct)

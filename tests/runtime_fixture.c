@@ -20,8 +20,7 @@ double fixture_random(uint64_t *state) {
   return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-/* Make a lung of the vertices begin <= i < end: a bipyramid with its triangles. Fewer than 5
- * vertices get no triangles. */
+/* Make a lung of the vertices begin <= i < end. At least 5 vertices form a bipyramid. */
 static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_t *state) {
   const size_t corners = end - begin >= 5 ? end - begin - 2 : 0;
   for (size_t i = begin; i < end; ++i) {
@@ -47,7 +46,7 @@ static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_
   }
 }
 
-/* Compute the displacement of vertex i by mode k at weight 1, mm. */
+/* Compute the displacement u of vertex i by mode k with weight 1, mm. */
 static void mode_displacement(const fixture *f, size_t i, size_t k, double u[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = f->vector
@@ -61,9 +60,8 @@ static double det(const double *a, const double *b, const double *c) {
          a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* Add the volume forms of one triangle, mL. Its volume is a sixth of the determinant of its corners
- * p + sum over k of w_k u_k, where mode k displaces p by u_k. The forms are the terms of degree 1,
- * 2 and 3 in the weights w. */
+/* Add the contribution of one triangle to the volume of a lung, mL: a sixth of the determinant of
+ * its displaced corners, split into terms of degree 1, 2 and 3 in the weights of the modes. */
 static void add_forms(fixture *f, const uint32_t *corner, size_t lung) {
   const size_t K = f->modes;
   double r[3][3];
@@ -152,8 +150,8 @@ fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed) 
   fixture *f = fixture_create(vertices, modes, 1, 2, false, false, 1, seed);
   memset(f->mode, 0, 4 * modes * sizeof *f->mode);
   memset(f->coefficient, 0, vertices * modes * sizeof *f->coefficient);
-  f->mode[0] = 1 / 0.28209479177387814;     /* weight 1 in any direction */
-  f->mode[4 + 1] = 1 / 0.48860251190291992; /* weight g_y in the direction g */
+  f->mode[0] = 1 / 0.28209479177387814; /* mode 0 has the weight 1 for any direction of gravity */
+  f->mode[4 + 1] = 1 / 0.48860251190291992; /* mode 1 has the y coordinate of gravity as weight */
   for (size_t i = 0; i < vertices; ++i) {
     const float *p = f->vertex + 3 * i;
     const double middle = 150.3 * ((double)f->lung[i] - 0.5);

@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Check that outputs have the same bytes with 1, 2, 3 and 7 threads, and compare several builds.
+# Check that commands write the same bytes with 1, 2, 3 and 7 threads, and compare the outputs of several builds.
 #
 #     tests/same_bytes.sh build/release/supine [build/debug/supine ...]
 #
-# Run each command with each number of threads in each build, on inputs made by the first build. Exit with 1 if an
-# output depends on the number of threads; print which outputs differ between builds.
+# The first build makes the input files. Then each build runs each command with each number of threads. Exit with 1 if
+# an output depends on the number of threads. Print which outputs differ between builds.
 set -eu
 export SOURCE_DATE_EPOCH=0
 work=$(mktemp -d)
@@ -21,7 +21,8 @@ printf 'name,x,y,z\na,60,-150,-100\nb,-70,-120,-90\n' >points.csv
 "$first" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1
 
 failed=0
-# compare ENDING COMMAND...: compare the command's output from every build and number of threads.
+# compare ENDING COMMAND...: compare the files with this ending that the command writes in every build and with every
+# number of threads.
 compare() {
   ending=$1
   shift

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compare the output of a session with its golden file: same_output.py GOLDEN OUTPUT.
 
-Results differ slightly between processors. In output piped through `rounded`, the last of the four digits of a
-decimal number may therefore differ by one. Everything else must be identical."""
+Numbers differ slightly between processors. If a command is piped through `rounded`, which keeps four digits of a number,
+the last of these digits may therefore differ by one. All other output must be identical."""
 import difflib
 import math
 import re
@@ -17,7 +17,7 @@ def lines_of(path):
 
 
 def close(a, b):
-    """Return whether two numbers of four digits differ by at most one in the last digit."""
+    """Return whether two numbers differ by at most one in the fourth digit."""
     a, b = float(a), float(b)
     largest = max(abs(a), abs(b))
     return a == b or abs(a - b) < 1.5 * 10.0 ** (math.floor(math.log10(largest)) - 3)

@@ -15,7 +15,7 @@ static inline double random_signed(uint64_t *seed) {
   return (double)(*seed >> 11) * 0x1p-52 - 1;
 }
 
-/* Draw a direction uniformly from the sphere: z and longitude are uniform (Archimedes). */
+/* Choose a direction uniformly on the sphere, by uniform z and longitude (Archimedes). */
 static inline void random_direction(uint64_t *seed, double direction[3]) {
   const double z = random_signed(seed);
   const double longitude = M_PI * random_signed(seed);
@@ -25,7 +25,7 @@ static inline void random_direction(uint64_t *seed, double direction[3]) {
   direction[2] = z;
 }
 
-/* Draw a rotation matrix r from a random unit quaternion. */
+/* Make a random rotation matrix r from a random unit quaternion. */
 static inline void random_rotation(uint64_t *seed, double r[3][3]) {
   double q[4];
   double length = 0;

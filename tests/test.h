@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Headers, macros and helpers of every test program. test_main.c has the main function. */
+/* Headers, macros and functions that every test program uses. test_main.c has the main function. */
 #ifndef SUPINE_TEST_H
 #define SUPINE_TEST_H
 
@@ -17,7 +17,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Define a test: TEST(test_name) { ... }. The setup of the group may set `*state`. */
+/* Define a test: TEST(test_name) { ... }. The group's setup may set `*state`. */
 #define TEST(name)                                                                                 \
   static void name(void **state);                                                                  \
   __attribute__((constructor)) static void name##_add(void) {                                      \
@@ -34,8 +34,8 @@
 void test_add(const char *name, CMUnitTestFunction test);
 void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
 
-/* Assert |value - expected| <= tolerance. On failure print both in double precision;
- * assert_float_equal of cmocka 1.1.5 prints floats. */
+/* Assert |value - expected| <= tolerance. On failure print both in double precision, because
+ * assert_float_equal of cmocka 1.1.5 prints only single precision. */
 #define assert_close(value, expected, tolerance)                                                   \
   do {                                                                                             \
     const double value_ = (value);                                                                 \
@@ -52,7 +52,7 @@ void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
     const char *text_ = (text);                                                                    \
     const char *words_ = (words);                                                                  \
     if (strstr(text_, words_) == NULL) {                                                           \
-      fail_msg("no \"%s\" in: %.4000s", words_, text_);                                            \
+      fail_msg("\"%s\" is missing in: %.4000s", words_, text_);                                    \
     }                                                                                              \
   } while (0)
 
@@ -64,7 +64,7 @@ static inline void test_write(const char *path, const char *text) {
   assert_int_equal(fclose(file), 0);
 }
 
-/* Return the content of a file (malloc) with a NUL appended. Set `size` to the size of the file. */
+/* Return the content of a file (malloc), followed by a NUL that `size` does not count. */
 static inline void *test_read(const char *path, size_t *size) {
   FILE *file = fopen(path, "rb");
   assert_non_null(file);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Status strings, output files, threads, and endings of file names. */
+/* Test status strings, output files, threads, and endings of file names. */
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -76,7 +76,7 @@ TEST(test_output_commit_replaces_file_abandon_keeps_it) {
   read_text(path, text, sizeof text);
   assert_string_equal(text, "first");
   assert_int_equal(unlink(path), 0);
-  assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left */
+  assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left in the folder */
 }
 
 TEST(test_output_full_disk_or_missing_folder_write_error) {
@@ -92,7 +92,7 @@ TEST(test_output_full_disk_or_missing_folder_write_error) {
   assert_says(error.message, "/dev/full");
 }
 
-/* If true, open fails for O_TMPFILE, which some file systems do not support. */
+/* If true, open fails for O_TMPFILE, as on file systems without it. */
 static bool tmpfile_unsupported;
 
 int __real_open(const char *path, int flags, ...);
@@ -133,7 +133,7 @@ static void check_modes(void) {
     write_output(path, "new");
     assert_int_equal(mode_of(path), 0666 & ~masks[i]);
     assert_int_equal(chmod(path, 0640), 0);
-    write_output(path, "old"); /* an existing file keeps its mode */
+    write_output(path, "old"); /* overwriting a file must keep its mode */
     assert_int_equal(mode_of(path), 0640);
     assert_int_equal(umask(before), masks[i]);
     assert_int_equal(unlink(path), 0);
@@ -160,7 +160,7 @@ static void check_links(void) {
   (void)snprintf(over, sizeof over, "%s/over", folder);
   assert_int_equal(symlink("target", link), 0);
   assert_int_equal(symlink(link, over), 0);
-  for (int i = 0; i < 2; ++i) { /* the target is missing at first, then it exists */
+  for (int i = 0; i < 2; ++i) { /* first the target of the link is missing, then it exists */
     struct stat status;
     write_output(over, i == 0 ? "first" : "second");
     read_text(target, text, sizeof text);
@@ -172,8 +172,8 @@ static void check_links(void) {
   assert_int_equal(rmdir(folder), 0);
 }
 
-/* Limit the size of files, to emulate a full disk. Whichever write fails, the failure is reported,
- * the old file stays, and no temporary file is left. */
+/* Limit the size of files, like a full disk does. Assert that, whichever write fails, an error is
+ * returned, the old file stays and no temporary file is left. */
 static void check_full_disk(void) {
   char folder[] = "/tmp/supine-output-XXXXXX";
   char path[64];
@@ -231,7 +231,7 @@ TEST(test_output_abandon_all_removes_temporary_files) {
   tmpfile_unsupported = false;
   assert_int_equal(access(output.temporary, F_OK), 0);
   supine_output_abandon_all();
-  assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left */
+  assert_int_equal(rmdir(folder), 0); /* fails if a temporary file is left in the folder */
   supine_output_abandon(&output);
   assert_int_equal(supine_output_try("/nonexistent-folder/x", NULL), SUPINE_ERROR_WRITE);
 }

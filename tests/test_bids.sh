@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Run the BIDS app on four subjects, one with a corrupt file and one without lungs:
+# Run the BIDS app on four subjects, one of whom has a corrupt file and one no lungs:
 # test_bids.sh PROGRAM COHORT
 set -u
 SUPINE=$1

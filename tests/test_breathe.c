@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine breathe: volumes measured on the surface of each frame, files, and refused input. */
+/* Test supine breathe: volumes measured on the surfaces of frames, files, and refused input. */
 #include <dirent.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -17,9 +17,9 @@
 
 static char folder[] = "/tmp/supine-breathe-XXXXXX";
 static char basis[64], breath[64], series[64];
-static char text[16384]; /* output of the last command on stdout and stderr */
+static char text[16384]; /* output of the last command on stdout and stderr together */
 
-/* Write a basis of lungs whose left lung has `left_share` of its healthy volume. */
+/* Write a basis of the lungs, the left of which is collapsed to `left_share` of its volume. */
 static supine_status make_basis(const supine_lungs *lungs, double left_share, const char *path) {
   supine_precompute_options options = {
       .model = supine_physics_model(SUPINE_LAW_PAPER), .band = 5, .modes = 16, .held_out = 5};
@@ -46,7 +46,7 @@ static int setup(void **state) {
   return good ? 0 : -1;
 }
 
-/* Remove the files in a folder. */
+/* Remove all files from the temporary folder. */
 static void empty_folder(void) {
   DIR *entries = opendir(folder);
   const struct dirent *entry;
@@ -79,7 +79,7 @@ static size_t count_files(void) {
 
 #define RUN(...) COMMAND_RUN(&supine_command_breathe, KEPT_BOTH, text, __VA_ARGS__)
 
-/* Return the volume, mL, within the triangles whose vertices are begin <= i < end. */
+/* Return the volume, mL, of the lung that has the vertices begin <= i < end. */
 static double volume_of(const float *xyz, const uint32_t *triangles, size_t count, size_t begin,
                         size_t end) {
   const double centre[3] = {0.0, -150.0, -95.0};
@@ -101,8 +101,8 @@ static double volume_of(const float *xyz, const uint32_t *triangles, size_t coun
   return sum / 6000.0;
 }
 
-/* Assert for each frame of the file `breath` that the stated volume of each lung is the volume of
- * its surface, and that both lungs together gain `wanted` [frames], mL. */
+/* Assert for each frame of the file `breath` that the volume in the file equals the volume of the
+ * surface for each lung, and that the lungs together have gained `wanted` [frames], mL. */
 static void check_volumes(const char *basis_path, const double *wanted, size_t frames) {
   supine_safetensors *file = NULL;
   supine_basis *opened = NULL;
@@ -134,15 +134,16 @@ static void check_volumes(const char *basis_path, const double *wanted, size_t f
     }
     total = fmax(total, fabs(sum - wanted[t]));
   }
-  printf("%zu frames: volume errors up to %.4f mL for each lung, %.4f mL in total\n", frames,
-         by_lung, total);
+  printf("%zu frames: volume errors up to %.4f mL for one lung, up to %.4f mL for all lungs "
+         "together\n",
+         frames, by_lung, total);
   assert_true(by_lung < 0.05);
   assert_true(total < 0.05);
   supine_safetensors_close(file);
   supine_basis_close(opened);
 }
 
-/* Return the volume of each frame of a breath, mL (malloc). */
+/* Return the volume inhaled at the time of each frame of a breath, mL (malloc). */
 static double *breath_of(const supine_pv_breath *course, double fps, size_t frames) {
   double *time = malloc(frames * sizeof *time);
   double *volume = malloc(frames * sizeof *volume);
@@ -176,8 +177,7 @@ TEST(test_breathe_real_lungs_turning_volumes_exact_in_every_frame) {
   supine_lungs_free(&lungs);
 }
 
-/* A program that uses only the installed library computes the frames of the command, bit for
- * bit. */
+/* The installed library alone computes the same frames as supine breathe, bit for bit. */
 TEST(test_breathe_any_frame_equals_library) {
   enum { FRAMES = 21 };
   supine_safetensors *file = NULL;
@@ -196,7 +196,7 @@ TEST(test_breathe_any_frame_equals_library) {
   float *xyz = malloc(3 * info->vertex_count * sizeof *xyz);
   assert_non_null(xyz);
   for (size_t t = 0; t < FRAMES; ++t) {
-    /* The paper's law defines no volume at rest, so volumes are relative to the scan. */
+    /* The basis has no volume at rest, so volumes are relative to the scan. */
     supine_state frame = {.volume = {SUPINE_VOLUME_SCAN, 0.0}};
     supine_pose pose;
     memcpy(frame.gravity, gravity + 3 * t, sizeof frame.gravity);

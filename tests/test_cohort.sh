@@ -1,10 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Run the cohort workflow on forty synthetic subjects, three of them with corrupt files:
+# Run the cohort workflow on forty synthetic subjects, three of whom have missing or corrupt files:
 #
 #     test_cohort.sh PROGRAM COHORT [OPTIONS OF SNAKEMAKE]
 #
-# The options are --cores 2 if none are given; on a cluster, give --slurm --jobs 2.
+# The default options are --cores 2. On a cluster, use --slurm --jobs 2.
 set -u
 supine=$1
 cohort=$2
@@ -14,7 +14,7 @@ command -v snakemake >/dev/null || { echo "skipped: snakemake is not installed";
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-export HOME="$work" # for snakemake's cache
+export HOME="$work" # where snakemake keeps its cache
 failures=0
 fail() {
   echo "FAILED: $*"
@@ -28,10 +28,10 @@ for i in $(seq -w 1 40); do
   "$supine" phantom --vertices 300 --volume "$volume" -o "meshes/$i.ply" >/dev/null || exit 1
   echo "sub-$i,meshes/$i.ply,--band 2" >>subjects.csv
 done
-rm meshes/05.ply                                            # a missing file
-head -c 3000 meshes/11.ply >cut && mv cut meshes/11.ply     # a truncated file
+rm meshes/05.ply
+head -c 3000 meshes/11.ply >cut && mv cut meshes/11.ply
 printf 'v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 3 2\nf 1 2 4\nf 2 3 4\n' >meshes/23.obj
-sed -i 's/23.ply/23.obj/' subjects.csv                      # an open surface
+sed -i 's/23.ply/23.obj/' subjects.csv # an open surface instead of a closed one
 
 flow() {
   snakemake -s "$cohort/Snakefile" --nocolor "$@" --config table=subjects.csv out=results \

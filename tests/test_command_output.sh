@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Compare the whole output of commands with golden files: test_command_output.sh PROGRAM FOLDER
 #
-# Each FOLDER/*.txt is a session: lines "$ COMMAND", each followed by the output on both streams and by the
-# exit code if it is not 0. Sessions run in a folder with lungs.ply, a phantom of about 500 vertices, and
-# lungs.safetensors, its basis. In the sessions, the filter `rounded` rounds numbers that depend on the
-# processor, and sed masks times and residuals. same_output.py accepts a difference of one in the last digit
-# of a rounded number. To accept the current output:
+# Each golden file FOLDER/*.txt is a session: lines "$ COMMAND", each followed by what the command prints on
+# stdout and stderr, and by the exit code if it is not 0. Sessions run in a folder with lungs.ply, synthetic
+# lungs of about 500 vertices, and lungs.safetensors, the basis of these lungs. Numbers that depend on the
+# processor are rounded by the filter `rounded`, and same_output.py then accepts a difference of one in their
+# last digit. sed replaces times and residuals. To replace the golden files by the current output:
 #
 #   SUPINE_GOLDEN_UPDATE=1 ctest --preset release -R command_output
 set -u
@@ -18,8 +18,8 @@ mkdir "$work/bin"
 ln -s "$program" "$work/bin/supine"
 cat >"$work/bin/rounded" <<'END'
 #!/bin/sh
-# rounded [DIGITS] [FILE]: round decimal numbers to DIGITS digits (default 4), and numbers below 1e-7 to 0. Give fewer
-# DIGITS if a number is halfway between two numbers of four digits.
+# rounded [DIGITS] [FILE]: round decimal numbers to DIGITS significant digits (default 4), and numbers below 1e-7 to 0.
+# Use fewer digits if a number is nearly halfway between two numbers of four digits.
 digits=4
 case ${1-} in [1-9]) digits=$1; shift ;; esac
 exec awk -v digits="$digits" '{

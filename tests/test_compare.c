@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Comparison of orientations: distances computed from Gram matrices equal sums over all vertices;
- * slabs by height. */
+/* Test comparisons of orientations: distances, and volumes of horizontal slabs. */
 
 #include "test.h"
 
@@ -12,7 +11,6 @@
 
 enum { LUNGS_MAX = 3 };
 
-/* An open synthetic basis with its comparison. */
 typedef struct made {
   fixture *f;
   unsigned char *bytes;
@@ -52,7 +50,7 @@ static void random_direction(uint64_t *state, double g[3]) {
   } while (g[0] * g[0] + g[1] * g[1] + g[2] * g[2] < 0.01);
 }
 
-/* Return the share of each vertex in the surface area, by Heron's formula (malloc). */
+/* Return each vertex's share of the total area, computed by Heron's formula (malloc). */
 static double *area_shares(const fixture *f) {
   double *share = calloc(f->vertices, sizeof *share);
   assert_non_null(share);
@@ -97,7 +95,7 @@ static pair random_pair(const made *m, uint64_t *state) {
   return p;
 }
 
-/* Compute in double precision the distance of each vertex between two poses, mm (malloc). */
+/* Return the distance of each vertex between the poses of p, mm, in double precision (malloc). */
 static double *direct_distances(const made *m, const pair *p) {
   const size_t n = m->f->vertices;
   double *a = malloc(3 * n * sizeof *a);
@@ -227,8 +225,9 @@ TEST(test_compare_energy_all_bands_sum_to_mean_square) {
     assert_true(energy[l] >= 0);
     total += energy[l];
   }
-  /* Average over a grid of directions. Equispaced longitudes are exact to band 2 BAND. Fejer's
-   * first rule in latitude is exact to degree LATITUDES - 1 >= 2 BAND in z. */
+  /* Average the mean square displacement over a grid of directions of gravity. The average is exact
+   * for products of two harmonics of band BAND: LONGITUDES exceeds 2 BAND, and Fejer's first rule
+   * is exact to degree LATITUDES - 1 in z, which is at least 2 BAND. */
   double mean = 0;
   for (int j = 0; j < LATITUDES; ++j) {
     const double turn = 3.14159265358979323846 * (2 * j + 1) / (2.0 * LATITUDES);
@@ -268,7 +267,7 @@ TEST(test_compare_create_surface_without_area_refused) {
   fixture_destroy(f);
 }
 
-/* Return x + matrix x + shift for each vertex x (malloc). */
+/* Return the position x + matrix x + shift of each vertex x of the basis (malloc). */
 static float *moved(const fixture *f, const double matrix[3][3], const double shift[3]) {
   float *xyz = malloc(3 * f->vertices * sizeof *xyz);
   assert_non_null(xyz);
@@ -314,8 +313,8 @@ TEST(test_slabs_reference_volumes_sum_to_lung_volume) {
   unmake(&m);
 }
 
-/* Slabs across the axis of a bipyramid with a level ring of corners. The part within a distance z
- * of a tip has (z / h)^3 of the volume of one pyramid, whose height is h. */
+/* Cut a bipyramid of height 2 h into horizontal slabs. The part within a distance z of either tip,
+ * up to h, has the share (z / h)^3 of half the volume. */
 TEST(test_slabs_bipyramid_volumes_grow_with_cube_of_height) {
   fixture *f = fixture_create(602, 3, 2, 1, false, true, 2, 8);
   for (size_t i = 0; i < 600; ++i) {
@@ -344,12 +343,12 @@ TEST(test_slabs_bipyramid_volumes_grow_with_cube_of_height) {
   fixture_destroy(f);
 }
 
-/* The displacement x -> x + M x + shift multiplies the volume of every slab by det(I + M). */
+/* Displacing every point x by M x + shift multiplies the volume of each slab by det(I + M). */
 TEST(test_slabs_affine_displacement_gains_equal_determinant) {
   static const double matrices[][3][3] = {
-      {{0}},                                        /* only the shift */
-      {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* an expansion */
-      {{-0.2, -0.6, 0}, {0.6, -0.2, 0}, {0, 0, 0}}, /* a rotation */
+      {{0}},                                        /* M = 0 */
+      {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}},      /* I + M expands by 10 % */
+      {{-0.2, -0.6, 0}, {0.6, -0.2, 0}, {0, 0, 0}}, /* I + M is a rotation */
       {{0.04, 0.08, -0.3}, {0.02, -0.06, 0.05}, {-0.09, 0.01, 0.07}}};
   static const double shift[3] = {1.7, -2.9, 3.3};
   made m = make(902, 4, 2, 2, false, true);
@@ -368,7 +367,7 @@ TEST(test_slabs_affine_displacement_gains_equal_determinant) {
       double g[3];
       random_direction(&random, g);
       assert_int_equal(supine_compare_slabs(m.basis, g, NULL, xyz, SLABS, slabs, NULL), SUPINE_OK);
-      /* The tolerance, mL, covers the rounding of float positions; a slab has about 100 mL. */
+      /* A slab has about 100 mL. The tolerance, mL, is for the rounding of positions to float. */
       for (size_t s = 0; s < 2 * SLABS; ++s) {
         assert_close(slabs[s].gain, (determinant - 1) * slabs[s].volume, 1e-3);
       }
@@ -398,7 +397,7 @@ TEST(test_slabs_random_gravity_gains_sum_to_exact_volume) {
         gain += slabs[lung * SLABS + s].gain;
       }
       assert_close(gain, posed_lung_volume(m.basis, lung, weights, scales[lung]),
-                   1e-3); /* tolerance in mL, for float positions */
+                   1e-3); /* tolerance, mL, for rounding to float */
     }
   }
   free(xyz);

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Compile the C# example of BINDINGS.md, deform a basis with it, and compare the bytes with the C library:
+# Compile the C# example of BINDINGS.md, deform a basis with it, and compare the positions with those of the C library:
 #
 #     test_csharp.sh SOURCE_FOLDER LIBRARY SUPINE CC MCS MONO
 set -eu
@@ -12,7 +12,7 @@ trap 'rm -r "$work"' EXIT
 "$cc" -I"$source/runtime/include" "$source/tests/python/reference.c" "$library" -o "$work/reference"
 export LD_LIBRARY_PATH="${library%/*}"
 "$work/reference" "$work/lungs.safetensors" prone:rest+500 "$work/expected"
-# The reference file has 15 floats for each vertex and begins with all positions.
+# The file of expected results has 60 bytes for each vertex. It begins with the positions of all vertices.
 vertices=$(($(wc -c <"$work/expected") / 60))
 {
   echo 'using System; using System.IO; using System.Runtime.InteropServices; static class Test {'

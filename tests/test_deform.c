@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare positions, for every storage and instruction set, with double precision. */
+/* Compare positions with double precision, for every storage and every instruction set. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -26,7 +26,7 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Open the basis; return NULL if this processor lacks the instruction set. */
+/* Open the basis. Return NULL if this processor lacks the instruction set. */
 static supine_basis *open_as(const opened *o, supine_storage storage, supine_simd simd) {
   const supine_basis_options options = {sizeof options, .storage = storage, .simd = simd};
   supine_basis *basis = NULL;
@@ -52,8 +52,8 @@ static void random_frame(const supine_basis *basis, uint64_t *random, double *we
   }
 }
 
-/* Return the largest distance, mm, between positions in xyz and in `exact` of the vertices begin <=
- * i < end. The first vertex in xyz is `begin`. */
+/* Return the largest distance, mm, of the vertices begin <= i < end in `xyz` from their positions
+ * in `exact`. `xyz` holds only these vertices, `exact` holds all. */
 static double farthest(const float *xyz, const double *exact, size_t begin, size_t end) {
   double top = 0;
   for (size_t i = begin; i < end; ++i) {
@@ -68,7 +68,7 @@ static double farthest(const float *xyz, const double *exact, size_t begin, size
   return sqrt(top);
 }
 
-/* Assert for every storage and instruction set that the error is within its stated bound. */
+/* Assert that positions err by at most supine_basis_error. */
 static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool vector,
                             uint64_t seed) {
   opened o = made(fixture_create(vertices, modes, 3, lungs, vector, false, 11, seed));
@@ -88,10 +88,11 @@ static void check_all_paths(size_t vertices, size_t modes, size_t lungs, bool ve
       supine_deform(basis, POSED(basis, weights, scales), xyz);
       const double error = farthest(xyz, exact, 0, vertices);
       if (!(error <= supine_basis_error(basis, POSED(basis, weights, scales)))) {
-        fail_msg("%zu vertices, %zu modes, %zu lungs, storage %d, instruction set %d: error %g mm, "
-                 "stated %g mm",
-                 vertices, modes, lungs, storage, simd, error,
-                 supine_basis_error(basis, POSED(basis, weights, scales)));
+        fail_msg(
+            "%zu vertices, %zu modes, %zu lungs, storage %d, instruction set %d: positions err by "
+            "%g mm, more than the bound of %g mm",
+            vertices, modes, lungs, storage, simd, error,
+            supine_basis_error(basis, POSED(basis, weights, scales)));
       }
       supine_basis_close(basis);
     }
@@ -123,7 +124,7 @@ TEST(test_deform_every_mode_count_within_stated_error) {
   }
 }
 
-/* The stated bound is at most 30 times the largest error of many frames. */
+/* supine_basis_error is at most 30 times the largest error of 20 random poses. */
 TEST(test_basis_error_many_frames_bound_at_most_30_times_error) {
   opened o = made(fixture_create(3000, 16, 3, 2, false, false, 11, 5));
   double *exact = fixture_allocate(3 * 3000, sizeof *exact);
@@ -151,7 +152,7 @@ TEST(test_basis_error_many_frames_bound_at_most_30_times_error) {
   drop(&o);
 }
 
-/* The stated error does not depend on which coordinate of gravity sets the weight of a mode. */
+/* The storage error is the same whether a weight depends on the x, the y or the z of gravity. */
 TEST(test_storage_error_mode_along_any_axis_same) {
   double error[3];
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -187,18 +188,17 @@ TEST(test_storage_error_exact_below_int16_below_mixed) {
     supine_basis_close(basis);
   }
   assert_true(error[SUPINE_STORAGE_EXACT] < error[SUPINE_STORAGE_INT16]);
-  /* 4 bytes for each of 16 coefficients, 12 for the position and 12 for the direction */
+  /* 4 bytes for each of the 16 coefficients, 12 for the position, 12 for the direction */
   assert_true(bytes[SUPINE_STORAGE_EXACT] == 88);
-  /* 2 bytes for each coefficient, 8 for the position and 8 for the direction */
+  /* 2 bytes for each of the 16 coefficients, 8 for the position, 8 for the direction */
   assert_true(bytes[SUPINE_STORAGE_INT16] == 48);
   assert_true(error[SUPINE_STORAGE_INT16] < error[SUPINE_STORAGE_MIXED]);
-  /* seven 4-byte words (five with two coefficients, two with three), 8 bytes for the position and 8
-   * for the direction */
+  /* seven 4-byte words for 16 coefficients, 8 bytes for the position, 8 for the direction */
   assert_true(bytes[SUPINE_STORAGE_MIXED] == 44);
   drop(&o);
 }
 
-/* The mixed storage is chosen if the last modes have small amplitudes, like those of real lungs. */
+/* If the last modes have small amplitudes, as in real lungs, they get fewer bits by default. */
 TEST(test_storage_auto_small_last_modes_chooses_mixed) {
   fixture *f = fixture_create(500, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < (size_t)500 * 16; ++i) {
@@ -212,7 +212,7 @@ TEST(test_storage_auto_small_last_modes_chooses_mixed) {
   drop(&o);
 }
 
-/* Numbers just below 2^30 give finite bounds; a file with 2^30 is refused. */
+/* Numbers just below 2^30 give finite error bounds. A file with the number 2^30 is refused. */
 TEST(test_storage_error_largest_numbers_finite) {
   fixture *f = fixture_create(50, 16, 3, 1, false, false, 11, 5);
   for (size_t i = 0; i < 3; ++i) {
@@ -233,7 +233,6 @@ TEST(test_storage_error_largest_numbers_finite) {
   drop(&o);
 }
 
-/* Assert that an explicit request for the storage chosen automatically states the same error. */
 static void check_stated_error(const opened *o, const supine_basis *chosen) {
   const supine_basis_info *info = supine_basis_get_info(chosen);
   supine_basis *basis = open_as(o, info->storage, SUPINE_SIMD_AUTO);
@@ -250,7 +249,7 @@ TEST(test_storage_auto_distant_vertex_chooses_exact) {
   check_stated_error(&o, basis);
   supine_basis_close(basis);
   free(o.bytes);
-  f->vertex[0] = 1e6F; /* a vertex 1 km away makes stored positions coarse */
+  f->vertex[0] = 1e6F; /* 1 km away, which makes 16-bit positions coarse */
   o = made(f);
   basis = open_as(&o, SUPINE_STORAGE_AUTO, SUPINE_SIMD_AUTO);
   assert_int_equal(supine_basis_get_info(basis)->storage, SUPINE_STORAGE_EXACT);
@@ -274,8 +273,8 @@ TEST(test_open_bad_options_refused) {
   drop(&o);
 }
 
-/* Assert that any range of vertices, stored at any alignment, has the same bits as in one call for
- * all vertices, and that nothing beyond the range is written. */
+/* Assert that positions of any range of vertices, written at any alignment, have the same bits as
+ * in one call for all vertices, and that nothing outside the range is written. */
 static void check_ranges(size_t vertices, size_t modes, size_t lungs, supine_simd simd,
                          int trials) {
   opened o = made(fixture_create(vertices, modes, 1, lungs, false, false, 11, 8));
@@ -377,7 +376,7 @@ TEST(test_step_many_steps_reach_final_positions) {
     supine_step(100, step, xyz);
   }
   fixture_deform(o.f, weights, scales, exact);
-  /* Each step rounds each coordinate by at most 2^-24 of 512 mm; 1.8 is more than sqrt(3). */
+  /* Each step rounds three coordinates by at most 2^-24 of 512 mm. 1.8 exceeds sqrt(3). */
   const double drift = STEPS * 0x1p-24 * 512 * 1.8;
   assert_true(farthest(xyz, exact, 0, 100) <=
               supine_basis_error(basis, POSED(basis, weights, scales)) + drift);
@@ -412,8 +411,8 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
         const double error = farthest(xyz + 3 * j * (end - begin), exact, begin, end);
         if (!(error <=
               supine_basis_error(basis, POSED(basis, weights + j * modes, scales + 2 * j)))) {
-          fail_msg("orientation %zu, storage %d, instruction set %d: error %g mm", j, storage, simd,
-                   error);
+          fail_msg("orientation %zu, storage %d, instruction set %d: positions err by %g mm", j,
+                   storage, simd, error);
         }
       }
       supine_basis_close(basis);
@@ -429,8 +428,8 @@ static void check_batch(size_t vertices, size_t modes, bool vector, size_t count
 TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(700, 16, false, 64, 0, 700);
   check_batch(700, 16, false, 1, 3, 691);
-  check_batch(24000, 16, false, 64, 0, 24000); /* output exceeds the cache; whole cache lines */
-  check_batch(23999, 16, false, 64, 1, 23998); /* orientations share cache lines */
+  check_batch(24000, 16, false, 64, 0, 24000); /* the output exceeds the cache */
+  check_batch(23999, 16, false, 64, 1, 23998); /* adjacent orientations share cache lines */
   check_batch(90, 16, false, 300, 0, 90);
   check_batch(90, 3, false, 5, 17, 60);
   check_batch(90, 3, false, 5, 17, 18);
@@ -439,7 +438,7 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(90, 256, true, 3, 1, 90);
 }
 
-/* Five modes need two vec4s of weights. Their three unused slots become 0, whatever they held. */
+/* The weights of five modes leave three components of two vec4s, which are set to 0. */
 TEST(test_gl_weights_unused_slots_zero) {
   enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, false, false, 11, 8));
@@ -501,7 +500,7 @@ TEST(test_normals_bipyramid_area_weighted) {
       assert_true(fabs((double)normals[3 * i + axis] - s[axis] / length) <= 64 * 0x1p-24);
     }
   }
-  /* Normals point outwards: the normal of the upper tip points up. */
+  /* The normal at the upper tip points up, so normals point outwards. */
   assert_true(normals[3 * 39 + 2] > 0.9F);
   /* The normals of a surface shrunk to a point are 0. */
   float point[120] = {0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Normals computed from modes equal their formula in double precision. */
+/* Normals computed from modes equal the defining formula, evaluated in double precision. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -10,11 +10,11 @@
 
 enum { VERTICES = 211, MODES = 5, BATCH = 3 };
 
-/* Bound on the rounding error of a sum of up to 66 products and of a square root. */
+/* Bound on the relative rounding error of a sum of up to 66 products, divided by a square root. */
 static const double rounding = 66 * 0x1p-23;
 
-/* Return the error from packing the numbers of a mode, in counts of the file. It is half a step.
- * The first third of the modes is packed in 13 bits, the second in 10 and the last in 9. */
+/* Return the largest error from packing the numbers of a mode in fewer bits, in units of the 16-bit
+ * numbers of the file. The first third of the modes gets 13 bits, the second 10 and the last 9. */
 static double packed_error(size_t mode, size_t modes) {
   static const double bits[] = {13, 10, 9};
   const double limit = 256.0 / 255 * INT16_MAX;
@@ -35,7 +35,7 @@ static opened open_lit(size_t normals, supine_simd simd) {
   uint64_t random = 17;
   if (normals > 0) {
     fixture_add_normals(o.f, normals, 5);
-    /* Vertex 40 has the normal 0, like a vertex without triangles. */
+    /* gives vertex 40 the normal 0, like a vertex without triangles */
     memset(o.f->normal + 3 * normals * 40, 0, 3 * normals * sizeof *o.f->normal);
   }
   o.bytes = fixture_bytes(o.f, &size);
@@ -58,8 +58,8 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Compute the weights v [Q] of a lung's modes of normals. They are quadratic forms of s w: the gain
- * s times the weights w of the modes of displacement. */
+/* Compute the weights v [Q] of a lung's Q modes of normals, as polynomials of degree 2 in s w. Here
+ * w are the weights of the displacement modes, and s is the gain. */
 static void expected_weights(const fixture *f, size_t lung, const double *w, double s, double *v) {
   const size_t terms = (MODES + 1) * (MODES + 2) / 2;
   for (size_t j = 0; j < f->normals; ++j) {
@@ -78,7 +78,7 @@ static void expected_weights(const fixture *f, size_t lung, const double *w, dou
   }
 }
 
-/* Compute the normal n of vertex i. Return a bound on its error along each axis. */
+/* Compute the unit normal n of vertex i. Return a bound on the error of each coordinate. */
 static double expected_normal(const fixture *f, size_t i, const double *w, const double *s,
                               double *n) {
   double off = 0;
@@ -178,8 +178,8 @@ TEST(test_deform_lit_without_normals_refused) {
   assert_int_equal(supine_deform_lit(basis, POSED(basis, o.weights, o.scales), xyz, xyz),
                    SUPINE_ERROR_UNSUPPORTED);
   supine_basis_close(basis);
-  /* A program built before this option existed passes a smaller size. No bytes beyond that size are
-   * read. */
+  /* A program built before the option without_normals existed passes a smaller size. The library
+   * must not read beyond that size. */
   options.size = offsetof(supine_basis_options, without_normals);
   assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);
   assert_int_equal(supine_basis_get_info(basis)->normal_count, 8);
@@ -206,7 +206,7 @@ TEST(test_open_bad_normals_refused) {
   f->normal_weight[5] = (double)NAN;
   assert_int_equal(open_status(f), SUPINE_ERROR_FORMAT);
   f->normal_weight[5] = 0;
-  f->normals = 3; /* fewer modes of normals */
+  f->normals = 3;
   assert_int_equal(open_status(f), SUPINE_OK);
   free(f->normal);
   free(f->normal_weight);

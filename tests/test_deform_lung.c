@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The positions of a real lung with 16 harmonics are within the stated error, in every storage and
- * instruction set. */
+/* Test that positions of a real lung with 16 harmonics err by at most the stated bound. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -9,7 +8,7 @@
 
 #include "lungs_helpers.h"
 
-/* Compute the positions of a pose in double precision from the numbers in the file. */
+/* Compute positions in a pose in double precision, from the coefficients in the file. */
 static void deform_exactly(const supine_basis_info *info, const supine_pose *pose, double *xyz) {
   for (size_t i = 0; i < info->vertex_count; ++i) {
     double amount = 0.0;

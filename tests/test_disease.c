@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lesions and collapse: changes in the affected tissue and elsewhere. */
+/* Test how lesions and collapse change displacements in the diseased tissue and elsewhere. */
 #include <float.h>
 
 #include "precompute/lungs/disease.h"
@@ -12,10 +12,10 @@
 static const char *const real_names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
 static const double supine[3] = {0.0, 1.0, 0.0};
 
-static supine_model model; /* model of the current test */
+static supine_model model;
 
-/* Return a factor of 1 for each vertex (malloc), and make the model use these factors. Lesions
- * added later multiply them. */
+/* Return stiffness factors of 1 for all vertices (malloc), and make `model` use them. A lesion
+ * added later multiplies these factors. */
 static double *no_lesions(const supine_lungs *lungs) {
   double *factors = malloc(lungs->mesh.vertex_count * sizeof *factors);
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -47,7 +47,7 @@ static double distance(const double *p, const double *q) {
   return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
 }
 
-/* Return the outermost vertex of the left lung. */
+/* Return the vertex of the left lung that is farthest to the left. */
 static const double *side_of(const supine_lungs *lungs) {
   size_t found = 0;
   for (size_t i = 0; i < lungs->mesh.vertex_count; ++i) {
@@ -58,8 +58,8 @@ static const double *side_of(const supine_lungs *lungs) {
 
 /* Smallest and largest ratio of the displacement with a lesion to the displacement without it. */
 typedef struct change {
-  double inside[2]; /* within half the radius of the lesion */
-  double far[2];    /* more than 50 mm from the edge of the lesion */
+  double inside[2]; /* at most half a radius from the centre of the lesion */
+  double far[2];    /* more than 50 mm outside the lesion */
 } change;
 
 static void widen(double range[2], double value) {
@@ -67,8 +67,8 @@ static void widen(double range[2], double value) {
   range[1] = fmax(range[1], value);
 }
 
-/* Compare a breath with the lesion to a breath without it. Both have `volume` mL; if `volume` is 0,
- * both have a scale of 1. */
+/* Compare the displacements in a breath with and without the lesion. If `volume` is above 0, both
+ * breaths inhale that volume, mL. If it is 0, the displacements are not scaled. */
 static change change_by(const supine_lungs *lungs, const supine_lesion *lesion, double volume) {
   supine_solution healthy = solve(lungs, supine);
   double *factors = no_lesions(lungs);
@@ -107,22 +107,22 @@ static void check_lesions(const supine_lungs *lungs) {
       const supine_lesion lesion = {{side[0] - 8.0, side[1], side[2]}, 25.0, factors[f]};
       const change scaled = change_by(lungs, &lesion, 0.0);
       const change breathed = change_by(lungs, &lesion, 500.0);
-      printf(
-          "reach %2g mm, factor %2g: displacement with the lesion divided by displacement without "
-          "it: inside %.3f to %.3f; 50 mm away %.6f to %.6f at the same scale, "
-          "%.6f to %.6f at 500 mL\n",
-          model.reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0], scaled.far[1],
-          breathed.far[0], breathed.far[1]);
+      printf("reach %2g mm, stiffness factor %2g: displacement with the lesion divided by "
+             "displacement "
+             "without the lesion: inside %.3f to %.3f; 50 mm away %.6f to %.6f if not scaled, "
+             "%.6f to %.6f if both inhale 500 mL\n",
+             model.reach, factors[f], scaled.inside[0], scaled.inside[1], scaled.far[0],
+             scaled.far[1], breathed.far[0], breathed.far[1]);
       assert_true(scaled.inside[1] < 0.9);
       assert_true(breathed.inside[1] < 0.9);
       assert_true(scaled.far[0] > 0.99 && scaled.far[1] < 1.01);
-      /* At a given volume, all tissue far from the lesion moves more, by one factor, to make up for
-       * the volume that the lesion does not gain. */
+      /* A stiff lesion gains less volume. To inhale the same volume, all tissue far from the lesion
+       * must move more, by the same factor everywhere. */
       assert_close(breathed.far[1] / breathed.far[0], scaled.far[1] / scaled.far[0], 1e-9);
       const supine_lesion small = {{side[0] - 8.0, side[1], side[2]}, 18.0, factors[f]};
       const change by_small = change_by(lungs, &small, 500.0);
-      printf("  with a radius of 18 mm: 50 mm away %.6f to %.6f at 500 mL\n", by_small.far[0],
-             by_small.far[1]);
+      printf("  lesion with a radius of 18 mm: 50 mm away %.6f to %.6f if both inhale 500 mL\n",
+             by_small.far[0], by_small.far[1]);
       assert_true(by_small.inside[1] < 0.9);
       assert_true(by_small.far[0] > 0.99 && by_small.far[1] < 1.01);
     }
@@ -142,8 +142,8 @@ TEST(test_lesion_in_real_lungs_changes_only_its_region) {
   supine_lungs_free(&lungs);
 }
 
-/* A large lesion does not change the other lung, because the scaling of the stiffness E to
- * geometric mean 1 ignores lesions. */
+/* A large lesion in one lung does not change the other lung, because the stiffness of all tissue is
+ * divided by its geometric mean before the factors of lesions are applied. */
 TEST(test_lesion_large_other_lung_unchanged) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
@@ -153,7 +153,7 @@ TEST(test_lesion_large_other_lung_unchanged) {
   size_t reached = 0;
   double *factors = no_lesions(&lungs);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, &reached, NULL), SUPINE_OK);
-  assert_true(20 * reached > lungs.mesh.vertex_count); /* more than 5 % of the vertices */
+  assert_true(20 * reached > lungs.mesh.vertex_count);
   supine_solution ill = solve(&lungs, supine);
   for (size_t i = lungs.lung_begin[1]; i < lungs.lung_begin[2]; ++i) {
     assert_true(fabs(ill.catch_[i] - healthy.catch_[i]) <= 1e-12 * healthy.catch_[i] + 1e-14);
@@ -188,8 +188,7 @@ TEST(test_lesion_factors_any_distance_follow_documented_profile) {
   const supine_lesion lesion = {{centre[0], centre[1], centre[2]}, 50.0, 7.0};
   double *factors = no_lesions(&lungs);
   assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
-  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL),
-                   SUPINE_OK); /* a second lesion multiplies the factors */
+  assert_int_equal(supine_tissue_add_lesion(&lungs, &lesion, factors, NULL, NULL), SUPINE_OK);
   size_t seen[3] = {0, 0, 0};
   for (size_t i = 0; i < lungs.mesh.vertex_count; ++i) {
     const double r = distance(lungs.mesh.vertices + 3 * i, centre) / 50.0;
@@ -237,7 +236,7 @@ TEST(test_lesion_bad_numbers_refused) {
                                       {{0, 0, 0}, 10, -3},      {{0, 0, 0}, 10, NAN}};
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     supine_error error = {0};
-    double *factors = NULL; /* bad numbers are refused before the factors are read */
+    double *factors = NULL; /* an invalid lesion is refused before `factors` is read */
     assert_int_equal(supine_tissue_add_lesion(&lungs, &bad[i], factors, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, "lesion at");
@@ -245,7 +244,7 @@ TEST(test_lesion_bad_numbers_refused) {
   supine_lungs_free(&lungs);
 }
 
-/* Return the volume of one lung of a surface, mL. */
+/* Return the volume of one lung, mL, with vertices at these positions. */
 static double volume_of(const supine_lungs *lungs, size_t lung, double *vertices) {
   const supine_mesh part = {lungs->mesh.vertex_count, vertices,
                             lungs->triangle_begin[lung + 1] - lungs->triangle_begin[lung],
@@ -293,8 +292,8 @@ TEST(test_collapse_any_direction_volume_and_breath_scaled) {
   supine_lungs_free(&lungs);
 }
 
-/* A collapsed lung has shrunk towards a fixed point: the mean of its vertices in the quarter of its
- * width nearest the midline. */
+/* A collapsed lung has shrunk towards a fixed point. This point is the mean of the vertices in the
+ * innermost quarter of the lung's width. */
 TEST(test_collapse_fixed_point_at_hilum) {
   model = supine_physics_model(SUPINE_LAW_PAPER);
   supine_lungs lungs = lumps();
@@ -354,7 +353,7 @@ TEST(test_collapse_real_lung_shrinks_towards_midline) {
     outer[0] = fmin(outer[0], lungs.mesh.vertices[3 * i]);
     outer[1] = fmin(outer[1], collapsed[3 * i]);
   }
-  assert_true(outer[1] > outer[0] + 20.0); /* mm, from the chest wall to the collapsed lung */
+  assert_true(outer[1] > outer[0] + 20.0); /* mm between the chest wall and the collapsed lung */
   free(collapsed);
   supine_lungs_free(&lungs);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare the equilibrium with its definition and with the paper's iteration. */
+/* Compare the equilibrium with its equations and with the iteration of [Santhanam2008]. */
 
 #include "precompute/physics/equilibrium.h"
 #include "test.h"
@@ -12,8 +12,8 @@
 typedef struct fixture {
   supine_mesh mesh;
   supine_topology topology;
-  double *stiffness; /* [N], with a geometric mean far from 1 */
-  double *force;     /* [N, 3] three applied forces, one in each column */
+  double *stiffness; /* [N] with a geometric mean far from 1 */
+  double *force;     /* [N, 3] one applied force in each column */
 } fixture;
 
 static int setup(void **state) {
@@ -60,8 +60,7 @@ static double *solve_of(const fixture *f, const double *stiffness, size_t count)
   return out;
 }
 
-/* Return the stiffness scaled to geometric mean 1, which supine_physics_equilibrium_set_stiffness
- * does internally (malloc). */
+/* Return the stiffness divided by its geometric mean (malloc). */
 static double *normalised(size_t count, const double *stiffness) {
   double *out = malloc(count * sizeof *out);
   double sum = 0.0;
@@ -74,7 +73,8 @@ static double *normalised(size_t count, const double *stiffness) {
   return out;
 }
 
-/* Compute the catch of the springs from that of the masses [N] by (8) and (12)-(14) (malloc). */
+/* Compute the catch (the force kept) of each spring from the catch of each mass [N] by (8) and
+ * (12)-(14) of [Santhanam2008] (malloc). */
 static double *spring_catch(const fixture *f, const double *masses) {
   const size_t edges = f->topology.edge_count;
   double *e = normalised(f->mesh.vertex_count, f->stiffness);
@@ -87,7 +87,6 @@ static double *spring_catch(const fixture *f, const double *masses) {
                                            p[3 * i + 2] - p[3 * j + 2]));
     const double spring = 0.5 * (e[i] + e[j]);
     const double z = spring + (1.0 / e[i] + 1.0 / e[j]) / d;
-    /* For a mass i, x_i / Z_i of [Santhanam2008] is E_i F_i. */
     springs[k] = spring / z * spring / d * (e[i] * masses[i] + e[j] * masses[j]);
   }
   free(e);
@@ -152,7 +151,7 @@ TEST(test_pitcher_catcher_forces_of_both_signs_equals_solve) {
   double *force = malloc(n * sizeof *force);
   double *fast = malloc(n * sizeof *fast);
   double *slow = malloc(n * sizeof *slow);
-  for (size_t i = 0; i < n; ++i) { /* forces of both signs */
+  for (size_t i = 0; i < n; ++i) {
     force[i] = f->force[3 * i] - 0.4;
   }
   double last[2] = {0.0, INFINITY};
@@ -168,7 +167,8 @@ TEST(test_pitcher_catcher_forces_of_both_signs_equals_solve) {
   free(slow);
 }
 
-/* Columns of the transfer matrix T are not negative, and T[i, j] E_i^2 = T[j, i] E_j^2. */
+/* The matrix T, from applied forces to the forces that masses keep, has no negative entry. For the
+ * stiffness E it is reciprocal: T[i, j] E_i^2 = T[j, i] E_j^2. */
 TEST(test_transfer_column_two_vertices_reciprocal) {
   const fixture *f = *state;
   const size_t n = f->mesh.vertex_count;
@@ -200,7 +200,7 @@ TEST(test_transfer_column_all_vertices_superpose_to_solution) {
   double *column = malloc(n * sizeof *column);
   double *sum = calloc(n, sizeof *sum);
   double *whole = solve_of(f, f->stiffness, 3);
-  for (size_t j = 0; j < n; ++j) { /* the catch is F = T f by (2) */
+  for (size_t j = 0; j < n; ++j) { /* by (2), columns times forces add up to the solution */
     assert_int_equal(supine_physics_transfer_column(eq, j, column, NULL), SUPINE_OK);
     for (size_t i = 0; i < n; ++i) {
       sum[i] += column[i] * f->force[3 * j + 1];
@@ -215,8 +215,8 @@ TEST(test_transfer_column_all_vertices_superpose_to_solution) {
   free(whole);
 }
 
-/* A large surface is factorised again by each solve. A second solve, which overwrites the force
- * with the solution, gives the same bits. */
+/* For a large surface, each solve factorises the matrix again. A second solve gives the same bits,
+ * even if it stores the solution in the array of the force. */
 TEST(test_solve_large_surface_in_place_same_bits) {
   supine_mesh mesh = helper_lump(101, 60.0, 5);
   const size_t n = mesh.vertex_count;
@@ -265,14 +265,14 @@ TEST(test_solve_force_not_finite_numerical_error) {
   const fixture *f = *state;
   supine_equilibrium *eq = equilibrium_of(&f->mesh, &f->topology, f->stiffness);
   double *out = malloc(2 * f->mesh.vertex_count * sizeof *out);
-  double *force = calloc(2 * f->mesh.vertex_count, sizeof *force); /* [N, 2] */
+  double *force = calloc(2 * f->mesh.vertex_count, sizeof *force);
   supine_error error;
   for (size_t column = 0; column < 2; ++column) {
     force[6 + column] = NAN;
     assert_int_equal(supine_physics_equilibrium_solve(eq, 2, force, out, &error),
                      SUPINE_ERROR_NUMERICAL);
     assert_says(error.message, "residual");
-    force[6 + column] = 0.0; /* a force of 0 is valid */
+    force[6 + column] = 0.0;
   }
   assert_int_equal(supine_physics_equilibrium_solve(eq, 2, force, out, &error), SUPINE_OK);
   assert_close(helper_largest(2 * f->mesh.vertex_count, out), 0.0, 0.0);
@@ -281,8 +281,8 @@ TEST(test_solve_force_not_finite_numerical_error) {
   free(force);
 }
 
-/* Compare the solution for two real lungs with a direct solution of the unsymmetric equations over
- * all nodes. */
+/* Compare the solution for two real lungs with a direct solution of the original equations, whose
+ * unsymmetric matrix has a row for each mass and each spring. */
 static void check_real_lungs(const char *const *names, supine_axes axes) {
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 2, axes, &lungs)) {
@@ -308,7 +308,8 @@ static void check_real_lungs(const char *const *names, supine_axes axes) {
   supine_equilibrium *eq = equilibrium_of(&lungs.mesh, &lungs.topology, stiffness);
   assert_int_equal(supine_physics_equilibrium_solve(eq, 1, force, fast, NULL), SUPINE_OK);
   const double difference = helper_difference(n, x, fast) / helper_largest(n, x);
-  printf("%s: %zu vertices, difference from the direct solution %.1e\n", names[0], n, difference);
+  printf("%s: %zu vertices, relative difference from the direct solution %.1e\n", names[0], n,
+         difference);
   assert_true(difference <= 1e-10);
   supine_physics_equilibrium_destroy(eq);
   supine_lungs_free(&lungs);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability: regional laws, files, and the effect on displacement. */
+/* Test expandability: by region, from files, and how it changes displacements. */
 #include <float.h>
 
 #include "precompute/lungs/expandability.h"
@@ -112,8 +112,8 @@ TEST(test_expandability_load_binary_or_missing_file_refused) {
   assert_int_equal(supine_tissue_expandability_load("/tmp", 3, a, NULL), SUPINE_ERROR_READ);
 }
 
-/* Doubling the expandability everywhere changes nothing. Compared with uniform tissue, tissue of
- * high expandability moves more, and tissue of low expandability less. */
+/* Doubling the expandability of all tissue changes nothing. If it differs between regions,
+ * expandable tissue moves more than in a uniform lung, and stiff tissue moves less. */
 TEST(test_solve_uneven_expandability_expandable_tissue_moves_more) {
   const size_t n = lungs.mesh.vertex_count;
   const double g[3] = {0.0, 1.0, 0.0};
@@ -130,7 +130,7 @@ TEST(test_solve_uneven_expandability_expandable_tissue_moves_more) {
     }
     assert_int_equal(supine_physics_solve(&lungs, &model, g, &found[i], NULL), SUPINE_OK);
   }
-  /* Mean displacement divided by that of uniform tissue: near the apex, and near the base. */
+  /* mean ratio of a displacement to that in a uniform lung, near the apex and near the base */
   double ends[2] = {0.0, 0.0};
   double count[2] = {0.0, 0.0};
   for (size_t i = 0; i < n; ++i) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Morph targets of a basis, and glTF files. */
+/* Test glTF files made from a basis, and their morph targets. */
 #include "test.h"
 
 #include <jansson.h>
@@ -44,8 +44,8 @@ static uint32_t word(const unsigned char *at) {
   return value;
 }
 
-/* Read the GLB file `out` and return its JSON. Set `bytes` to the file (malloc) and `numbers` to
- * its binary chunk. */
+/* Read the GLB file `out` and return its JSON. Set `bytes` to the content of the file (malloc) and
+ * `numbers` to the binary chunk within it. */
 static json_t *read_glb(unsigned char **bytes, const unsigned char **numbers) {
   size_t size = 0;
   *bytes = test_read(out, &size);
@@ -71,8 +71,8 @@ static size_t number(const json_t *object, const char *key) {
   return (size_t)json_integer_value(json_object_get(object, key));
 }
 
-/* Return coordinate `axis` of element i of an accessor. Assert that it is within the accessor's
- * stated range. */
+/* Return coordinate `axis` of element i of a glTF accessor. Assert that the coordinate is between
+ * the accessor's min and max. */
 static double component(const json_t *root, const unsigned char *numbers, size_t accessor, size_t i,
                         size_t axis) {
   const json_t *a = json_array_get(json_object_get(root, "accessors"), accessor);
@@ -99,8 +99,8 @@ static double real(const json_t *object, const char *key, size_t index) {
   return json_number_value(child(object, key, index));
 }
 
-/* Assert that morphing with the weights that `extras` describe gives the positions of the library.
- * Each lung has a gain s, and a gain t for the targets of the bend. */
+/* Assert that morph weights by the formula in `extras` give the positions of supine_deform. Along
+ * axis a, lung i has the gain s[i] + t[i] * bend[a]. */
 static void check_pose(const supine_pose *given, const double s[2], const double t[2]) {
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
@@ -140,7 +140,6 @@ static void check_pose(const supine_pose *given, const double s[2], const double
   free(xyz);
 }
 
-/* With targets for the bend and gains for each lung, morphing gives the library's positions. */
 TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain"), 0);
   export_source source = {0};
@@ -161,8 +160,9 @@ TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
   supine_export_source_close(&source);
 }
 
-/* Weights are between 0 and 1 for any direction of gravity. Their range is that of sampled
- * directions, widened at each end by a fiftieth, because other directions may exceed it. */
+/* Morph weights are between 0 and 1 for any direction of gravity. They are scaled by the range of
+ * sampled directions, widened at either end by a fiftieth, because other directions may exceed the
+ * sampled range. */
 TEST(test_glb_weights_any_direction_between_0_and_1) {
   enum { TRIED = 4096 };
   export_source source = {0};
@@ -196,7 +196,6 @@ TEST(test_glb_weights_any_direction_between_0_and_1) {
   supine_export_source_close(&source);
 }
 
-/* Compressed arrays fill the file without gaps, and state their decoded size. */
 TEST(test_glb_compressed_views_fill_file_without_gaps) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   unsigned char *bytes = NULL;
@@ -245,7 +244,7 @@ TEST(test_glb_postures_one_animation_each) {
 TEST(test_glb_without_triangles_refused) {
   char path[256];
   (void)snprintf(path, sizeof path, "%s/points", folder);
-  fixture *f = fixture_create(4, 2, 1, 1, false, true, 5, 5); /* too few vertices for triangles */
+  fixture *f = fixture_create(4, 2, 1, 1, false, true, 5, 5); /* too small for triangles */
   fixture_write(f, path);
   fixture_destroy(f);
   assert_int_equal(EXPORT_RUN(text, path, "-o", out), 2);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The exported page: its tensors equal those of the basis, and its texts are escaped. */
+/* Test the exported HTML page: its tensors equal the basis, and its texts are escaped. */
 #include "test.h"
 
 #include <base64.h>
@@ -48,7 +48,7 @@ TEST(test_base64_write_rfc_4648_vectors_equal) {
   }
 }
 
-/* Return the page as a string (malloc). */
+/* Return the content of the page as a string (malloc). */
 static char *read_page(void) {
   return test_read(out, &(size_t){0});
 }
@@ -60,7 +60,7 @@ static int digit(char c) {
   return (int)(at - digits);
 }
 
-/* Return the bytes of a tensor of the page (malloc), and set their number. */
+/* Return the bytes of a tensor of the page (malloc), and set `size` to their number. */
 static unsigned char *take_bytes(const char *page, const char *name, size_t *size) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "id=\"tensor-%s\">", name);
@@ -104,7 +104,7 @@ static int16_t *take_rows(const char *page, const char *name, size_t rows, size_
   return counts;
 }
 
-/* Return a number, or the first number of a list, from the page's description of the basis. */
+/* Return the number called `name`, or the first number of the list called `name`, in the page. */
 static double number_of(const char *page, const char *name) {
   char tag[64];
   (void)snprintf(tag, sizeof tag, "&quot;%s&quot;:", name);
@@ -114,9 +114,9 @@ static double number_of(const char *page, const char *name) {
   return strtod(at + (*at == '['), NULL);
 }
 
-/* Assert that the page's positions and coefficients equal those of the basis to half a count. The
- * page has directions of unit length, and coefficients multiplied by the length of the basis's
- * directions. */
+/* Assert that positions and coefficients in the page are those of the basis, rounded to 16 bits. In
+ * the page, directions have unit length, and coefficients are multiplied by the length that the
+ * direction has in the basis. */
 static void check_motion(const char *page, const export_source *s, const uint32_t *order) {
   const size_t n = s->info->vertex_count;
   const size_t modes = s->info->mode_count;

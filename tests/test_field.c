@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Displacement fields on a grid: forward, inverse, and images warped by this program, plastimatch
- * and elastix. */
+/* Test displacement fields on a grid, their inverses, and images warped by three programs. */
 #include "folder.h"
 #include "inside_helpers.h"
 
@@ -14,8 +13,7 @@
 static supine_basis *surface;
 static supine_basis *grid;
 
-/* Weights of the affine, the quadratic and the wave mode. They displace points by up to about 20
- * mm. */
+/* Weights at which the modes of inside_helpers.h displace points by up to about 20 mm. */
 static const double weights[HELPER_MODES] = {0.5, 0.4, 0.0};
 static const double scales[2] = {1.0, 1.0};
 
@@ -64,7 +62,7 @@ static supine_field made_field(void) {
   return field;
 }
 
-/* Return the inverse field. Only the first call computes it, which takes some seconds. */
+/* Return the inverse field. Only the first call computes it, which takes seconds. */
 static const supine_field *made_inverse(void) {
   if (inverse_kept.nodes.values == NULL) {
     supine_field field = made_field();
@@ -79,8 +77,8 @@ static double size_of(const double v[3]) {
   return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-/* At grid nodes the field equals the displacement of the basis. Far outside the lungs it is 0.
- * Between nodes it is trilinear. */
+/* At grid nodes the field equals the displacement computed by the basis. Between nodes it is
+ * trilinear. Far outside the lungs it is 0. */
 TEST(test_field_at_nodes_and_cells_interpolates_basis) {
   supine_field field = made_field();
   const supine_basis_info *info = supine_basis_get_info(grid);
@@ -94,13 +92,13 @@ TEST(test_field_at_nodes_and_cells_interpolates_basis) {
     }
     supine_field_at(&field, p, u);
     for (size_t k = 0; k < 3; ++k) {
-      /* The tolerance, mm, covers positions rounded by up to 1e-5. */
+      /* The tolerance, mm, allows for the rounding of positions by up to 1e-5 mm. */
       assert_close(u[k], (double)moved[3 * i + k], 2e-5);
     }
   }
   const float *values = field.nodes.values;
   assert_true(values[0] == 0.0F && values[1] == 0.0F &&
-              values[2] == 0.0F); /* a corner of the grid, far outside */
+              values[2] == 0.0F); /* a corner, far outside the lungs */
   const size_t *n = field.nodes.size;
   const size_t at = n[0] / 4 + n[0] * (n[1] / 2 + n[1] * (n[2] / 2));
   double middle[3];
@@ -119,8 +117,8 @@ TEST(test_field_at_nodes_and_cells_interpolates_basis) {
   supine_field_free(&field);
 }
 
-/* If the scan is below full inflation, the field is measured from the scan. It is 0 in the state of
- * the scan. In another state it equals the displacement of an embedded point. */
+/* A field has displacements from the scan, so it is 0 in the state of the scan. In another state it
+ * equals the displacement of an embedded point. */
 TEST(test_field_scan_below_full_measured_from_scan) {
   supine_inside_shells below;
   supine_inside_report report;
@@ -139,11 +137,11 @@ TEST(test_field_scan_below_full_measured_from_scan) {
   }
   assert_int_equal(supine_field_create(grid, &below.scan, 60.0, &field, &error), SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
-  for (size_t i = 0; i < 3 * count; ++i) { /* 0 except for rounding of float32 positions */
+  for (size_t i = 0; i < 3 * count; ++i) {
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_field_free(&field);
-  /* Embed, as a point, a node that is inside the lungs. */
+  /* Embed a point at a grid node that is inside the lungs. */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, scales), 60.0, &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
@@ -186,11 +184,11 @@ TEST(test_field_invert_residual_within_a_tenth_of_a_mm) {
   supine_field inverse;
   supine_field_residual residual;
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
-  print_message("residual of forward and inverse displacement: %.4f mm RMS, %.4f mm at most\n",
+  print_message("a point moved forth and back misses its start by %.4f mm RMS, %.4f mm at most\n",
                 residual.rms, residual.largest);
   assert_true(residual.largest <= 0.1);
   assert_true(residual.rms > 0.0 && residual.rms < residual.largest);
-  /* Between the nodes, the residual is at most 1.5 times the stated residual. */
+  /* Between nodes, moving a point forth and back may miss it by 1.5 times the largest residual. */
   const supine_basis_info *info = supine_basis_get_info(surface);
   uint64_t seed = 3;
   double largest = 0.0;
@@ -220,7 +218,7 @@ TEST(test_field_invert_residual_within_a_tenth_of_a_mm) {
   supine_field_free(&inverse);
 }
 
-/* Landmarks in the left lung, LPS, mm. */
+/* Positions of landmarks in the left lung, mm. */
 enum { LANDMARKS = 5 };
 static const double landmarks[LANDMARKS][3] = {{71.0, 3.0, -40.0},
                                                {90.0, 20.0, 10.0},
@@ -243,7 +241,7 @@ static supine_image ball_image(supine_image_voxel voxel) {
                          image.origin[2] + 2.0 * (double)(i / 11000)};
     for (int l = 0; l < LANDMARKS; ++l) {
       const double d[3] = {p[0] - landmarks[l][0], p[1] - landmarks[l][1], p[2] - landmarks[l][2]};
-      if (supine_dot(d, d) < 81.0) { /* labels 1 to 5, or a brightness */
+      if (supine_dot(d, d) < 81.0) {
         supine_image_put(&image, i, 1, &(double){voxel == SUPINE_VOXEL_U8 ? l + 1.0 : 1000.0});
       }
     }
@@ -251,8 +249,8 @@ static supine_image ball_image(supine_image_voxel voxel) {
   return image;
 }
 
-/* Compute the centroid c of the voxels within 14 mm of a point. If `label` is not 0, use only
- * voxels with this label; otherwise weight all by their brightness. */
+/* Compute the centroid c of the voxels within 14 mm of the position `about`. If `label` is above 0,
+ * use only voxels with that label. Otherwise weight the voxels by their brightness. */
 static void centroid(const supine_image *image, const double about[3], int label, double c[3]) {
   double sum = 0.0;
   c[0] = c[1] = c[2] = 0.0;
@@ -280,7 +278,7 @@ static void centroid(const supine_image *image, const double about[3], int label
   }
 }
 
-/* Embed the landmarks, and compute their positions in the deformed lungs. */
+/* Embed the landmarks as points, and compute their positions in the deformed lungs. */
 static void moved_landmarks(double out[LANDMARKS][3]) {
   static bool known;
   static double kept[LANDMARKS][3];
@@ -327,10 +325,11 @@ static void check_landmarks(const supine_image *image, bool labels) {
       way[k] = moved[l][k] - landmarks[l][k];
       c[k] -= moved[l][k];
     }
-    assert_true(size_of(way) > 4.0); /* every landmark moves */
+    assert_true(size_of(way) > 4.0); /* every landmark must move, or the test would prove nothing */
     largest = fmax(largest, size_of(c));
   }
-  print_message("landmarks off by %.2f mm at most\n", largest);
+  print_message("landmarks in the warped image are at most %.2f mm from the embedded points\n",
+                largest);
   assert_true(largest < 2.0);
 }
 
@@ -349,7 +348,7 @@ TEST(test_resample_landmarks_follow_embedded_points) {
   }
 }
 
-/* Return the depth of voxel i below the surface of the lungs, mm. */
+/* Return the depth of voxel i of the image below the surface of the lungs, mm. */
 static double depth_at(const supine_field *field, const supine_image *image, size_t i) {
   double p[3];
   double depth;
@@ -360,7 +359,7 @@ static double depth_at(const supine_field *field, const supine_image *image, siz
   return depth;
 }
 
-/* Return the mass within one label of a mask, g. */
+/* Return the mass, g, of the voxels of a CT image at which the mask has this label. */
 static double mass_of(const supine_image *image, const supine_image *mask, double label) {
   double sum = 0.0;
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
@@ -369,14 +368,14 @@ static double mass_of(const supine_image *image, const supine_image *mask, doubl
   return 1e-6 * sum * pow(image->step[0][0], 3.0);
 }
 
-/* Scaling the density keeps the mass within the warped mask of a lung constant to 1 %. Without
- * scaling, the mass of lungs in air changes by more than 5 %. The lungs have about -850 to -550 HU,
- * and are surrounded by air or by a chest wall of 40 HU. */
+/* If density is scaled by the change of volume, the mass within the warped mask of a lung changes
+ * by less than 1 %. If not, the mass of a lung in air changes by more than 5 %. The lungs have
+ * about -850 to -550 HU, a chest wall has 40 HU. */
 TEST(test_resample_scaled_density_keeps_mass) {
   supine_field field;
   supine_field inverse;
   supine_field_residual residual;
-  const double larger[2] = {-1.4, 1.2}; /* gains at which one lung inflates and one deflates */
+  const double larger[2] = {-1.4, 1.2}; /* one lung inflates, the other deflates */
   assert_int_equal(supine_field_create(grid, POSED(grid, weights, larger), 60.0, &field, NULL),
                    SUPINE_OK);
   assert_int_equal(supine_field_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
@@ -384,7 +383,7 @@ TEST(test_resample_scaled_density_keeps_mass) {
     for (int wall = 0; wall < 2; ++wall) {
       supine_image image = field.depth;
       supine_image mask = field.depth;
-      for (size_t a = 0; a < 3; ++a) { /* 2.5 mm voxels with centres between grid nodes */
+      for (size_t a = 0; a < 3; ++a) { /* 2.5 mm voxels, not centred on grid nodes */
         image.size[a] = (size_t)((double)field.depth.size[a] * 4.0 / 2.5) - 2;
         image.step[a][a] = 2.5;
         image.origin[a] += 1.1;
@@ -416,13 +415,14 @@ TEST(test_resample_scaled_density_keeps_mass) {
       const double before = mass_of(&image, &mask, lung + 1.0);
       const double after = mass_of(&scaled, &moved, lung + 1.0) / before - 1.0;
       const double unscaled = mass_of(&plain, &moved, lung + 1.0) / before - 1.0;
-      print_message("%s lung, %s: %.0f g, change %+.2f %% with scaled density, %+.1f %% without\n",
+      print_message("%s lung, %s: %.0f g; change of mass %+.2f %% with scaled density, %+.1f %% "
+                    "without scaling\n",
                     lung ? "right" : "left", wall ? "in the chest wall" : "in air", before,
                     100.0 * after, 100.0 * unscaled);
       assert_true(fabs(after) < 0.01);
       assert_true(wall || fabs(unscaled) > 0.05);
       size_t changed = 0;
-      /* Outside the mask, density is unchanged except at the mask's edge. */
+      /* Outside the mask, only voxels at its edge may change. */
       for (size_t i = 0; i < count && wall; ++i) {
         changed += supine_image_get(&moved, i) == 0.0 && supine_image_get(&scaled, i) != 40.0;
       }
@@ -438,14 +438,13 @@ TEST(test_resample_scaled_density_keeps_mass) {
   supine_field_free(&inverse);
 }
 
-/* Run `command`, with which another program warps the image balls.nrrd with the field v.nrrd into
- * warped.nrrd, and check the landmarks. Skip the test if `probe` fails, because the program is
- * missing. */
+/* Run `command`, by which another program warps balls.nrrd by the field v.nrrd to warped.nrrd, and
+ * check the result. If the command `probe` fails, skip the test. */
 static void check_warped_by(const char *probe, const char *command) {
   char text[512];
   (void)snprintf(text, sizeof text, "%s >/dev/null 2>&1", probe);
   if (system(text) != 0) { /* NOLINT(cert-env33-c) */
-    print_message("skipped: '%s' fails\n", probe);
+    print_message("skipped: the command '%s' fails\n", probe);
     skip();
   }
   supine_image image = ball_image(SUPINE_VOXEL_I16);
@@ -472,7 +471,7 @@ TEST(test_plastimatch_inverse_field_warps_landmarks) {
                   "--output-img warped.nrrd --output-type short >plastimatch.log 2>&1");
 }
 
-/* transformix of elastix takes the inverse field as a transform. */
+/* transformix, a program of elastix, takes the inverse field as a transform. */
 TEST(test_elastix_inverse_field_warps_landmarks) {
   FILE *file = fopen(in_folder("field.txt"), "wb");
   assert_non_null(file);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Displacement fields of another simulator: loading, fit, cross-validation, and refused input. */
+/* Test displacements of another simulator: loading, fit, cross-validation, refused input. */
 
 #include "folder.h"
 #include "precompute/fields.h"
@@ -33,7 +33,7 @@ static int teardown(void **state) {
   return folder_remove(state);
 }
 
-/* Solve the physics for random directions of gravity, and return the displacements. */
+/* Solve the equilibrium for `count` random directions of gravity, and return the displacements. */
 static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64_t seed,
                                     double soften) {
   const size_t n = of->mesh.vertex_count;
@@ -58,7 +58,7 @@ static supine_fields physics_fields(const supine_lungs *of, size_t count, uint64
   return fields;
 }
 
-/* Return random fields, limited to `band`, for the given directions of gravity. */
+/* Return displacements that are random sums of harmonics up to degree `band`. */
 static supine_fields band_limited_fields(size_t band, size_t count, const double *directions) {
   const size_t n = lungs.mesh.vertex_count;
   const size_t terms = supine_sh_count(band);
@@ -94,7 +94,7 @@ static void check_band_limited(const supine_fields *fields, size_t band) {
     fail_msg("%s", error.message);
   }
   assert_int_equal(report.band, band);
-  assert_true(report.accuracy.relative_rms < 1e-6); /* rounding of float coefficients */
+  assert_true(report.accuracy.relative_rms < 1e-6);
   assert_int_equal(field.vertex_count, 3 * fields->vertex_count);
   supine_projection_compression_free(&field);
 }
@@ -111,8 +111,7 @@ TEST(test_fit_band_limited_fields_recovered) {
   supine_fields_free(&fields);
 }
 
-/* The closed form of the leave-one-out error equals the error of refits that each omit one
- * direction. */
+/* The leave-one-out error in closed form equals the error of refits that omit one direction. */
 TEST(test_fit_leave_one_out_error_equals_refits) {
   enum { COUNT = 24, BAND = 2 };
   supine_fields fields = physics_fields(&lungs, COUNT, 99, 1.0);
@@ -158,8 +157,8 @@ TEST(test_fit_leave_one_out_error_equals_refits) {
   supine_fields_free(&fields);
 }
 
-/* Compare the stated error of a basis fitted to 60 random directions with its error in 40 other
- * directions. */
+/* Fit a basis to the displacements for 60 random directions of gravity. Compare the error that the
+ * fit reports with the error in 40 other directions. */
 static void check_stated_error(const supine_lungs *of, const char *what) {
   supine_fields fields = physics_fields(of, 60, 2008, 1.0);
   supine_fields others = physics_fields(of, 40, 1999, 1.0);
@@ -180,12 +179,12 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
   double field2 = 0.0;
   for (size_t d = 0; d < others.direction_count; ++d) {
     const double *g = others.directions + 3 * d;
-    /* At the default volume, the basis gives the fields unchanged. */
+    /* A state without a volume gives the fitted displacements, not scaled. */
     supine_state posture = {.gravity = {g[0], g[1], g[2]}};
     supine_pose pose;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_OK);
     supine_deform(basis, &pose, xyz);
-    posture.volume.kind = SUPINE_VOLUME_REST; /* a basis of fields has no volume at rest */
+    posture.volume.kind = SUPINE_VOLUME_REST; /* the other simulator gave no volume at rest */
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
     posture.volume.kind = SUPINE_VOLUME_FULL;
     assert_int_equal(supine_basis_pose(basis, &posture, &pose, NULL), SUPINE_ERROR_ARGUMENT);
@@ -197,9 +196,9 @@ static void check_stated_error(const supine_lungs *of, const char *what) {
     }
   }
   const double truth = sqrt(error2 / field2);
-  printf(
-      "%s, 60 directions, band %zu: stated error %.2f %%, error in 40 other directions %.2f %%\n",
-      what, report.band, 100.0 * report.accuracy.relative_rms, 100.0 * truth);
+  printf("%s, fitted to 60 directions with band %zu: reported error %.2f %%, error in 40 other "
+         "directions %.2f %%\n",
+         what, report.band, 100.0 * report.accuracy.relative_rms, 100.0 * truth);
   assert_true(report.accuracy.relative_rms > truth / 1.3333 &&
               report.accuracy.relative_rms < truth * 1.3333);
   free(xyz);
@@ -223,8 +222,9 @@ TEST(test_fit_real_lung_other_directions_error_as_stated) {
   supine_lungs_free(&real);
 }
 
-/* Fit the sum of band-1 fields, noise, and `amount` times band-2 fields. Set `band` to the band
- * chosen. Return the leave-one-out error of band 2 divided by that of band 1. */
+/* Fit the sum of displacements of band 1, noise, and `amount` times displacements of band 2. Set
+ * `band` to the band that the fit chooses. Return the leave-one-out error with band 2 divided by
+ * that with band 1. */
 static double gain_of_band_2(double amount, size_t *band) {
   enum { COUNT = 60 };
   double directions[3 * COUNT];
@@ -248,7 +248,7 @@ static double gain_of_band_2(double amount, size_t *band) {
   return report.error[2] / report.error[1];
 }
 
-/* Band 2 is chosen if it lowers the error by 1.5 %, but not if it lowers the error by 0.5 %. */
+/* The fit chooses band 2 if this lowers the error by 1.5 %, but not if by only 0.5 %. */
 TEST(test_fit_band_reducing_error_by_half_a_percent_not_chosen) {
   static const double wanted[] = {0.995, 0.985};
   for (size_t i = 0; i < 2; ++i) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The applied force (18) with its parts, heights, and the directions of displacement (15)-(17). */
+/* Test the applied force (18) of [Santhanam2008], heights, and directions (15)-(17). */
 #include <float.h>
 
 #include "precompute/physics/model.h"
@@ -52,7 +52,7 @@ TEST(test_height_range_random_directions_equals_brute_force) {
   }
 }
 
-/* Compute the force [N] for one direction of gravity, with heights from `low` to `high`. */
+/* Compute the force [N] for gravity g, along which the lungs extend from `low` to `high`. */
 static void force_along(const supine_lungs *lungs, const supine_force_law *law, const double g[3],
                         double low, double high, double *force) {
   const supine_gravities gravity = {1, g, &low, &high};
@@ -78,7 +78,7 @@ TEST(test_force_paper_law_equals_height_from_0_to_1) {
     least = fmin(least, down[i]);
     most = fmax(most, down[i]);
     assert_close(down[i], (height(lungs, g, i) - low) / (high - low), 4 * DBL_EPSILON);
-    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* -g turns a height h into 1 - h */
+    assert_close(down[i] + up[i], 1.0, 8 * DBL_EPSILON); /* opposite gravity: 1 - height */
   }
   assert_close(least, 0.0, 4 * DBL_EPSILON);
   assert_close(most, 1.0, 4 * DBL_EPSILON);
@@ -100,8 +100,8 @@ TEST(test_force_box_part_uses_box_coordinates) {
   free(force);
 }
 
-/* Softening multiplies the force by a factor of geometric mean 1. The logarithm of this factor
- * grows linearly with height. */
+/* Softening multiplies the force at each vertex by a factor. The factors have geometric mean 1, and
+ * their logarithm grows linearly with height. */
 TEST(test_force_softened_logarithm_linear_in_height) {
   const supine_lungs *lungs = *state;
   const size_t n = lungs->mesh.vertex_count;
@@ -123,8 +123,6 @@ TEST(test_force_softened_logarithm_linear_in_height) {
   free(force);
 }
 
-/* The force at selected vertices for several directions equals the force at all vertices for each
- * direction. */
 TEST(test_force_some_vertices_same_as_all) {
   const supine_lungs *lungs = *state;
   enum { COUNT = 5 };
@@ -153,8 +151,7 @@ TEST(test_force_some_vertices_same_as_all) {
 }
 
 TEST(test_directions_box_model_literal_values) {
-  /* A left lung 100 mm wide, 200 mm deep and 300 mm high. The midline is at its inner face, x =
-   * 10. */
+  /* A left lung 100 x 200 x 300 mm in size. The midline is its inner side, x = 10. */
   double vertices[] = {10, 0, 0, 110, 0, 0, 10, 200, 0, 10, 0, 300, 60, 100, 150};
   uint32_t triangles[] = {0, 1, 2, 0, 3, 1, 1, 3, 4, 1, 4, 2, 0, 2, 3, 2, 4, 3};
   const supine_mesh mesh = {5, vertices, 6, triangles};
@@ -165,16 +162,15 @@ TEST(test_directions_box_model_literal_values) {
   assert_close(lungs.midline, 10.0, 0.0);
   assert_int_equal(lungs.side[0], 1);
   assert_int_equal(supine_physics_directions(&lungs, &law, d, NULL), SUPINE_OK);
-  /* Vertex 1 has the box coordinates X = Y = Z = 1: outer side, front, base. */
+  /* vertex 1: at the outer side, front and base, so X = Y = Z = 1 */
   assert_close(d[3], 2.0, 1e-14);
   assert_close(d[4], -1.5, 1e-14);
   assert_close(d[5], -16.0, 1e-14);
-  /* No point of the back (Y = 0), the apex (Z = 0) or the midline (X = 0) moves perpendicular to
-   * that plane. */
+  /* a vertex at the back, the apex or the midline moves only within that plane */
   assert_close(d[7], 0.0, 0.0);
   assert_close(d[11], 0.0, 0.0);
   assert_close(d[0], 0.0, 0.0);
-  /* Vertex 4 has the box coordinates X = Y = Z = 1/2: 2 (1/2)^1.5, -1.5 (1/2), -16 (1/2)^1.4. */
+  /* vertex 4: X = Y = Z = 1/2, moved by 2 (1/2)^1.5, -1.5 (1/2), -16 (1/2)^1.4 */
   assert_close(d[12], 0.70710678118654752, 1e-14);
   assert_close(d[13], -0.75, 1e-14);
   assert_close(d[14], -6.0628662660415918, 1e-13);

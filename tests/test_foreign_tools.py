@@ -29,7 +29,7 @@ def run(*arguments):
 
 
 def read_nrrd(path):
-    """Return the vectors [k, j, i, 3] and the origin that the header states."""
+    """Return the vectors [k, j, i, 3] of a displacement field, and its origin."""
     import gzip
     data = open(path, "rb").read()
     head, body = data.split(b"\n\n", 1)
@@ -46,7 +46,7 @@ def close(name, a, b, tolerance):
 
 
 def plastimatch_stats(path):
-    """Return an array [3, 3]: minimum, mean and maximum (rows) of the three components."""
+    """Return the minimum, the mean and the maximum (three rows) of the x, y and z components (three columns)."""
     text = run("plastimatch", "stats", path)
     return numpy.array([[float(x) for x in re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text).groups()]
                         if re.search(rf"{word}:\s+(\S+)\s+(\S+)\s+(\S+)", text) else [numpy.nan] * 3
@@ -75,7 +75,7 @@ if shutil.which("plastimatch"):
     for ending in ("nrrd", "nii.gz", "mha"):
         close(f"plastimatch: f.{ending}", plastimatch_stats(f"f.{ending}"), wanted, 2e-3)
 
-# Warp images. One written as .mha is converted by plastimatch and then read by nibabel.
+# Images are warped by supine. plastimatch converts a warped .mha image, which nibabel then reads.
 size = (40, 36, 38)
 grid = numpy.indices(size).sum(0) % 7
 nibabel.save(nibabel.Nifti1Image(grid.astype(numpy.int16), numpy.diag([-10.0, -10.0, 10.0, 1.0])), "in.nii.gz")
@@ -101,7 +101,7 @@ if shutil.which("plastimatch"):
     close("plastimatch: image", numpy.asarray(back.dataobj), moved, 0)
     close("plastimatch: place", back.affine, nibabel.load("in-out.nii.gz").affine, 1e-3)
 
-# transformix of elastix takes a displacement field as a transform.
+# transformix, a program of elastix, takes a displacement field of supine as a transform.
 if shutil.which("transformix"):
     with open("t.txt", "w", encoding="utf-8") as file:
         file.write('(Transform "DeformationFieldTransform")\n(NumberOfParameters 0)\n'
@@ -122,7 +122,7 @@ if shutil.which("transformix"):
     went = re.search(r"OutputPoint = \[ (\S+) (\S+) (\S+) \]", text)
     close("transformix", [float(x) for x in went.groups()] if went else [numpy.nan] * 3, point + vectors[k, j, i], 1e-2)
 
-# Surfaces written by VTK are read in every encoding.
+# supine reads surfaces that VTK writes, in every encoding.
 try:
     import vtk
 except ImportError:
@@ -149,7 +149,7 @@ if vtk:
                     if not os.path.exists("v.ply") or open("v.ply", "rb").read() != open("wanted.ply", "rb").read():
                         faults.append(f"VTK's VTP, mode {mode}, header {header}, packed {packed}, encoded {encoded}")
 
-# Test a folder of TotalSegmentator masks, output to a pipe, and a file name that is not UTF-8.
+# supine reads a folder of TotalSegmentator masks, writes to a pipe, and accepts a file name that is not UTF-8.
 os.mkdir("segmentations")
 where = numpy.indices((58, 46, 40)).transpose(1, 2, 3, 0) * [5, 4, 6] + [-141.3, -85.7, -113.9]
 x, y, z = numpy.moveaxis(where, -1, 0)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The checks and repairs that every surface of lungs passes. */
+/* Test the checks and repairs of surfaces of lungs after loading. */
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/lungs/phantom.h"
@@ -11,7 +11,7 @@ static supine_mesh phantom(void) {
   return mesh;
 }
 
-/* Return the left lung, whose triangles come first. */
+/* Return the left lung of the phantom, whose vertices and triangles come first. */
 static supine_mesh left_lung(void) {
   supine_mesh mesh = phantom();
   mesh.triangle_count /= 2;
@@ -25,7 +25,7 @@ static void turn_triangle(supine_mesh *mesh, size_t t) {
   mesh->triangles[3 * t + 2] = second;
 }
 
-/* Transform the coordinates as if a file in these axes were read as LPS. */
+/* Convert the coordinates as if a file in these axes had been read as LPS. */
 static void misread(supine_mesh *mesh, supine_axes axes) {
   double matrix[3][3];
   supine_mesh_axes_matrix(axes, matrix);
@@ -41,8 +41,8 @@ static void misread(supine_mesh *mesh, supine_axes axes) {
   }
 }
 
-/* Append vertices and triangles. If `of_new`, the indices in the triangles are relative to the
- * first new vertex. */
+/* Append vertices and triangles. If `of_new`, the indices in `corner` count from the first appended
+ * vertex. */
 static void append(supine_mesh *mesh, size_t vertices, const double *at, size_t triangles,
                    const uint32_t *corner, bool of_new) {
   const size_t n = mesh->vertex_count;
@@ -98,7 +98,7 @@ TEST(test_axes_letters_all_48_round_trip) {
 TEST(test_axes_apply_letters_permute_and_flip) {
   supine_axes axes = SUPINE_AXES_AUTO;
   double p[3] = {1.5, -2.25, 4.0};
-  assert_true(supine_mesh_axes_parse("SRA", &axes)); /* superior, right, anterior */
+  assert_true(supine_mesh_axes_parse("SRA", &axes)); /* axes point to superior, right, anterior */
   supine_mesh_axes_apply(axes, 2.0, p);
   assert_true(p[0] == 4.5 && p[1] == -8.0 && p[2] == 3.0);
 }
@@ -118,7 +118,7 @@ TEST(test_gate_clean_lungs_no_message) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* Each of the 47 wrong axes for a pair of lungs is detected, and the correct axes are proposed. */
+/* Lungs in each of the 47 axes other than LPS are read as if the axes were LPS. */
 TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
   for (int code = 2; code < SUPINE_AXES_COUNT; ++code) {
     supine_mesh mesh = phantom();
@@ -135,12 +135,11 @@ TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
   }
 }
 
-/* The message proposes the axes of the file, even if coordinates were converted by a wrong
- * --axes. */
+/* A wrong --axes has converted the coordinates. The axes of the file are proposed. */
 TEST(test_gate_wrong_axes_option_proposes_correct_one) {
   supine_mesh mesh = phantom();
   const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS, .axes_given = true};
-  misread(&mesh, SUPINE_AXES_RAS); /* an LPS file, read as RAS */
+  misread(&mesh, SUPINE_AXES_RAS); /* as if --axes RAS were given for an LPS file */
   outcome out = pass(&mesh, &ras);
   assert_says(out.findings.text, "add --axes LPS");
   supine_lungs_free(&out.lungs);
@@ -153,10 +152,10 @@ TEST(test_gate_single_lung_side_found_by_shape) {
   for (int right = 0; right < 2; ++right) {
     supine_mesh mesh = left_lung();
     for (size_t i = 0; right != 0 && i < mesh.vertex_count; ++i) {
-      mesh.vertices[3 * i] *= -1.0; /* mirrors the left lung into a right one */
+      mesh.vertices[3 * i] *= -1.0; /* a mirrored left lung has the shape of a right lung */
     }
     for (size_t i = 0; i < mesh.vertex_count; ++i) {
-      /* Move the lung to the opposite side of the body. */
+      /* Put the lung on the wrong side of the body, which must not matter. */
       mesh.vertices[3 * i] += right != 0 ? 900.0 : -900.0;
     }
     outcome out = pass(&mesh, NULL);
@@ -220,13 +219,12 @@ TEST(test_gate_duplicate_loose_reversed_triangles_repaired) {
   supine_mesh_free((supine_mesh *)&before);
 }
 
-/* If there are more pieces than lobes, each too large to be dropped, a warning says that some may
- * not be lung. */
+/* The surface has 8 pieces of at least 85 mL. Lungs have only 5 lobes. */
 TEST(test_gate_many_pieces_reported) {
   supine_mesh mesh = phantom();
   for (int side = 0; side < 6; ++side) {
     double at[4][3];
-    for (int k = 0; k < 12; ++k) { /* tetrahedra with edges of 80 mm along the axes, 85 mL each */
+    for (int k = 0; k < 12; ++k) { /* corners of a tetrahedron of 85 mL */
       at[k / 3][k % 3] = (k % 3 == 2      ? 100.0 * (side / 2) - 100.0
                           : side % 2 == 0 ? -300.0
                                           : 300.0) +
@@ -240,11 +238,11 @@ TEST(test_gate_many_pieces_reported) {
   supine_mesh_free(&mesh);
 }
 
-/* Two lungs that share one vertex are separated there. */
+/* Two lungs that share one vertex are separated at this vertex. */
 TEST(test_gate_touching_lungs_separated) {
   supine_mesh mesh = phantom();
   const size_t half = mesh.vertex_count / 2;
-  /* The innermost vertex has the lowest x in the left lung and the highest x in the right lung. */
+  /* The innermost vertex has the least x in the left lung, the largest x in the right lung. */
   size_t inner[2] = {0, half};
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     const double x = mesh.vertices[3 * i];
@@ -263,8 +261,7 @@ TEST(test_gate_touching_lungs_separated) {
   supine_mesh_free(&mesh);
 }
 
-/* One piece as wide as two lungs, an ellipsoid with a waist, is refused unless the midline is
- * given. */
+/* An ellipsoid with a waist, as wide as two lungs, is refused unless the midline is given. */
 TEST(test_gate_both_lungs_in_one_piece_refused) {
   supine_mesh mesh = left_lung();
   double low[3];
@@ -310,11 +307,11 @@ TEST(test_gate_impossible_size_refused_unless_units_given) {
   supine_mesh_free(&mesh);
 }
 
-/* A surface with a hole and no other defect is left unchanged. */
+/* A surface whose only defect is a hole is left unchanged. */
 TEST(test_repair_open_surface_unchanged) {
   supine_mesh mesh = phantom();
   supine_mesh_repair_report report;
-  mesh.triangle_count -= 3; /* leaves a hole */
+  mesh.triangle_count -= 3; /* makes a hole */
   const size_t count = mesh.triangle_count;
   assert_int_equal(supine_mesh_repair(&mesh, &report), SUPINE_OK);
   assert_int_equal(report.duplicates + report.loose + report.reversed + report.separated, 0);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core. Positions and normals, read
- * by transform feedback, equal those of the C evaluator within rounding. The lungs of one draw have
- * different gains. The tests are skipped if EGL has no such context. */
+/* Run supine.glsl without a window, in GLSL ES 3.00 and GLSL 3.30 core. Assert that positions and
+ * normals, read back by transform feedback, equal those of the C library except for rounding. The
+ * lungs have different gains in one draw. The tests are skipped if EGL has no context without a
+ * surface. */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <GLES3/gl3.h>
@@ -16,7 +17,7 @@
 
 enum { VERTICES = 1003, LUNGS = 2, NORMALS = 8, WORDS = 3 };
 
-/* OpenGL functions that are loaded, by type and name. */
+/* Type and name of each OpenGL function that is loaded at run time. */
 #define GL_FUNCTIONS(F)                                                                            \
   F(PFNGLATTACHSHADERPROC, AttachShader)                                                           \
   F(PFNGLBEGINTRANSFORMFEEDBACKPROC, BeginTransformFeedback)                                       \
@@ -64,8 +65,7 @@ typedef struct gl_api {
 #undef MEMBER
 } gl_api;
 
-/* Create a context of this API without a surface and make it current. Return false if that is not
- * possible. */
+/* Create an OpenGL context without a surface. Return false if that is not possible. */
 static bool make_context(EGLenum api, EGLDisplay *display, EGLContext *context, gl_api *gl) {
   const EGLint renderable = api == EGL_OPENGL_API ? EGL_OPENGL_BIT : EGL_OPENGL_ES3_BIT;
   const EGLint wanted[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, renderable, EGL_NONE};
@@ -118,7 +118,7 @@ static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, co
   return shader;
 }
 
-/* Link a program that displaces vertices with `vectors` vec4s of coefficients. */
+/* Link an OpenGL program that displaces vertices by coefficients in `vectors` vec4s. */
 static GLuint make_program(const gl_api *gl, const char *version, const char *library,
                            size_t vectors) {
   static const char *const arguments[] = {"c0", "c0, c1", "c0, c1, c2", "c0, c1, c2, c3"};
@@ -162,8 +162,7 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
   return program;
 }
 
-/* Create a framebuffer. Drawing needs one, even without output, and a context without a surface has
- * none. */
+/* Create a framebuffer, which drawing needs and a context without a surface lacks. */
 static void make_framebuffer(const gl_api *gl) {
   GLuint framebuffer = 0;
   GLuint renderbuffer = 0;
@@ -175,7 +174,7 @@ static void make_framebuffer(const gl_api *gl) {
   gl->FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, renderbuffer);
 }
 
-/* Inputs of the shader. */
+/* Inputs of the vertex shader. */
 typedef struct model {
   size_t modes;
   float *attributes; /* [VERTICES, SUPINE_GL_FLOATS + modes] from supine_gl_pack */
@@ -216,8 +215,7 @@ static void load_model(const gl_api *gl, const model *m) {
   }
 }
 
-/* Set captured [VERTICES, 6] to the position and normal of each vertex, computed by the shader in
- * one draw. */
+/* Set captured [VERTICES, 6] to the position and normal of each vertex after one draw. */
 static void run_shader(const gl_api *gl, GLuint program, const model *m, float *captured) {
   const GLsizeiptr output = (GLsizeiptr)(6 * VERTICES * sizeof(float));
   const GLsizei vectors = (GLsizei)((m->modes + 3) / 4);
@@ -243,8 +241,8 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
   memcpy(captured, mapped, (size_t)output);
 }
 
-/* Tolerance of normals. The GPU has the same packed numbers as the C evaluator but rounds
- * differently, and sums of random modes lose a digit by cancellation. */
+/* Tolerance for normals. The shader uses the same packed numbers as the C library but rounds
+ * differently. The random modes nearly cancel in some sums, which loses a digit. */
 static const double normal_rounding = 1e-4;
 
 static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes) {
@@ -275,7 +273,7 @@ static void check_modes(const gl_api *gl, const char *version, const char *libra
   assert_int_equal(supine_deform_lit(basis, POSED(basis, weights, scales), cpu, cpu + 3 * VERTICES),
                    SUPINE_OK);
   double moved = 0;
-  /* Shader and evaluator err by at most supine_basis_error each. */
+  /* The shader and the C library err by at most supine_basis_error each. */
   const double bound = 2 * supine_basis_error(basis, POSED(basis, weights, scales));
   assert_true(bound < 1e-3);
   for (size_t i = 0; i < VERTICES; ++i) {
@@ -302,7 +300,7 @@ static void check_glsl(EGLenum api, const char *version) {
   EGLContext context = EGL_NO_CONTEXT;
   gl_api gl = {0};
   if (!make_context(api, &display, &context, &gl)) {
-    print_message("skipped: EGL has no context without a surface\n");
+    print_message("skipped: EGL has no OpenGL context without a surface\n");
     skip();
     return;
   }

@@ -6,8 +6,8 @@
 
 #include "tests/poses.h"
 
-/* Assert that the basis has the numbers that version 0.1.0 of the program printed. The golden files
- * of all formats hold the same synthetic pair of lungs with 324 vertices. */
+/* Assert that a basis file has the numbers that version 0.1.0 printed for it. The golden files of
+ * all versions of the format hold the same synthetic lungs. */
 static void check_golden(const char *path, const char *version, const char *checksum) {
   supine_basis *basis = NULL;
   supine_error error = {0};
@@ -47,7 +47,7 @@ static void check_golden(const char *path, const char *version, const char *chec
   for (size_t i = 0; i < sizeof want / sizeof *want; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const double x = (double)xyz[3 * want[i].vertex + axis];
-      assert_true(fabs(x - want[i].at[axis]) <= 1e-5); /* mm, the resolution of floats at 100 mm */
+      assert_true(fabs(x - want[i].at[axis]) <= 1e-5); /* the spacing of floats near 100 mm */
     }
   }
   supine_basis_close(basis);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Images in NRRD, NIfTI and MetaImage: round trips in every orientation and type, and invalid
- * files. */
+/* Test images in NRRD, NIfTI and MetaImage: round trips and invalid files. */
 #include <sys/stat.h>
 
 #include "folder.h"
@@ -51,7 +50,7 @@ TEST(test_image_write_then_read_same) {
           supine_image_read(in_folder(names[i]), &back, &error) != SUPINE_OK) {
         fail_msg("%s", error.message);
       }
-      check_same(&image, &back, 0x1p-23 * 256.0); /* NIfTI-1 stores origin and axes in float32 */
+      check_same(&image, &back, 0x1p-23 * 256.0); /* for float32 positions in NIfTI-1 */
       supine_image_free(&image);
       supine_image_free(&back);
     }
@@ -96,7 +95,7 @@ TEST(test_nrrd_in_ras_converted_to_lps) {
   supine_image_free(&image);
 }
 
-/* A big-endian NIfTI header with a slope and an intercept is read. */
+/* A big-endian NIfTI file is read, with the slope and the intercept of its values. */
 TEST(test_nifti_big_endian_with_slope_read) {
   unsigned char bytes[352 + 120];
   supine_image image = made(SUPINE_VOXEL_I16, 5);
@@ -189,7 +188,7 @@ TEST(test_nifti_bad_files_refused) {
              {40, {4, 5, 4, 1, 3}, 5, "ndim is 4"},
              {254, {0}, 1, "orientation"},
              {70, {32}, 1, "COMPLEX"},
-             {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* the first row of the matrix is 0 */
+             {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* sets an axis to 0 */
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     memcpy(changed, bytes, sizeof bytes);
     memcpy(changed + bad[i].at, bad[i].value, bad[i].count * sizeof(int16_t));
@@ -202,7 +201,7 @@ TEST(test_nifti_bad_files_refused) {
   }
 }
 
-/* A wrong checksum is refused, although every voxel could be read. */
+/* A wrong checksum is refused, although all voxels can be decompressed. */
 TEST(test_image_gzip_checksum_wrong_refused) {
   static const char *const names[] = {"c.nrrd", "c.nii.gz", "c.mha"};
   for (size_t i = 0; i < 3; ++i) {
@@ -210,7 +209,8 @@ TEST(test_image_gzip_checksum_wrong_refused) {
     supine_image image = made(SUPINE_VOXEL_F64, 5);
     assert_int_equal(supine_image_write(in_folder(names[i]), &image, NULL, NULL), SUPINE_OK);
     const size_t size = read_bytes(in_folder(names[i]), bytes, sizeof bytes);
-    /* zlib data end with the checksum, gzip data with the checksum and the size. */
+    /* zlib data end with the checksum. gzip data end with the checksum and the size, each of 4
+     * bytes. */
     bytes[size - (i == 2 ? 1 : 5)] ^= 0x55;
     write_bytes(in_folder(names[i]), bytes, size);
     check_refused(names[i], SUPINE_ERROR_FORMAT, names[i]);

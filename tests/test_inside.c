@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Content inside the lungs: location, motion, and files. */
+/* Test points, meshes and grids inside the lungs: location, motion and files. */
 #include "folder.h"
 #include "inside_helpers.h"
 
@@ -21,7 +21,7 @@ static int setup(void **state) {
   }
   (void)snprintf(surface_path, sizeof surface_path, "%s/surface", folder);
   (void)snprintf(inside_path, sizeof inside_path, "%s/inside", folder);
-  helper_write_basis(surface_path, 10, 2); /* two lungs of 1,002 vertices each */
+  helper_write_basis(surface_path, 10, 2); /* 1,002 vertices per lung */
   surface = helper_open(surface_path);
   return supine_inside_shells_create(surface, &shells, NULL) == SUPINE_OK ? 0 : -1;
 }
@@ -36,8 +36,8 @@ static double distance(const double a[3], const double b[3]) {
   return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
 }
 
-/* Draw a random point p on the surface of a lung. Set corner and weight to the vertices of its
- * triangle and their weights in p. */
+/* Choose a random point p on the surface of a lung. Set `corner` to the vertices of its triangle,
+ * and `weight` to the barycentric coordinates of p. */
 static void random_surface_point(const supine_inside_shell *shell, uint64_t *seed, double p[3],
                                  size_t corner[3], double weight[3]) {
   const size_t t = (size_t)(helper_random(seed) * (double)shell->triangle_count);
@@ -57,8 +57,8 @@ static void random_surface_point(const supine_inside_shell *shell, uint64_t *see
   }
 }
 
-/* Draw a point p on a random ray from the centre of a lung, at `share` of the distance to the
- * surface. It is inside if `share` is below 1. */
+/* Choose a random ray from the centre of a lung. Set p to the point on the ray at `share` times the
+ * distance of the surface. */
 static void point_at_share(size_t lung, uint64_t *seed, double share, double p[3]) {
   const double centre[3] = {lung == 0 ? 71.3 : -72.9, 3.1, -40.7};
   size_t corner[3];
@@ -69,8 +69,8 @@ static void point_at_share(size_t lung, uint64_t *seed, double share, double p[3
   }
 }
 
-/* Return the distance of x from the nearest triangle, mm, by a slow and simple search over
- * barycentric coordinates. */
+/* Return the distance of x from the nearest triangle, mm, by ternary search for one barycentric
+ * coordinate, a. For each a, the other coordinate b has a closed form. */
 static double slow_distance(const supine_inside_shell *shell, const double x[3]) {
   double best = INFINITY;
   for (size_t t = 0; t < shell->triangle_count; ++t) {
@@ -81,13 +81,10 @@ static double slow_distance(const supine_inside_shell *shell, const double x[3])
     double low = 0.0;
     double high = 1.0;
     double found = INFINITY;
-    for (int i = 0; i < 60; ++i) { /* ternary search in the barycentric coordinate a, in which the
-                                      distance is convex */
+    for (int i = 0; i < 60; ++i) {
       double at[2];
       for (int side = 0; side < 2; ++side) {
         const double a = low + (side + 1) * (high - low) / 3.0;
-        /* Squared distance of x from the line of constant a across the triangle. The nearest point
-         * of this line is at b. */
         double square = 0.0;
         double along = 0.0;
         double length = 0.0;
@@ -121,7 +118,7 @@ TEST(test_surface_find_random_points_side_and_distance_correct) {
   for (int i = 0; i < 400; ++i) {
     const double share = 1.7 * helper_random(&seed);
     double p[3];
-    /* Skip points at the surface, whose side is uncertain. */
+    /* A point this near the surface may be on either side. */
     if (fabs(share - 1.0) < 0.02) {
       continue;
     }
@@ -130,7 +127,7 @@ TEST(test_surface_find_random_points_side_and_distance_correct) {
     assert_int_equal(place.depth > 0.0, share < 1.0);
     assert_true(fabs(distance(p, place.nearest) - fabs(place.depth)) < 1e-9);
     if (i < 40) {
-      /* The slow search ends within 1e-10 edge lengths of the nearest point. */
+      /* slow_distance ends within 1e-10 edge lengths of the nearest point. */
       assert_true(fabs(slow_distance(&shells.shell[0], p) - fabs(place.depth)) < 1e-6);
     }
   }
@@ -141,7 +138,7 @@ TEST(test_surface_find_with_hint_same_answer) {
   supine_inside_place near = {0};
   for (int i = 0; i < 500; ++i) {
     double p[3];
-    if (i % 50 == 0) { /* restart the random walk far from the hint */
+    if (i % 50 == 0) { /* a new random point; the hint is far from it */
       point_at_share(0, &seed, 1.4 * helper_random(&seed), p);
     } else {
       for (int k = 0; k < 3; ++k) {
@@ -160,7 +157,7 @@ TEST(test_surface_find_surface_with_hole_side_correct) {
   const supine_inside_shell *shell = &shells.shell[0];
   supine_inside_surface *torn = NULL;
   uint64_t seed = 15;
-  /* Without its first 12 triangles, the surface has a hole. */
+  /* Omitting the first 12 triangles leaves a hole. */
   assert_int_equal(supine_inside_surface_create(shell->vertices, shell->triangle_count - 12,
                                                 shell->triangles + 36, true, &torn, NULL),
                    SUPINE_OK);
@@ -193,13 +190,13 @@ TEST(test_biharmonic_fit_centres_and_affine_values_exact) {
   supine_inside_biharmonic_evaluate(&fit, COUNT, points, found);
   double noise = 0.0;
   for (size_t i = 0; i < COUNT; ++i) {
-    /* The tolerance is for values up to 60 mm and a matrix of condition about 1e5. */
+    /* The tolerance suits values of up to 60 mm and a matrix with a condition number of 1e5. */
     for (size_t k = 0; k < 3; ++k) {
       assert_true(fabs(found[COLUMNS * i + k] - values[COLUMNS * i + k]) < 1e-9);
     }
     noise = fmax(noise, fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]));
   }
-  assert_true(noise > 0.1); /* at points other than the centres, noise is not reproduced */
+  assert_true(noise > 0.1); /* random values are reproduced only at the centres */
   for (size_t j = 0; j < CENTRES; ++j) {
     const size_t i = fit.chosen[j];
     assert_true(fabs(found[COLUMNS * i + 3] - values[COLUMNS * i + 3]) < 1e-9);
@@ -217,8 +214,8 @@ TEST(test_biharmonic_fit_points_in_a_plane_refused) {
   assert_says(error.message, "plane");
 }
 
-/* Make content of points in both lungs. Each point is at a random share, from `lowest` to
- * `highest`, of the way from the centre of its lung to the surface. */
+/* Make points in the left and the right lung in turn. Each is on a random ray from the centre of
+ * the lung, at a random share of the distance to the surface, from `lowest` to `highest`. */
 static supine_inside_content made_points(size_t count, double lowest, double highest,
                                          uint64_t seed) {
   supine_inside_content content = {.count = count, .part_count = count};
@@ -246,8 +243,7 @@ static supine_inside_report embed(const supine_inside_content *content, bool cla
   return report;
 }
 
-/* Return the largest distance, mm, between embedded points moved by one mode and their exact
- * positions. */
+/* Move embedded points by one mode. Return the largest error, mm, relative to helper_motion. */
 static double farthest_from(const supine_inside_content *content, int mode) {
   supine_basis *inside = helper_open(inside_path);
   const double scales[2] = {1.3, 1.3};
@@ -273,8 +269,9 @@ static double farthest_from(const supine_inside_content *content, int mode) {
   return largest;
 }
 
-/* An affine motion is exact to the rounding of float32. A quadratic motion, which the motion of the
- * surface does not determine inside, is wrong by less than 6.5 % of the largest displacement. */
+/* Points inside the lungs follow an affine motion of the surface exactly, except for rounding to
+ * float32. The motion of the surface does not determine a quadratic motion inside. Points then err
+ * by less than 6.5 % of the largest displacement. */
 TEST(test_embed_affine_motion_exact_quadratic_approximate) {
   supine_inside_content content = made_points(800, 0.0, 0.97, 21);
   const supine_inside_report report = embed(&content, false, 0);
@@ -289,14 +286,15 @@ TEST(test_embed_affine_motion_exact_quadratic_approximate) {
   }
   assert_true(farthest_from(&content, 0) < 4.0 * 0x1p-24 * 256.0);
   const double quadratic = farthest_from(&content, 1) / largest;
-  print_message("quadratic motion: error %.2f %% of the largest displacement, which is %.1f mm\n",
-                100.0 * quadratic, largest);
+  print_message(
+      "quadratic motion: points err by at most %.2f %% of the largest displacement, %.1f mm\n",
+      100.0 * quadratic, largest);
   assert_true(quadratic < 0.065);
   supine_inside_content_free(&content);
 }
 
-/* Embedded points on the surface follow it to 0.01 mm, for all modes at once, even with few
- * centres. */
+/* Embedded points on the surface follow it to 0.01 mm when all modes act together, even if few
+ * vertices are the centres of the interpolation. */
 TEST(test_embed_surface_points_move_with_surface) {
   enum { COUNT = 600 };
   supine_inside_content content = made_points(COUNT, 1.0, 1.0, 33);
@@ -336,8 +334,9 @@ TEST(test_embed_surface_points_move_with_surface) {
   supine_inside_content_free(&content);
 }
 
-/* In a scan below full inflation, content is embedded at its position in the scan. It has that
- * position in the state of the scan. Content on the surface of the scan moves with the surface. */
+/* If the scan is below full inflation, points are given at their positions in the scan. In the
+ * state of the scan, embedded points have these positions. Points on the surface of the scan move
+ * with the surface. */
 TEST(test_embed_scan_below_full_measured_from_scan) {
   enum { COUNT = 400 };
   char path[80];
@@ -358,7 +357,7 @@ TEST(test_embed_scan_below_full_measured_from_scan) {
   supine_deform(scanned, POSED(scanned, weights, scales), surface_moved);
   supine_deform(scanned, &moved_shells.scan, surface_scanned);
   shells = moved_shells;
-  /* Half of the points are on the surface, half are inside. */
+  /* Points with an even index are then moved to the surface; the others are inside. */
   supine_inside_content content = made_points(COUNT, 0.3, 0.95, 5);
   double target[3 * COUNT];
   double farthest = 0.0;
@@ -378,10 +377,10 @@ TEST(test_embed_scan_below_full_measured_from_scan) {
         farthest = fmax(farthest, fabs((double)supine_basis_get_info(scanned)->vertices[at] -
                                        (double)surface_scanned[at]));
       }
-      assert_close(content.points[3 * i + k], there, 1e-4); /* a point on the surface of the scan */
+      assert_close(content.points[3 * i + k], there, 1e-4);
     }
   }
-  assert_true(farthest > 10.0); /* mm, from the reference surface of the file to the scan */
+  assert_true(farthest > 10.0); /* mm between the surfaces in the file and in the scan */
   (void)embed(&content, false, 0);
   supine_basis *inside = helper_open(inside_path);
   const uint32_t *part = supine_basis_tensor(inside, "part")->data;
@@ -392,7 +391,7 @@ TEST(test_embed_scan_below_full_measured_from_scan) {
     assert_true(part[i] % 2 == 1 || distance(got, target + 3 * (size_t)part[i]) < 0.01);
   }
   supine_deform(inside, &moved_shells.scan, xyz);
-  for (size_t i = 0; i < COUNT; ++i) { /* at the given positions, except for rounding */
+  for (size_t i = 0; i < COUNT; ++i) {
     const double got[3] = {(double)xyz[3 * i], (double)xyz[3 * i + 1], (double)xyz[3 * i + 2]};
     assert_true(distance(got, content.points + 3 * (size_t)part[i]) < 1e-4);
   }
@@ -477,7 +476,7 @@ TEST(test_embed_point_outside_counted_and_clamped) {
   assert_int_equal(report.farthest, 17);
   const supine_inside_place place = supine_inside_surface_find(shells.shell[0].surface, far, NULL);
   assert_true(fabs(report.farthest_mm + place.depth) < 1e-9 && report.farthest_mm > 600.0);
-  /* An affine motion is exact outside the lungs, too. */
+  /* A point outside the lungs follows an affine motion exactly, too. */
   assert_true(farthest_from(&content, 0) < 8.0 * 0x1p-24 * 1024.0);
   report = embed(&content, true, 0);
   assert_int_equal(report.outside, 1);
@@ -503,7 +502,8 @@ TEST(test_embed_point_outside_counted_and_clamped) {
   supine_inside_content_free(&content);
 }
 
-/* Every point inside the lungs is in a grid cell whose eight corners are stored. */
+/* A grid keeps only nodes near the lungs. These include all eight corners of every grid cell that
+ * contains a point inside the lungs. */
 TEST(test_grid_points_inside_have_all_cell_corners) {
   const supine_image like = {.size = {300, 260, 280},
                              .origin = {180.0, 120.0, -200.0},
@@ -636,7 +636,7 @@ TEST(test_content_meshes_joined_as_parts) {
   supine_inside_report report;
   const supine_inside_options options = {0};
   assert_int_equal(supine_inside_embed(&shells, &content, &options, inside_path, &report, NULL),
-                   SUPINE_ERROR_MESH); /* the content has no points */
+                   SUPINE_ERROR_MESH); /* content without points is refused */
   content = made_points(4, 0.5, 0.6, 1);
   assert_int_equal(supine_inside_embed(&shells, &content, &options, "/nowhere/x", &report, NULL),
                    SUPINE_ERROR_WRITE);
@@ -655,8 +655,8 @@ static double part_volume(const supine_basis_info *info, uint32_t part_end, cons
   return sum / 6.0;
 }
 
-/* Rotate the points `from` by `angle` about an axis through their mean. Return the sum of their
- * squared distances from the points `to`. */
+/* Rotate the points `from` by `angle` about the line through their mean that is parallel to `axis`.
+ * Return the sum of their squared distances from the points `to`. */
 static double misfit_turned(size_t count, const float *from, const float *to, size_t axis,
                             double angle) {
   const size_t a = (axis + 1) % 3;
@@ -682,9 +682,9 @@ static double misfit_turned(size_t count, const float *from, const float *to, si
   return sum;
 }
 
-/* A rigid tumour lies beside a soft one. In the state of the scan it has its given position. In
- * every pose it keeps its volume, and its motion is the rigid motion that fits the field best. All
- * functions that compute positions agree. */
+/* One tumour is rigid and another is soft. In the state of the scan, the rigid tumour has its given
+ * position. In every pose it keeps its volume, and it moves by the rigid motion nearest to its soft
+ * displacement. All functions that compute positions agree. */
 TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   char path[80];
   (void)snprintf(path, sizeof path, "%s/scanned-rigid", folder);
@@ -697,7 +697,7 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   supine_inside_content content = {0};
   for (size_t side = 0; side < 2; ++side) {
     supine_mesh mesh = helper_lump(7, 0.0, 9 + side);
-    /* Make the lump 40 mm long, and move it into a lung. */
+    /* The tumour is 40 mm long and inside a lung. */
     for (size_t k = 0; k < 3 * mesh.vertex_count; ++k) {
       mesh.vertices[k] = 0.15 * mesh.vertices[k] + (k % 3 == 0 ? 73.7 - 149.1 * (double)side : 3.0);
     }
@@ -721,11 +721,11 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   const uint32_t end = ((const uint32_t *)supine_basis_tensor(inside, "rigid")->data)[1];
   assert_int_equal(end, n / 2);
   float *xyz = malloc(4 * 3 * n * sizeof *xyz);
-  float *others = xyz + 3 * n; /* [3, N, 3] results of other functions */
+  float *others = xyz + 3 * n; /* [3, N, 3] */
   const supine_pose *scan = &moved_shells.scan;
   supine_deform(inside, scan, xyz);
   const uint32_t *part = supine_basis_tensor(inside, "part")->data;
-  for (size_t i = 0; i < 3 * n; ++i) { /* the order of the file is that of the content */
+  for (size_t i = 0; i < 3 * n; ++i) { /* points keep their order in the file */
     assert_close((double)xyz[i], content.points[i], 2e-4);
     assert_int_equal(part[i / 3], i / 3 >= end);
   }
@@ -748,7 +748,7 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
       assert_true(misfit < misfit_turned(end, xyz, others, axis % 3, axis < 3 ? 0.002 : -0.002));
     }
     for (size_t k = 3 * end; k < 3 * n; ++k) {
-      /* The soft part moves with the field. */
+      /* The soft tumour moves like in the basis without a rigid part. */
       assert_close((double)xyz[k], (double)others[k], 1e-4);
     }
     supine_displace_range(inside, pose, 0, n, others + 3 * n);

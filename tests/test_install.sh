@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Install the run-time library to its own folder and build the example with it, by CMake and by pkg-config;
-# check the library's dependencies and exported names.
+# Install the run-time library to an empty folder, and build the example with it by CMake and by pkg-config. Check
+# the dependencies and the exported names of the library.
 #
 #     test_install.sh CMAKE BUILD_FOLDER EXAMPLE_FOLDER MAKE_BASIS CC CXX
 set -eu
@@ -17,14 +17,14 @@ check() {
   grep -q '^100 vertices; the first is at' "$work/out" || { cat "$work/out"; exit 1; }
 }
 
-# Build the example by CMake; it has no other path to the headers.
+# Build the example by CMake, which finds the headers only in the installed package.
 CC=$cc CXX=$cxx "$cmake" -S "$example" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >>"$work/log"
 "$cmake" --build "$work/build" >>"$work/log"
 check "$work/build/example_static"
 check "$work/build/example_shared"
 "$work/build/header_cpp"
 
-# Build the example by pkg-config.
+# Build the example with the flags that pkg-config prints.
 PKG_CONFIG_PATH=$(dirname "$(find "$prefix" -name supine-runtime.pc)")
 export PKG_CONFIG_PATH
 lib=$(dirname "$PKG_CONFIG_PATH")
@@ -48,8 +48,8 @@ esac
 nm -D --defined-only "$lib/libsupine_runtime.so" | awk '{print $3}' >"$work/names"
 grep -q '^supine_deform@@SUPINE_0$' "$work/names"
 if grep -Ev '^(supine_[a-z0-9_]*@@SUPINE_0|SUPINE_0.*)$' "$work/names"; then exit 1; fi
-# It exports exactly the functions that the installed headers declare. Each header compiles alone, in C
-# and in C++, and cites no header that is not installed.
+# Each installed header compiles alone, in C and in C++, and mentions no header that is not installed. The shared
+# library exports exactly the functions that these headers declare.
 for header in "$prefix"/include/supine/*.h; do
   name=supine/$(basename "$header")
   printf '#include <%s>\n' "$name" >"$work/one.c"
@@ -68,10 +68,10 @@ cat "$prefix"/include/supine/*.h | grep -o '[A-Za-z0-9_./]*\.h\b' | sort -u | wh
   *) [ -f "$prefix/include/$named" ] || { echo "a header cites $named, which is not installed"; exit 1; } ;;
   esac
 done
-# The archive defines only names that begin with supine_.
+# The static library defines only names that begin with supine_.
 nm --defined-only --extern-only "$lib/libsupine_runtime.a" | awk 'NF == 3 {print $3}' >"$work/names"
 if grep -v '^supine_' "$work/names"; then exit 1; fi
 
-# The archive uses no names of FFTW, GSL, assimp, threads or BLAS.
+# The static library uses no functions of FFTW, GSL, assimp, threads or BLAS.
 nm --undefined-only "$lib/libsupine_runtime.a" | awk '{print $2}' | sort -u >"$work/undefined"
 if grep -Ei 'fftw|gsl_|assimp|^ai[A-Z]|pthread|cblas' "$work/undefined"; then exit 1; fi

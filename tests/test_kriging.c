@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Kriging equals refits without a point, and states the correct error for data of its model. */
+/* Test kriging: omitting a point by formula equals a fit without the point, and for data of the
+ * kriging model the predicted error is correct. */
 #include "runtime/kriging.h"
 #include "test.h"
 
@@ -15,7 +16,8 @@ static double normal(uint64_t *state) {
   return sum;
 }
 
-/* Draw points in two lungs. The law displaces them by up to 40 mm. */
+/* Choose random points in two lungs. The displacement law, which kriging corrects, displaces them
+ * by up to 40 mm. */
 static void place(uint64_t *seed, size_t count, supine_kriging_point *points) {
   for (size_t j = 0; j < count; ++j) {
     supine_kriging_point *p = &points[j];
@@ -33,8 +35,9 @@ static void place(uint64_t *seed, size_t count, supine_kriging_point *points) {
   }
 }
 
-/* Set the residuals of the points, mm, to the sum of a translation (terms 0 to 2), a change of
- * volume (term 3), a rotation (terms 4 to 6) and a sample of the Gaussian process. */
+/* Set the residuals of the points, mm, to random data of the kriging model: the sum of a
+ * translation (terms 0 to 2), a change of volume (term 3), a rotation (terms 4 to 6) and a sample
+ * of the Gaussian process. */
 static void draw(uint64_t *seed, size_t count, supine_kriging_point *points, const double *terms) {
   double *factor = fixture_allocate(count * count, sizeof *factor);
   double *white = fixture_allocate(count, sizeof *white);
@@ -153,8 +156,8 @@ TEST(test_kriging_data_drawn_from_model_error_as_stated) {
   }
   qsort(ratio, SEEDS, sizeof *ratio, by_value);
   print_message(
-      "stated error divided by true error, RMS: median %.2f, range %.2f to %.2f; share of points "
-      "within 1.8 stated errors: %.3f\n",
+      "predicted RMS error divided by true RMS error: median %.2f, range %.2f to %.2f; share of "
+      "points that err by at most 1.8 predicted errors: %.3f\n",
       ratio[SEEDS / 2], ratio[0], ratio[SEEDS - 1], held);
   assert_in_range((int)(100 * ratio[SEEDS / 2]), 75, 135);
   assert_in_range((int)(100 * held), 93, 99);
@@ -168,7 +171,7 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
   double *space = fixture_allocate(supine_kriging_space(12), sizeof *space);
   place(&seed, 12, points);
   for (size_t j = 0; j < 12; ++j) {
-    points[j] = points[0]; /* all points are in one place */
+    points[j] = points[0]; /* the same position for all points */
     points[j].residual[0] = 5 * fixture_random(&seed);
   }
   for (size_t count = 1; count <= 12; ++count) {
@@ -183,7 +186,7 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
     double scratch[12];
     predict(&fit, &points[0], shift, &variance);
     assert_true(isfinite((double)shift[0]) && variance > 0);
-    assert_true(variance <= 3.01F); /* variance of one observation with a noise of 1 mm per axis */
+    assert_true(variance <= 3.01F); /* an observation's variance, 1 mm^2 per axis */
     assert_int_equal(supine_kriging_leave_out(&fit, 0, left, scratch) > 0, count > 1);
   }
   points[1].noise = points[0].noise = 0;

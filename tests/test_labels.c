@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Surfaces from label maps: accuracy for known lungs, conventions of labels, the report, and
- * refused maps. */
+/* Test surfaces made from label maps: accuracy, meanings of labels, reports, refused maps. */
 #include "folder.h"
 #include "mesh/anatomy.h"
 #include "mesh/labels/labels.h"
@@ -40,7 +39,7 @@ static made surfaces_of(const char *const *paths, size_t count,
   return out;
 }
 
-/* Write the image into a file, and make surfaces from the file. */
+/* Write the image to a file, and make surfaces of the lungs from this file. */
 static made surfaces_of_image(const supine_image *image, const char *name,
                               const supine_labels_options *options) {
   const char *path = in_folder(name);
@@ -78,7 +77,7 @@ static void check_closed(const supine_mesh *mesh) {
   assert_true(supine_mesh_volume(mesh) > 0.0);
 }
 
-/* Return the RMS distance of the surfaces of a map from the true surface, mm. */
+/* Return the RMS distance, mm, from vertices of both surfaces to the true surface. */
 static double rms_from(const supine_inside_surface *truth, const made *out) {
   enum { EVERY = 29 };
   double sum = 0.0;
@@ -94,8 +93,8 @@ static double rms_from(const supine_inside_surface *truth, const made *out) {
   return sqrt(sum / count);
 }
 
-/* From voxels of 1, 2 and 3 mm, the volume of the lungs is recovered within 0.5, 1 and 2 %,
- * respectively, and the surface within half a voxel RMS. */
+/* Surfaces made from voxels of 1, 2 and 3 mm have the volume of the lungs within 0.5, 1 and 2 %,
+ * and are within half a voxel (RMS) of the true surface. */
 TEST(test_labels_phantom_volume_and_surface_recovered) {
   supine_mesh phantom = {0};
   supine_inside_surface *truth = NULL;
@@ -130,8 +129,9 @@ TEST(test_labels_phantom_volume_and_surface_recovered) {
       assert_false(is->cut);
     }
     const double rms = rms_from(truth, &out);
-    printf("voxels of %d mm: surface off by %.3f mm RMS, volumes by %+.2f and %+.2f mL\n", h, rms,
-           out.report.lung[0].surface - out.report.lung[0].mask,
+    printf("voxels of %d mm: surfaces err by %.3f mm RMS; volume of surface minus volume of mask: "
+           "left %+.2f mL, right %+.2f mL\n",
+           h, rms, out.report.lung[0].surface - out.report.lung[0].mask,
            out.report.lung[1].surface - out.report.lung[1].mask);
     assert_true(rms < 0.5 * h);
     release(&out);
@@ -141,8 +141,9 @@ TEST(test_labels_phantom_volume_and_surface_recovered) {
   supine_mesh_free(&phantom);
 }
 
-/* Return a map in which the left lung (label 2) has two labels and the right lung (label 1) has
- * three, in layers from the feet up. */
+/* Return a map in which the left lung has the labels left[0], left[1] and the right lung right[0],
+ * right[1], right[2], in layers from the feet up. In the map `from`, the left lung has the label 2
+ * and the right lung the label 1. */
 static supine_image relabelled(const supine_image *from, const uint8_t left[2],
                                const uint8_t right[3]) {
   supine_image image = *from;
@@ -161,7 +162,7 @@ static supine_image relabelled(const supine_image *from, const uint8_t left[2],
 TEST(test_labels_any_convention_same_lungs) {
   static const struct {
     uint8_t left[2], right[3];
-    const char *options[3]; /* equivalent values of --labels; a leading NULL stands for no option */
+    const char *options[3]; /* values of --labels; NULL means none */
     const char *said;
   } maps[] = {
       {{2, 2}, {1, 1, 1}, {NULL, "lungmask", "left=2,right=1"}, "2 left; 1 right"},
@@ -194,8 +195,7 @@ TEST(test_labels_any_convention_same_lungs) {
   supine_image_free(&image);
 }
 
-/* A TotalSegmentator map with lobes and other organs gives the same lungs as one file for each
- * lobe. */
+/* A map with lobes and other organs gives the same lungs as one file for each lobe. */
 TEST(test_labels_other_organs_ignored_and_files_of_lobes_joined) {
   static const uint8_t left[2] = {11, 10};
   static const uint8_t right[3] = {14, 13, 12};
@@ -238,7 +238,7 @@ TEST(test_labels_other_organs_ignored_and_files_of_lobes_joined) {
   supine_image_free(&image);
 }
 
-/* A single lung is accepted if its side is given. */
+/* A map of one lung is accepted if --labels names its side. */
 TEST(test_labels_one_lung_of_given_side_accepted) {
   supine_image image = helper_two_lungs(4.0);
   const supine_labels_options left = {.labels = "left=2", .edge = 5.0};
@@ -272,7 +272,7 @@ TEST(test_labels_touching_lungs_separated) {
   for (size_t i = 0; i < voxels(&image); ++i) {
     ((uint8_t *)image.values)[i] = ((uint8_t *)image.values)[i] != 0;
   }
-  /* Add a bridge across the midline, 5 x 4 voxels in cross-section, and compute its volume. */
+  /* Join the lungs by a bridge across the midline, 5 x 4 voxels in cross-section. */
   const size_t low[3] = {image.size[0] / 2 - 5, image.size[1] / 2 - 2, image.size[2] / 2 - 2};
   const size_t high[3] = {image.size[0] / 2 + 4, image.size[1] / 2 + 3, image.size[2] / 2 + 2};
   box_set(&image, low, high, 1);
@@ -281,7 +281,7 @@ TEST(test_labels_touching_lungs_separated) {
   made out = surfaces_of_image(&image, "touch.nrrd", &options);
   assert_int_equal(out.report.lung_count, 2);
   assert_true(out.report.neck >= 16.0 && out.report.neck <= 24.0);
-  /* The bridge is divided between the lungs, and no other voxel changes sides. */
+  /* The bridge is divided between the lungs. No other voxel moves to the other lung. */
   assert_true(out.report.lung[0].mask >= 0.064 * (double)left - added &&
               out.report.lung[0].mask <= 0.064 * (double)left + added);
   assert_true(fabs(out.report.lung[0].mask + out.report.lung[1].mask -
@@ -297,7 +297,7 @@ TEST(test_labels_islands_cavities_tunnels_counted) {
   const double left = voxel * (double)count_label(&image, 2);
   const size_t middle[3] = {(size_t)((66.0 - image.origin[0]) / 4.0), image.size[1] / 2,
                             image.size[2] / 2};
-  /* Make three cavities of 8, 1 and 1 voxels; two of them meet only at an edge. */
+  /* Cavities of 8, 1 and 1 voxels. Two meet only at an edge, so they are not joined. */
   for (size_t c = 0; c < 3; ++c) {
     const size_t low[3] = {middle[0] + (c == 2 ? 1 : 4 * c) - 2, middle[1] + (c == 2 ? 1 : 0),
                            middle[2] + (c == 0 ? 4 : 0)};
@@ -305,7 +305,7 @@ TEST(test_labels_islands_cavities_tunnels_counted) {
                             low[2] + (c == 0 ? 2 : 1)};
     box_set(&image, low, high, 0);
   }
-  /* Add an island of 12 voxels of the right lung, in a corner. */
+  /* Add an island of 12 voxels in a corner of the image, with the label of the right lung. */
   box_set(&image, (const size_t[3]){1, 1, 1}, (const size_t[3]){4, 3, 3}, 1);
   const supine_labels_options options = {.edge = 5.0};
   made out = surfaces_of_image(&image, "holes.nrrd", &options);
@@ -318,8 +318,8 @@ TEST(test_labels_islands_cavities_tunnels_counted) {
   assert_true(fabs(lung[1].dropped - 12.0 * voxel) < 1e-9);
   assert_int_equal(lung[1].cavities, 0);
   release(&out);
-  /* A hollow with a channel to the outside is not a cavity. It is reported as a tunnel unless
-   * --close closes the channel. */
+  /* A hollow with a channel to the outside is not a cavity. The channel is reported as a tunnel,
+   * unless --close closes it. */
   const size_t hollow_low[3] = {middle[0] - 3, middle[1] - 3, middle[2] - 3};
   const size_t hollow_high[3] = {middle[0] + 4, middle[1] + 4, middle[2] + 4};
   box_set(&image, hollow_low, hollow_high, 0);
@@ -328,7 +328,7 @@ TEST(test_labels_islands_cavities_tunnels_counted) {
   box_set(&image, channel_low, channel_high, 0);
   const supine_labels_options fine = {.edge = 3.0};
   out = surfaces_of_image(&image, "channel.nrrd", &fine);
-  /* The channel runs through the lung from front to back, so it is one tunnel. */
+  /* The channel runs through the whole lung from front to back: one tunnel, not two. */
   assert_int_equal(out.report.lung[0].tunnels, 1);
   assert_true(left - out.report.lung[0].mask > 300.0 * voxel);
   release(&out);
@@ -342,7 +342,7 @@ TEST(test_labels_islands_cavities_tunnels_counted) {
   supine_image_free(&image);
 }
 
-/* The report names the axes of the header. Anatomy finds the axes that the voxels have. */
+/* If the header is wrong, the shape of the lungs shows the axes that the voxels have. */
 TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   static const double spacing[3] = {4.0, 4.0, 4.0};
   const supine_labels_options options = {.labels = "one", .edge = 5.0};
@@ -357,7 +357,7 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     static const char *const ways[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
     char wanted[64];
     supine_image map = image;
-    for (int a = 0; a < 3; ++a) { /* change the header only, not the voxels */
+    for (int a = 0; a < 3; ++a) { /* changes only the header, not the voxels */
       const bool flip = (flips >> a & 1) != 0;
       map.step[a][a] = flip ? -4.0 : 4.0;
       map.origin[a] = flip ? image.origin[a] + 4.0 * (double)(image.size[a] - 1) : image.origin[a];
@@ -377,7 +377,7 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     }
     release(&out);
   }
-  /* If the sides are given, a mirrored header is refused. */
+  /* If --labels gives the sides, a mirrored header is refused. */
   supine_image map = image;
   map.step[0][0] = -4.0;
   const supine_labels_options named = {.labels = "lungmask"};
@@ -405,14 +405,14 @@ TEST(test_labels_lungs_cut_at_the_border_reported) {
   supine_image_free(&image);
 }
 
-/* Return the largest distance of a vertex from the boundary of the mask, mm. */
+/* Return the largest distance of a vertex from the boundary of the labelled voxels, mm. */
 static double farthest_of(const supine_image *image, uint8_t label, const supine_mesh *mesh) {
   const uint8_t *at = image->values;
   double farthest = 0.0;
   for (size_t v = 0; v < mesh->vertex_count; ++v) {
     double voxel[3];
     supine_image_locate(image, mesh->vertices + 3 * v, voxel);
-    /* Squared distance to the nearest voxel outside and inside the mask, mm^2. */
+    /* Squared distances, mm^2, to the nearest voxel without and with the label. */
     double nearest[2] = {INFINITY, INFINITY};
     for (size_t i = 0; i < voxels(image); ++i) {
       const size_t index[3] = {i % image->size[0], i / image->size[0] % image->size[1],
@@ -448,7 +448,7 @@ TEST(test_labels_surface_within_half_a_voxel_of_the_mask) {
   supine_image_free(&image);
 }
 
-/* The surface of a mask of noise is one closed manifold. */
+/* The surface of a lung whose voxels are noise is one closed manifold. */
 TEST(test_labels_noise_closed_manifold) {
   uint64_t seed = 7;
   for (int trial = 0; trial < 6; ++trial) {
@@ -464,7 +464,7 @@ TEST(test_labels_noise_closed_manifold) {
       const bool is = 0.5 + 0.5 * random_signed(&seed) < density;
       at[i] = !is || i % 31 == 15 ? 0 : i % 31 < 15 ? 1 : 2;
     }
-    /* 4 mm keeps the voxels, 8 mm averages eight voxels, 2.7 mm interpolates */
+    /* an edge of 4 mm keeps the voxels, 8 mm averages eight voxels, 2.7 mm interpolates */
     const double edges[] = {4.0, 8.0, 2.7};
     for (size_t e = 0; e < 3; ++e) {
       const supine_labels_options options = {.edge = edges[e]};
@@ -476,7 +476,7 @@ TEST(test_labels_noise_closed_manifold) {
       if (status == SUPINE_OK) {
         check_closed(&out.surface[0]);
         check_closed(&out.surface[1]);
-      } else { /* sparse noise may vanish in larger cubes */
+      } else { /* averaging may remove sparse noise */
         assert_int_equal(status, SUPINE_ERROR_MESH);
         assert_true(density < 0.5);
       }
@@ -486,7 +486,6 @@ TEST(test_labels_noise_closed_manifold) {
   }
 }
 
-/* Distances equal those of a search over all pairs of voxels. The voxels have unequal sides. */
 TEST(test_labels_distance_any_mask_equals_search_of_all_pairs) {
   uint64_t seed = 11;
   labels_mask mask = {.size = {9, 13, 7}, .spacing = {0.7, 1.3, 2.9}};
@@ -529,8 +528,8 @@ static void refused(const char *name, const supine_labels_options *options, supi
   assert_null(out.surface[1].vertices);
 }
 
-/* Each label gives one surface. Label 700 has two balls, label 9 has a tube. The voxels have
- * unequal sides. */
+/* Each label gives one surface, also if its voxels are in two pieces or have a hole. Label 700 is
+ * two balls, label 9 is a tube. The voxels have unequal sides. */
 TEST(test_labels_shapes_any_label_one_surface_each) {
   supine_image image = {.voxel = SUPINE_VOXEL_U16, .channels = 1, .size = {60, 50, 40}};
   static const double spacing[3] = {0.8, 0.9, 1.3};
@@ -538,7 +537,7 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
   uint16_t *at = image.values;
   for (int a = 0; a < 3; ++a) {
     image.origin[a] = 31.7 - 40.3 * a;
-    image.step[a][a] = a == 1 ? -spacing[a] : spacing[a]; /* makes the axes left-handed */
+    image.step[a][a] = a == 1 ? -spacing[a] : spacing[a]; /* left-handed axes */
   }
   for (size_t i = 0; i < voxels(&image); ++i) {
     const double p[3] = {spacing[0] * (double)(i % 60), spacing[1] * (double)(i / 60 % 50),
@@ -570,12 +569,12 @@ TEST(test_labels_shapes_any_label_one_surface_each) {
     assert_true(fabs(surface - ml) < 0.06 * ml);
     assert_int_equal(supine_mesh_topology_create(&shapes[s].surface, &topology), SUPINE_OK);
     assert_true(topology.closed);
-    assert_int_equal(topology.component_count, s == 0 ? 1 : 2); /* both balls are kept */
+    assert_int_equal(topology.component_count, s == 0 ? 1 : 2); /* a tube, and two balls */
     supine_mesh_topology_free(&topology);
   }
   double low[3];
   double high[3];
-  /* The surface is at the position that the header gives. */
+  /* The surface is where the header of the image puts it. */
   supine_mesh_box(&shapes[1].surface, low, high);
   assert_true(fabs(low[0] - (31.7 + 4.0)) < 0.65 && fabs(high[0] - (31.7 + 20.0)) < 0.65);
   assert_true(fabs(high[1] - (31.7 - 40.3 - 12.0)) < 0.65);
@@ -645,12 +644,12 @@ TEST(test_labels_bad_maps_refused) {
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "which of its labels (1, 2, 3)");
   at[0] = 0;
-  for (size_t i = 0; i < voxels(&image); ++i) { /* leaves one lung, whose side is unknown */
+  for (size_t i = 0; i < voxels(&image); ++i) { /* one lung, whose side is unknown */
     at[i] = at[i] == 2 ? 2 : 0;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "one lung");
-  for (size_t i = 0; i < voxels(&image); ++i) { /* makes two labels, one above the other */
+  for (size_t i = 0; i < voxels(&image); ++i) { /* two labels, one above the other */
     at[i] = at[i] == 0 ? 0 : i < voxels(&image) / 2 ? 1 : 2;
   }
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
@@ -662,13 +661,13 @@ TEST(test_labels_bad_maps_refused) {
   at[5030] = 2;
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "impossible for a lung");
-  /* Sheets of one voxel vanish in cubes of 20 mm. */
+  /* Sheets one voxel thick vanish if averaged over cubes of 20 mm. */
   const supine_labels_options coarse = {.edge = 20.0};
   box_set(&image, (const size_t[3]){5, 5, 5}, (const size_t[3]){6, 40, 50}, 1);
   box_set(&image, (const size_t[3]){60, 5, 5}, (const size_t[3]){61, 40, 50}, 2);
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &coarse, SUPINE_ERROR_MESH, "smaller edge");
-  image.step[2][2] *= 100.0; /* like a header in another unit */
+  image.step[2][2] *= 100.0; /* as if the header were in another unit */
   assert_int_equal(supine_image_write(path, &image, NULL, NULL), SUPINE_OK);
   refused("bad.nrrd", &plain, SUPINE_ERROR_MESH, "impossible for a lung");
   supine_image_free(&image);
@@ -695,7 +694,7 @@ TEST(test_labels_impossible_voxels_refused) {
     }
     assert_int_equal(supine_image_write(in_folder("none.nrrd"), &map, NULL, NULL), SUPINE_OK);
     const char *path = in_folder("none.nrrd");
-    made out = surfaces_of(&path, 1, &plain); /* Whole numbers of any type are labels. */
+    made out = surfaces_of(&path, 1, &plain); /* whole numbers of any type are labels */
     assert_int_equal(out.report.lung_count, 2);
     release(&out);
     supine_image_put(&map, voxels(&image) - 1, 1, &(double){wrong[w].value});
@@ -706,7 +705,7 @@ TEST(test_labels_impossible_voxels_refused) {
   supine_image_free(&image);
 }
 
-/* Damaged files are refused; test_image.c has more cases. */
+/* Damaged files are refused (test_image.c has more cases). */
 TEST(test_labels_damaged_files_refused) {
   const supine_labels_options plain = {.edge = 5.0};
   supine_image image = helper_two_lungs(8.0);
@@ -729,7 +728,7 @@ TEST(test_labels_damaged_files_refused) {
   supine_image_free(&image);
 }
 
-/* Let the work continue for `*left` calls of the progress function, then stop it. */
+/* Let the work continue for the first `*left` calls, then stop it. */
 static bool stop_at(void *context, double fraction) {
   long *left = context;
   assert_true(fraction >= 0.0 && fraction <= 1.0);

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare the positions of the lungs in label maps by nibabel, VTK and supine: for all 8 flips of the axes, permuted
-and oblique axes, by sform and by qform. Check the messages for 21 wrong headers.
+"""Check that nibabel, VTK and supine find the lungs at the same positions in label maps: with all 8 flips of the axes,
+with permuted and oblique axes, given as sform or as qform. Check the messages for 21 wrong headers.
 
     test_labels_orientation.py SUPINE
 """
@@ -26,8 +26,8 @@ faults = 0
 
 
 def made_map():
-    """Return a map with labels of lungmask, and its affine matrix, with axes along RAS. The right lung is larger.
-    Towards the feet, both lungs are wider and lie further back."""
+    """Return a label map of two ellipsoids with the labels of lungmask, and its affine matrix. The axes are RAS. The right
+    lung is larger. Both lungs are wider and lie further back towards the feet."""
     affine = numpy.diag([*SPACING, 1.0])
     affine[:3, 3] = [-141.3, -85.7, -113.9]
     index = numpy.stack(numpy.meshgrid(*map(numpy.arange, SIZE), indexing="ij"), -1)
@@ -39,7 +39,7 @@ def made_map():
 
 
 def phantom_map(folder):
-    """Return a label map of synthetic lungs, whose shape shows their axes, and its affine matrix, with axes along RAS."""
+    """Return a label map of synthetic lungs, from whose shape the axes can be recognised, and its affine matrix."""
     path = os.path.join(folder, "phantom.ply")
     subprocess.run([supine, "phantom", "--vertices", "8000", "-o", path], check=True, stdout=subprocess.DEVNULL)
     reader = vtk.vtkPLYReader()
@@ -75,8 +75,8 @@ def phantom_map(folder):
 
 
 def check_header(labels, affine, flips, folder):
-    """Check that the message for a header with reversed axes (rotated by 180 degrees or mirrored) names the option
-    that corrects it, and that no axes are proposed for a correct header."""
+    """Write a header in which the axes with flips[axis] == 1 are reversed. Check that a message names the option that
+    corrects these axes. If no axis is reversed, check that no option is named."""
     global faults
     path = os.path.join(folder, "header.nii.gz")
     nibabel.save(nibabel.Nifti1Image(labels, numpy.diag([*(-1.0 if f else 1.0 for f in flips), 1.0]) @ affine), path)
@@ -95,7 +95,7 @@ def check_header(labels, affine, flips, folder):
 
 
 def turned(labels, affine, order, flips):
-    """Return labels and affine matrix of the same lungs in the same place, stored along other axes."""
+    """Return the same lungs at the same position, stored along permuted and reversed axes: labels and affine matrix."""
     change = numpy.zeros((4, 4))
     change[3, 3] = 1
     for new, old in enumerate(order):
@@ -116,7 +116,7 @@ def rotation(angles):
 
 
 def centres(labels, affine):
-    """Return centre (LPS, mm) and volume (mL) of the voxels of each label, the left lung first."""
+    """Return the centre (LPS, mm) and the volume (mL) of the voxels of each lung, the left lung first."""
     out = []
     for label in (2, 1):
         voxels = numpy.argwhere(labels == label)
@@ -126,7 +126,7 @@ def centres(labels, affine):
 
 
 def by_vtk(path):
-    """Return the centres and volumes by VTK's reader. Its matrices expect mm along the image axes, not voxel indices."""
+    """Return centres and volumes as read by VTK, whose matrices apply to mm along the image axes, not to voxel indices."""
     reader = vtk.vtkNIFTIImageReader()
     reader.SetFileName(path)
     reader.Update()
@@ -139,7 +139,8 @@ def by_vtk(path):
 
 
 def by_supine(path, folder):
-    """Return centre (LPS, mm) and volume (mL) of each surface written by --surfaces-out."""
+    """Return a list with the centre (LPS, mm) and the volume (mL) of each surface that supine makes from the map, the left
+    lung first, and what supine prints. The list is None if supine fails."""
     out = os.path.join(folder, "surfaces.ply")
     result = subprocess.run([supine, "solve", path, "--labels", "lungmask", "--edge", "5",
                              "--posture", "prone", "--surfaces-out", out,
@@ -168,7 +169,7 @@ def by_supine(path, folder):
         six = numpy.einsum("ij,ij->i", p[:, 0] - origin,
                            numpy.cross(p[:, 1] - origin, p[:, 2] - origin))
         centre = ((p - origin).sum(1) * six[:, None]).sum(0) / 4 / six.sum() + origin
-        found.append((centre, six.sum() / 6000))  # mL, positive if triangles face outwards
+        found.append((centre, six.sum() / 6000))  # the volume is positive if triangles face outwards
     return sorted(found, key=lambda f: -f[0][0]), result.stdout + result.stderr
 
 
@@ -182,7 +183,7 @@ def check(name, labels, affine, folder, form):
     back = nibabel.load(path)
     wanted = centres(numpy.asarray(back.dataobj), back.affine)
     ours, said = by_supine(path, folder)
-    # The only warning allowed is that the lungs are small for full inflation.
+    # Allow only the warning that the lungs are small for full inflation.
     warned = [line for line in said.splitlines() if "warning" in line and "full inflation" not in line]
     if ours is None or warned:
         faults += 1
@@ -190,7 +191,7 @@ def check(name, labels, affine, folder, form):
         return
     for other, reader in ((ours, "supine"), (by_vtk(path), "vtk")):
         for (a, va), (b, vb) in zip(wanted, other):
-            # tolerances: a tenth of a voxel, and 1 % of the volume
+            # positions may differ by a tenth of a voxel, volumes by 1 %
             if numpy.abs(a - b).max() > 0.1 * max(SPACING) or abs(va - vb) > 0.01 * va:
                 faults += 1
                 print(f"{name}: nibabel {a} {va:.1f} mL, {reader} {b} {vb:.1f} mL")

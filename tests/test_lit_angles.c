@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compare the normals of supine_deform_lit with those of supine_normals, in held-out postures and
- * volumes from rest to full inflation. The angles between them are within the documented limits,
- * and are those stated in the file. */
+/* Compare normals by supine_deform_lit (from modes) with those by supine_normals (from triangles),
+ * in random states from rest to full inflation. The angles between both are within the documented
+ * limits, and as large as the basis file says. */
 #include "test.h"
 
 #include <supine/runtime.h>
@@ -15,17 +15,17 @@
 
 enum { STATES = 192 };
 
-/* Documented limits of the mean and the 99.9th percentile, degrees. */
+/* Documented limits of the mean and the 99.9th percentile of the angles, degrees. */
 static const double mean_most = 0.1;
 static const double p999_most = 1.0;
-/* Largest relative rounding error of numbers in the file, which have two digits. */
+/* Largest relative rounding error of a number with two digits, like those in the file. */
 static const double printed = 0.05;
-/* Tolerance of the mean over STATES random states, in standard errors. */
+/* Tolerance for the mean over the STATES random states, in standard errors. */
 static const double sigmas = 4.0;
-/* Tolerance of the percentile, as a ratio. It is large: few states determine the percentile. */
-static const double p999_near = 1.4;
+/* Tolerance for the 99.9th percentile, as a ratio, large because few states determine it. */
+static const double p999_ratio_most = 1.4;
 
-/* Make a basis of lungs scanned at full inflation, by the default law with this softening. */
+/* Make a basis of lungs scanned at full inflation, with the given softening of the force. */
 static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes) {
   static const supine_scan full = {true, {.gravity = {0, 1, 0}, .volume = {SUPINE_VOLUME_FULL, 0}}};
   const supine_resting resting = supine_reference_resting_default();
@@ -40,8 +40,7 @@ static supine_basis *make_basis(supine_lungs *lungs, double soften, size_t modes
   assert_true(file >= 0 && close(file) == 0);
   options.model.force.soften = soften;
   options.reference = &reference;
-  /* Exact storage, because rounded reference positions would rotate small triangles, and with them
-   * the reference normals. */
+  /* Rounded reference positions would turn small triangles and their normals. */
   const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
   if (supine_reference_find(lungs, &options.model, &full, &resting, &reference, &error) !=
           SUPINE_OK ||
@@ -59,8 +58,8 @@ static int compare_floats(const void *left, const void *right) {
   return a < b ? -1 : a > b;
 }
 
-/* Set angles [N] to the angle between both normals of each vertex in a random state, degrees.
- * Return their mean. */
+/* Set angles [N] to the angle, degrees, between both kinds of normal at each vertex in a random
+ * state. Return the mean angle. */
 static double measure(const supine_basis *basis, uint64_t *seed, float *xyz, float *lit,
                       float *exact, float *angles) {
   const supine_basis_info *info = supine_basis_get_info(basis);
@@ -114,14 +113,14 @@ static void check_angles(supine_lungs *lungs, double soften, size_t modes) {
   const char *said_mean = supine_basis_metadata(basis, "normals_mean_degrees");
   const char *said_p999 = supine_basis_metadata(basis, "normals_p999_degrees");
   assert_true(said_mean != NULL && said_p999 != NULL);
-  printf("%zu vertices, %zu modes, %zu modes of normals: mean %.3f degrees (stated %s), 99.9th "
-         "percentile %.2f (stated %s)\n",
+  printf("%zu vertices, %zu modes, %zu modes of normals: angles of %.3f degrees in the mean (%s in "
+         "the file), 99.9th percentile %.2f degrees (%s in the file)\n",
          n, info->mode_count, info->normal_count, mean, said_mean, p999, said_p999);
   assert_true(mean <= mean_most);
   assert_true(p999 <= p999_most);
   assert_true(fabs(mean - strtod(said_mean, NULL)) <= sigmas * error + printed * mean);
-  assert_true(p999 <= p999_near * strtod(said_p999, NULL));
-  assert_true(strtod(said_p999, NULL) <= p999_near * p999);
+  assert_true(p999 <= p999_ratio_most * strtod(said_p999, NULL));
+  assert_true(strtod(said_p999, NULL) <= p999_ratio_most * p999);
   free(xyz);
   free(lit);
   free(exact);

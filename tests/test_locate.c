@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expected errors, and lungs located from points that the law has moved. */
+/* Test expected errors, and the location of lungs from observed points. */
 #include "test.h"
 
 #include <supine/locate.h>
@@ -48,7 +48,7 @@ static supine_state state_of(const char *text) {
   return state;
 }
 
-/* Set xyz [VERTICES, 3] to the positions of all vertices in a state. */
+/* Set xyz [VERTICES, 3] to the positions of all vertices in a state, mm. */
 static void deform(const supine_basis *basis, const supine_state *state, float *xyz) {
   supine_pose pose;
   supine_error error = {0};
@@ -58,8 +58,8 @@ static void deform(const supine_basis *basis, const supine_state *state, float *
   supine_deform(basis, &pose, xyz);
 }
 
-/* Convert a point to another frame of reference: if `turned`, rotate it by 40 degrees about (1, 2,
- * 2) / 3, then shift it. */
+/* Convert the point x to another frame of reference: if `turned`, rotate x by 0.7 rad (40 degrees)
+ * about the axis (1, 2, 2) / 3. Then shift it. */
 static void move(bool turned, const double x[3], double moved[3]) {
   static const double shift[3] = {512, -207, 1020};
   const double c = turned ? cos(0.7) : 1;
@@ -73,19 +73,19 @@ static void move(bool turned, const double x[3], double moved[3]) {
   }
 }
 
-/* Observe one of every twenty vertices in the given state. */
+/* Observe one in twenty vertices, at their exact positions in a state. */
 static void observe(world *w, const supine_state *state, bool turned) {
   float xyz[3 * VERTICES];
   deform(w->basis, state, xyz);
   for (size_t j = 0; j < SEEN; ++j) {
-    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* including a tip of each lung */
+    const size_t at = j * VERTICES / SEEN + (j % 2) * 19; /* the +19 includes a tip of each lung */
     const double x[3] = {(double)xyz[3 * at], (double)xyz[3 * at + 1], (double)xyz[3 * at + 2]};
     w->seen[j] = (supine_observation){.vertex = at, .noise = 1};
     move(turned, x, w->seen[j].position);
   }
 }
 
-/* Return the RMS distance between the located and the true positions of all vertices, mm. */
+/* Return the RMS distance of all vertices between their located and their true positions, mm. */
 static double miss(const world *w, const supine_location *found, const supine_state *state,
                    bool turned) {
   float truth[3 * VERTICES];
@@ -128,8 +128,8 @@ TEST(test_locate_points_moved_by_law_positions_and_volume_recovered) {
   for (int rigid = 0; rigid < 2; ++rigid) {
     observe(w, &truth, rigid == 1);
     const supine_location found = locate(w, &posture, rigid == 1);
-    print_message("positions off by %.2f mm RMS, volume off by %.0f mL (stated %.0f), residuals "
-                  "%.2f mm RMS\n",
+    print_message("positions err by %.2f mm RMS, volume errs by %.0f mL (expected error %.0f mL), "
+                  "residuals %.2f mm RMS\n",
                   miss(w, &found, &truth, rigid == 1), found.volume - held[0] - held[1],
                   found.volume_error, found.residual_rms);
     assert_true(miss(w, &found, &truth, rigid == 1) < 2.5);
@@ -152,7 +152,8 @@ TEST(test_locate_given_volume_kept) {
 
 TEST(test_locate_wrong_point_reported_and_ignored) {
   world *w = *state;
-  const supine_state truth = state_of("left:full-700"); /* expected errors are about 10 mm */
+  const supine_state truth =
+      state_of("left:full-700"); /* a state in which expected errors are about 10 mm */
   const supine_state posture = state_of("left");
   observe(w, &truth, false);
   const supine_location before = locate(w, &posture, false);
@@ -192,7 +193,8 @@ TEST(test_locate_any_number_of_points_error_at_most_prior) {
     assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, NULL), SUPINE_OK);
     assert_int_equal(supine_locate_positions(&found, w->basis, xyz, sigma, NULL), SUPINE_OK);
     for (size_t i = 0; i < VERTICES; ++i) {
-      /* The prior uses at least 2 mm for |u|, so its error is at least 3 mm. */
+      /* Observing points must not increase the expected error. An error below 3 mm may rise to 3
+       * mm, because supine_locate assumes displacements of at least 2 mm. */
       assert_true(sigma[i] <= fmaxf(3.01F, 1.0001F * expected[i]));
     }
   }
@@ -243,14 +245,16 @@ TEST(test_locate_bad_task_refused) {
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
   task.count = 3;
-  w->seen[1] = w->seen[2] = w->seen[0]; /* three points in one place determine no rotation */
+  w->seen[1] = w->seen[2] =
+      w->seen[0]; /* three points at one position do not determine a rotation */
   assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
                    SUPINE_ERROR_ARGUMENT);
 }
 
-/* sigma^2 = |u| min(4.5 mm, RMS of u) for a displacement u from the scan. If the volume is relative
- * to rest, whose volume is assumed, add the square of the displacement caused by 5 % of full
- * inflation. */
+/* The expected error is sqrt(c |u|). Here u is the displacement of a vertex from the scan, and c is
+ * 4.5 mm or the RMS displacement of all vertices, whichever is less. If the volume is given
+ * relative to rest, the volume at rest is uncertain by 5 % of full inflation, and the resulting
+ * displacement is added to the expected error in quadrature. */
 TEST(test_expected_error_any_state_equals_formula) {
   world *w = *state;
   const supine_basis_info *info = supine_basis_get_info(w->basis);
@@ -287,7 +291,7 @@ TEST(test_expected_error_any_state_equals_formula) {
   float sigma[VERTICES];
   assert_int_equal(supine_expected_error(w->basis, &scan, NULL, sigma, NULL), SUPINE_OK);
   for (size_t i = 0; i < VERTICES; ++i) {
-    assert_true(sigma[i] == 0); /* no error in the state of the scan */
+    assert_true(sigma[i] == 0);
   }
 }
 

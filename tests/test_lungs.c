@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lungs from surfaces and their sides, synthetic lungs, and volume forms. */
+/* Test the sides of lungs, synthetic lungs, and the volumes of displaced lungs. */
 
 #include "precompute/lungs/phantom.h"
 #include "precompute/physics/model.h"
@@ -31,7 +31,7 @@ TEST(test_lungs_two_files_any_order_left_first) {
   }
 }
 
-/* A surface whose vertices alternate between the lungs is grouped by lung, the left lung first. */
+/* Vertices that alternate between two lungs are sorted by lung, the left lung first. */
 TEST(test_lungs_interleaved_file_grouped) {
   supine_mesh lumps[2] = {helper_lump(4, -80.0, 3), helper_lump(4, 90.0, 4)};
   const size_t n = lumps[0].vertex_count;
@@ -84,7 +84,7 @@ TEST(test_lungs_single_lung_midline_at_inner_face) {
   }
 }
 
-/* The box coordinate X increases from 0 at the midline to 1 at the outer side of either lung. */
+/* The box coordinate X of either lung is 0 at the midline and 1 at the outer side. */
 TEST(test_lungs_box_either_lung_increases_outwards) {
   supine_mesh lumps[2] = {helper_lump(5, 90.0, 3), helper_lump(5, -80.0, 4)};
   supine_lungs lungs = {0};
@@ -114,7 +114,7 @@ TEST(test_lungs_given_midline_decides_sides) {
   supine_mesh_free(&lump);
 }
 
-/* Reverse every triangle from `first` on. */
+/* Reverse the orientation of every triangle from `first` on. */
 static void turn_inwards(supine_mesh *mesh, size_t first) {
   for (size_t t = first; t < mesh->triangle_count; ++t) {
     const uint32_t corner = mesh->triangles[3 * t];
@@ -187,7 +187,7 @@ TEST(test_lungs_midline_out_of_place_refused) {
   expect_refused(lumps, 2, &midline, "x = 80 mm runs through the left lung");
   midline = 95.0;
   expect_refused(lumps, 1, &midline, "runs through the right lung");
-  midline = 20.0; /* 20 mm from the middle is accepted */
+  midline = 20.0; /* a midline 20 mm from the middle is accepted */
   supine_lungs lungs = {0};
   assert_int_equal(supine_lungs_create(lumps, 2, &midline, &lungs, NULL), SUPINE_OK);
   assert_int_equal(lungs.lung_count, 2);
@@ -241,8 +241,8 @@ TEST(test_phantom_pair_closed_with_given_volume) {
   assert_int_equal(supine_phantom_create(1000, NAN, &mesh, NULL), SUPINE_ERROR_ARGUMENT);
 }
 
-/* The phantom keeps the shape of its first version, with which the expected sums over vertices were
- * computed. Every harmonic of the shape contributes to these sums. */
+/* The expected sums over vertices were computed for the first version of the phantom. They depend
+ * on all coefficients of its shape. */
 TEST(test_phantom_create_same_shape_as_first_version) {
   static const double made[2] = {-542.627977, 212.207209};
   supine_mesh mesh = {0};
@@ -255,13 +255,13 @@ TEST(test_phantom_create_same_shape_as_first_version) {
         sum += sin((double)(v + 1) * (double)(a + 1)) * mesh.vertices[3 * v + a];
       }
     }
-    /* the tolerance, mm, is a hundredth of the contribution of the smallest coefficient */
+    /* mm; each coefficient of the shape changes `sum` by at least 0.01 mm */
     assert_true(fabs(sum - made[lung]) < 1e-4);
   }
   supine_mesh_free(&mesh);
 }
 
-/* Return the volume that one lung of a pair gains, mL, measured on the deformed surface. */
+/* Return the volume that one of two lungs gains, mL, measured on the displaced surface. */
 static double gained(const supine_lungs *lungs, size_t lung, const double *d, const double *columns,
                      size_t count, const double *weights, const double gains[3]) {
   const size_t n = lungs->mesh.vertex_count;
@@ -300,7 +300,7 @@ TEST(test_volume_forms_any_scale_equal_measured_volume) {
   for (size_t i = 0; i < n * COLUMNS; ++i) {
     columns[i] = helper_random(&seed);
   }
-  for (size_t i = 0; i < 3 * n * COLUMNS; ++i) { /* the same field as vectors */
+  for (size_t i = 0; i < 3 * n * COLUMNS; ++i) { /* the same displacements as vectors */
     vectors[i] = columns[i / (3 * COLUMNS) * COLUMNS + i % COLUMNS] * d[i / COLUMNS];
   }
   supine_volume_forms forms[2] = {{0}};

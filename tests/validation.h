@@ -17,7 +17,7 @@
 #include "precompute/precompute.h"
 #include <supine/volume.h>
 
-/* A network of masses and links, with or without triangles. */
+/* A network of masses and links. A ring has no triangles. */
 typedef struct frame {
   supine_mesh mesh;
   supine_topology topology;
@@ -28,8 +28,8 @@ static inline void frame_free(frame *f) {
   supine_mesh_topology_free(&f->topology);
 }
 
-/* Return a flat sheet of side x side masses, `spacing` mm apart, with links along rows, columns and
- * one diagonal. */
+/* Return a flat sheet of side x side masses, `spacing` mm apart. Links run along rows, along
+ * columns and along one diagonal of each square. */
 static inline frame frame_plane(size_t side, double spacing) {
   frame f = {.mesh = {.vertex_count = side * side, .triangle_count = 2 * (side - 1) * (side - 1)}};
   f.mesh.vertices = calloc(3 * f.mesh.vertex_count, sizeof *f.mesh.vertices);
@@ -53,7 +53,7 @@ static inline frame frame_plane(size_t side, double spacing) {
   return f;
 }
 
-/* Return a ring of evenly spaced masses with this radius, mm. */
+/* Return a ring with this radius, mm, of evenly spaced masses. */
 static inline frame frame_ring(size_t count, double radius) {
   frame f = {.mesh = {.vertex_count = count}, .topology = {.edge_count = count}};
   f.mesh.vertices = calloc(3 * count, sizeof *f.mesh.vertices);
@@ -63,7 +63,7 @@ static inline frame frame_ring(size_t count, double radius) {
     const double angle = 2.0 * M_PI * (double)i / (double)count;
     f.mesh.vertices[3 * i] = radius * cos(angle);
     f.mesh.vertices[3 * i + 1] = radius * sin(angle);
-    if (i > 0) { /* links in sorted order: (0, 1), (0, count - 1), (1, 2), ... */
+    if (i > 0) { /* sorts the links: (0, 1), (0, count - 1), (1, 2), ... */
       const size_t e = i == 1 ? 0 : i;
       f.topology.edges[2 * e] = (uint32_t)(i - 1);
       f.topology.edges[2 * e + 1] = (uint32_t)i;
@@ -72,7 +72,7 @@ static inline frame frame_ring(size_t count, double radius) {
   return f;
 }
 
-/* Solve for the catch F [N] of the masses under a force [N]. */
+/* Compute the catch (the force that each mass keeps) [N] from the applied force [N]. */
 static inline supine_status frame_solve(const frame *f, const double *stiffness,
                                         const double *force, double *catch_) {
   supine_equilibrium *equilibrium = NULL;
@@ -88,24 +88,24 @@ static inline supine_status frame_solve(const frame *f, const double *stiffness,
   return status;
 }
 
-/* Unit masses linked by springs, each with a damper and a spring to the ground: the position y_i of
- * mass i obeys
+/* Masses of 1, linked by springs. Each mass is also tied to the ground by a damper and a spring.
+ * The position y_i of mass i obeys
  *
  *     y_i'' = p_i - ground_i y_i - sum over links of k_ij (y_i - y_j) - damping y_i' */
 typedef struct mass_spring_damper {
   size_t count;
   size_t links;
-  const uint32_t *ends; /* [links, 2] masses at the ends of each link */
-  double *k;            /* [links] spring constant k_ij */
-  double *ground;       /* [count] spring constant to the ground */
-  double *push;         /* [count] push p_i */
+  const uint32_t *ends; /* [links, 2] indices of the linked masses i, j */
+  double *k;            /* [links] k_ij */
+  double *ground;       /* [count] ground_i */
+  double *push;         /* [count] p_i */
   double damping;
-  size_t evaluations; /* of the right-hand side of the equation of motion */
+  size_t evaluations; /* number of evaluations of y'' */
 } mass_spring_damper;
 
-/* Create a system whose equilibrium y is E F of equilibrium.h, for a stiffness E of geometric
- * mean 1. In the matrix of the equation for y, the element of a link is -k_ij, and the row of a
- * mass sums to ground_i. */
+/* Create a system in whose equilibrium the position of each mass equals its stiffness times its
+ * catch, the force that the mass keeps in [Santhanam2008]. The stiffness must have geometric mean
+ * 1. */
 static inline mass_spring_damper damper_create(const frame *f, const double *stiffness,
                                                const double *force) {
   const size_t n = f->mesh.vertex_count;
@@ -161,8 +161,9 @@ static inline int damper_slope(double time, const double *state, double *slope, 
   return GSL_SUCCESS;
 }
 
-/* Integrate for `seconds` from y = 0. At each of `marks` evenly spaced times, set catch_ to F = y /
- * E and call `seen` if it is not NULL. Return false if GSL fails. */
+/* Integrate for `seconds` from positions and velocities of 0. At each of `marks` evenly spaced
+ * times, set catch_ to the positions divided by the stiffness, and call `seen` if it is not NULL.
+ * Return false if GSL fails. */
 static inline bool damper_integrate(mass_spring_damper *system, const double *stiffness,
                                     double seconds, size_t marks, double *catch_,
                                     void (*seen)(void *context, size_t evaluations,
@@ -192,7 +193,7 @@ static inline bool damper_integrate(mass_spring_damper *system, const double *st
   return good;
 }
 
-/* Return the RMS of a - b divided by the RMS of b. */
+/* Return the RMS of a - b, divided by the RMS of b. */
 static inline double relative_rms(size_t count, const double *a, const double *b) {
   double difference = 0.0;
   double norm = 0.0;
@@ -203,8 +204,8 @@ static inline double relative_rms(size_t count, const double *a, const double *b
   return sqrt(difference / norm);
 }
 
-/* Return a force on a sheet (malloc): a peak at the centre, whose radius is a fifth of the side,
- * plus a slope along y. */
+/* Return the force on each mass of a sheet (malloc): a Gaussian about the centre, whose radius is a
+ * fifth of the side, plus a term that grows with y. */
 static inline double *plane_force(const frame *f) {
   const size_t n = f->mesh.vertex_count;
   const double *last = f->mesh.vertices + 3 * (n - 1);
@@ -226,7 +227,7 @@ static inline double *ones(size_t count) {
   return values;
 }
 
-/* Scale the stiffness to geometric mean 1. */
+/* Multiply the stiffness by one factor, so that its geometric mean is 1. */
 static inline void normalise_stiffness(size_t count, double *stiffness) {
   double sum = 0.0;
   for (size_t i = 0; i < count; ++i) {
@@ -237,8 +238,7 @@ static inline void normalise_stiffness(size_t count, double *stiffness) {
   }
 }
 
-/* Return the stiffness of a ring. Its middle third is `factor` times as stiff as the two others
- * (malloc). */
+/* Return the stiffness of a ring (malloc): `factor` in one third of the ring, 1 elsewhere. */
 static inline double *ring_stiffness(size_t count, double factor) {
   double *stiffness = calloc(count, sizeof *stiffness);
   for (size_t i = 0; i < count; ++i) {
@@ -247,18 +247,17 @@ static inline double *ring_stiffness(size_t count, double factor) {
   return stiffness;
 }
 
-/* number of slabs of equal height along gravity; slab 0 is the uppermost */
+/* number of horizontal slabs of equal height; slab 0 is the uppermost */
 enum { ZONES = 10 };
 
 typedef struct ventilation {
-  double index[ZONES]; /* mean catch of a slab divided by the mean catch of all slabs */
-  double swept[ZONES]; /* ratio of a slab's share of the breath to its share of the area */
-  double slope; /* least-squares slope of the index over the position along gravity, from 0 (top) to
-                   1 */
-  double height; /* height of the lungs along gravity, mm */
+  double index[ZONES]; /* mean catch (force kept) in a slab, divided by the mean of all slabs */
+  double swept[ZONES]; /* share of the inhaled volume, divided by the share of the area */
+  double slope;  /* slope of `index` against depth, which is 0 at the top and 1 at the bottom */
+  double height; /* height of the lungs, mm */
 } ventilation;
 
-/* Measure the ventilation of a breath of `volume` mL. */
+/* Measure the ventilation of slabs when the lungs inhale `volume` mL under gravity g. */
 static inline supine_status ventilation_measure(const supine_lungs *lungs, const double g[3],
                                                 double volume, ventilation *found) {
   const size_t n = lungs->mesh.vertex_count;
@@ -294,8 +293,7 @@ static inline supine_status ventilation_measure(const supine_lungs *lungs, const
     areas[zone] += area[i];
     caught[zone] += area[i] * solution.catch_[i];
   }
-  /* Volume swept by a triangle: its mean displacement times the mean of its old and new area
-   * vectors. */
+  /* A triangle sweeps its mean displacement times the mean of its old and new area vectors. */
   for (size_t t = 0; t < lungs->mesh.triangle_count; ++t) {
     const uint32_t *c = lungs->mesh.triangles + 3 * t;
     double middle[3] = {0.0, 0.0, 0.0};
@@ -352,12 +350,12 @@ cleanup:
   return status;
 }
 
-/* A grid of cells of `size` mm, to search for the nearest vertex. */
+/* A grid of cubic cells with sides of `size` mm, to search for the nearest vertex. */
 typedef struct nearest_grid {
   double low[3], size;
   size_t cells[3];
-  size_t *begin;   /* [number of cells + 1] index in `order` of the first vertex of each cell */
-  uint32_t *order; /* [N] vertices sorted by cell */
+  size_t *begin; /* [number of cells + 1] index in `order` where the vertices of each cell begin */
+  uint32_t *order; /* [N] indices of vertices, sorted by cell */
   const supine_mesh *mesh;
 } nearest_grid;
 
@@ -400,8 +398,7 @@ static inline void nearest_free(nearest_grid *grid) {
   free(grid->order);
 }
 
-/* Return the vertex nearest to p in the cell of p and its neighbours, or SIZE_MAX if these cells
- * are empty. */
+/* Return the nearest vertex in the cell of p and adjacent cells, SIZE_MAX if these are empty. */
 static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   long cell[3];
   size_t found = SIZE_MAX;
@@ -430,7 +427,7 @@ static inline size_t nearest_find(const nearest_grid *grid, const double *p) {
   return found;
 }
 
-/* Set moves [N, 3], mm, to the displacements in a breath of `volume` mL. */
+/* Set moves [N, 3], mm, to the displacements if the lungs inhale `volume` mL under gravity g. */
 static inline supine_status breathe_at(const supine_lungs *lungs, double reach, const double g[3],
                                        double volume, double *moves) {
   supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
@@ -448,7 +445,8 @@ static inline supine_status breathe_at(const supine_lungs *lungs, double reach, 
   return status;
 }
 
-/* Compute the area-weighted RMS distance over which a unit force on a vertex spreads, mm. */
+/* Compute the RMS distance, mm, from a vertex to the places that a unit force on it reaches,
+ * weighted by force and area. */
 static inline supine_status spread_of(const supine_lungs *lungs, double reach, size_t vertex,
                                       double *spread) {
   const size_t n = lungs->mesh.vertex_count;
@@ -481,8 +479,8 @@ static inline supine_status spread_of(const supine_lungs *lungs, double reach, s
   return status;
 }
 
-/* Compare the displacements of two meshes of a lung at each vertex of `coarse` and the nearest
- * vertex of `fine`. Return their RMS difference divided by the RMS displacement of `fine`. */
+/* Compare the displacement of each vertex of `coarse` with that of the nearest vertex of `fine`,
+ * two meshes of one lung. Return the RMS difference divided by the RMS displacement of `fine`. */
 static inline double drift_of(const supine_mesh *coarse, const double *coarse_moves,
                               const supine_mesh *fine, const double *fine_moves) {
   nearest_grid grid = nearest_create(fine, 5.0);

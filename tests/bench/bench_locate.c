@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the errors of law and kriging at held-out points. For each of five people, predict the
- * displacements of all landmarks from those of ten landmarks, from exhaled to inhaled and in the
- * opposite direction. Print the RMS errors in mm and the percentage of points within the 95 % band,
- * then the time that the run-time library needs for a surface.
+/* Measure how well kriging predicts the displacements of landmarks in the lungs of five people.
+ * Observe ten landmarks of a person, and predict the displacements of all others, from exhaled to
+ * inhaled and from inhaled to exhaled. Print the RMS error in mm and the percentage of landmarks
+ * within the predicted 95 % band. Then print the time that the run-time library needs for a
+ * surface.
  *
  *     bench_locate [FOLDER OF LANDMARKS]
  *
- * The law is evaluated in closed form, with the applied force. The prior mean of a person's scale
- * is the mean scale of the other four people; its standard deviation is 30 % of this mean. */
+ * Kriging corrects a displacement law, which is here proportional to the applied force instead of
+ * the equilibrium. A scale multiplies the law. The prior mean of a person's scale is the mean of
+ * the other four people's scales. The prior standard deviation is 30 % of the prior mean. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -32,10 +34,10 @@ static const double spread = 0.3; /* prior standard deviation of the scale, rela
 
 typedef struct person {
   size_t count; /* number n of landmarks */
-  /* [n, 3] positions before the motion, displacements, and displacements by the law at scale 1,
-   * mm */
+  /* [n, 3] mm: positions, displacements, and displacements by the law at scale 1 */
   double from[3 * POINTS_MAX], moved[3 * POINTS_MAX], law[3 * POINTS_MAX];
-  double central[POINTS_MAX]; /* [n] squared distance from the centre of the box, in half sides */
+  double central[POINTS_MAX]; /* [n] squared distance from the centre of the box, scaled to sides of
+                                 2 */
   size_t lung[POINTS_MAX];
 } person;
 
@@ -46,8 +48,8 @@ static void need(supine_status status, const supine_error *error) {
   }
 }
 
-/* Compute the displacements of `points`, one for each landmark, in supine lungs by the law, and
- * store them in `p->law`. The bounding box of the points is used as that of the lungs. */
+/* Compute the displacements of `points`, one for each landmark, by the displacement law for supine
+ * lungs, and store them in `p->law`. The bounding box of the points replaces that of the lungs. */
 static void find_law(person *p, const double *points) {
   const supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
   const double *c = model.direction.c;
@@ -106,8 +108,7 @@ static void load(const char *folder, const char *name, bool inhaling, person *p)
   find_law(p, p->from);
 }
 
-/* Compute the scale of the law that fits the displacements best, up to a free translation. */
-static double best_scale(const person *p) {
+static double fit_scale(const person *p) {
   double mean[2][3] = {{0}};
   double lu = 0;
   double ll = 0;
@@ -123,8 +124,8 @@ static double best_scale(const person *p) {
   return lu / ll;
 }
 
-/* Evaluate the law at the inhaled position p of each landmark. The law displaces p to the exhaled
- * position x: solve p - scale * law(p) = x by iteration from p = x. */
+/* Evaluate the displacement law at the inhaled position p of each landmark, whose exhaled position
+ * x is known. Solve p = x + scale * law(p) by iteration from p = x. */
 static void find_law_at_inhaled(person *p, double scale) {
   double full[3 * POINTS_MAX];
   for (int step = 0; step < 30; ++step) {
@@ -151,12 +152,12 @@ static void set_point(const person *p, size_t j, double scale, double prior,
   }
 }
 
-/* Sums over the draws of one person. */
+/* Sums over DRAWS random choices of observed landmarks, for one person. */
 typedef struct sums {
   double error;    /* squared errors, mm^2 */
-  double stated;   /* variances stated by kriging, mm^2 */
-  double points;   /* number of held-out points */
-  double held;     /* number of held-out points within the 95 % band */
+  double stated;   /* variances predicted by kriging, mm^2 */
+  double points;   /* number of unobserved points */
+  double held;     /* number of unobserved points within the predicted 95 % band */
   double left_out; /* number of observed points judged to be outliers */
   double judged;   /* number of observed points */
 } sums;
@@ -238,8 +239,8 @@ static void study(const person *people, size_t number, double prior, bool centra
   gsl_rng_free(random);
 }
 
-/* Evaluate the law for all people, and set the prior of each person's scale to the mean scale of
- * the other four. */
+/* Evaluate the displacement law for all people, and set the prior mean of each person's scale to
+ * the mean of the other four people's scales. */
 static void prepare(const char *folder, bool inhaling, person *people, double *prior) {
   static const char *const names[PEOPLE] = {"054", "055", "056", "094", "097"};
   for (int pass = 0; pass < (inhaling ? 2 : 1); ++pass) {
@@ -250,16 +251,14 @@ static void prepare(const char *folder, bool inhaling, person *people, double *p
       } else {
         find_law_at_inhaled(&people[k], prior[k]);
       }
-      total += best_scale(&people[k]);
+      total += fit_scale(&people[k]);
     }
     for (size_t k = 0; k < PEOPLE; ++k) {
-      prior[k] = (total - best_scale(&people[k])) / (PEOPLE - 1);
+      prior[k] = (total - fit_scale(&people[k])) / (PEOPLE - 1);
     }
   }
 }
 
-/* Print the time, ms, in which one thread computes 25,000 vertices and their expected errors from
- * 20 observed points. */
 static void clock_library(void) {
   enum { VERTICES = 25000, MODES = 16, SEEN = 20, REPEATS = 30 };
   static const double resting[9] = {1700 * -3.5449077018110318};
@@ -304,9 +303,9 @@ static void clock_library(void) {
       found_in = fmin(found_in, middle - begin);
     }
     (void)printf(
-        "%d points, %d vertices with expected errors%s: %.2f ms, of which %.2f ms are the fit "
-        "(least of %d)\n",
-        SEEN, VERTICES, rigid == 1 ? ", with a rotation" : "", 1e3 * least, 1e3 * found_in,
+        "%d observed points, %d vertices with expected errors%s: %.2f ms, of which the fit takes "
+        "%.2f ms (fastest of %d runs)\n",
+        SEEN, VERTICES, rigid == 1 ? ", unknown rotation" : "", 1e3 * least, 1e3 * found_in,
         REPEATS);
   }
   free(space);
@@ -319,9 +318,10 @@ int main(int argc, char **argv) {
   double prior[PEOPLE];
   const char *folder = argc > 1 ? argv[1] : SUPINE_TEST_DATA "/landmarks";
   (void)printf(
-      "law + kriging from %d observed landmarks, %d draws per person; errors at the other "
-      "landmarks, mean over %d people\ndrawn    motion               error, mm  stated, mm  95 %% "
-      "band holds  points judged wrong\n",
+      "displacement law with kriging from %d observed landmarks, chosen %d times per person; RMS "
+      "errors at the other landmarks, mean over %d people\n"
+      "chosen   motion               error, mm  predicted, mm  within 95 %% band  judged "
+      "outliers\n",
       DRAWN, DRAWS, PEOPLE);
   for (int central = 0; central < 2; ++central) {
     double mean[4] = {0};
@@ -338,12 +338,12 @@ int main(int argc, char **argv) {
           mean[i] += own[i] / (2 * PEOPLE);
         }
       }
-      (void)printf("%-7s  %s      %5.2f       %5.2f          %5.1f %%  %5.1f %%\n",
+      (void)printf("%-7s  %s      %5.2f          %5.2f           %5.1f %%          %5.1f %%\n",
                    central == 1 ? "central" : "random",
                    back == 0 ? "exhaled to inhaled" : "inhaled to exhaled", of[0], of[1], of[2],
                    of[3]);
     }
-    (void)printf("%-7s  %-18s      %5.2f       %5.2f          %5.1f %%  %5.1f %%\n",
+    (void)printf("%-7s  %-18s      %5.2f          %5.2f           %5.1f %%          %5.1f %%\n",
                  central == 1 ? "central" : "random", "both", mean[0], mean[1], mean[2], mean[3]);
   }
   clock_library();

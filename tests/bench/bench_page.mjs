@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measure the time of a frame of the exported page and of each pass: the fastest of several alternating runs.
+// Measure the time in which the exported page draws a frame, and the time of each pass of a frame. Each time is the
+// shortest of several alternating runs.
 //
 //     node tests/bench/bench_page.mjs PAGE.html [CHROMIUM [FLAG...]]
 //
 // Needs playwright-core (npm install in tests/export, or in the folder of the environment variable MODULES). Chromium
 // draws in software unless FLAGs choose a graphics card: --enable-gpu and --use-angle=gl or --use-angle=vulkan.
-// "still" draws the surface without deforming it, like a viewer of a mesh of as many triangles. "turning" is a frame
-// in which the patient turns: weights, positions, normals and drawing. "script" is the part of this frame that the CPU
-// computes. The ratio turning / still is the cost of deforming relative to drawing.
+// "still" is a frame that draws the surface without deforming it. "turning" is a frame while the patient turns: weights,
+// positions, normals and drawing. "script" is the time of the CPU in such a frame. The ratio of turning to still is the
+// cost of deforming and drawing relative to drawing alone.
 import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the precomputation of both lungs with the default options, from mesh files to basis file,
- * against the time that assimp alone takes to load the same files one after the other and join
- * identical vertices. Runs alternate. Print the least time of each, then how the time grows from
- * 5,000 to 509,000 vertices.
+/* Measure the time to precompute a basis file from the mesh files of two lungs with default
+ * options, against the time that assimp alone takes to load the same files one after the other and
+ * join identical vertices. Runs alternate. Print the least time of each, then how the time grows
+ * from 5,000 to 509,000 vertices.
  *
  *     bench_precompute [REPEATS] */
 #include <stdio.h>
@@ -54,8 +54,7 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Precompute a basis, and set the time of each stage. Return the total time in s, negative on
- * failure. */
+/* Set the time of each stage, s. Return the total time, s, or -1 if a stage fails. */
 static double run_ours(pair *files, const char *out, double times[STAGES], size_t *vertices) {
   supine_lungs lungs = {0};
   supine_error error;

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure how much longer a call from Python takes than the same call in C: the fastest of several alternating runs.
+"""Measure how much longer supine_deform takes if called from Python instead of C, in the fastest of TURNS
+alternating runs of each.
 
     bench_python.py REFERENCE BASIS [TURNS]     REFERENCE: the program of tests/python/reference.c
 
@@ -16,7 +17,7 @@ reference, path = sys.argv[1:3]
 lungs = supine.open(path)
 pose = lungs.pose("prone")
 points = np.empty((lungs.vertex_count, 3), np.float32)
-CALLS = 20000  # like tests/python/reference.c
+CALLS = 20000  # as in tests/python/reference.c
 calls = {"deform into an array": lambda: lungs.deform(pose, points),
          "deform into a new array": lambda: lungs.deform(pose)}
 fastest = dict.fromkeys(calls, float("inf"))

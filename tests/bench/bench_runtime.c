@@ -32,15 +32,15 @@ void openblas_set_num_threads(int threads);
 
 typedef struct bench {
   const supine_basis_info *info;
-  supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis in each storage */
-  supine_basis *simd[SUPINE_SIMD_COUNT];       /* in 16 bits; NULL if the set is not available */
+  supine_basis *storage[SUPINE_STORAGE_COUNT]; /* the basis for each way of storing coefficients */
+  supine_basis *simd[SUPINE_SIMD_COUNT];       /* NULL if the processor lacks the instruction set */
   supine_pose pose;
-  float weights[SUPINE_MODES_MAX]; /* [K] weights of the modes, times the gain */
+  float weights[SUPINE_MODES_MAX]; /* [K] weights times gain */
   float *xyz, *normals;            /* [N, 3] positions, mm, and normals */
-  float *amount;                   /* [N] displacement along the direction, mm */
-  float *columns;                  /* [K, N] coefficients, mode by mode */
-  int16_t *counts;                 /* [K, N] coefficients as 16-bit counts */
-  float units[SUPINE_MODES_MAX];   /* [K] unit of the counts, mm, times the weight of the mode */
+  float *amount;                   /* [N] mm along the direction of displacement */
+  float *columns;                  /* [K, N] */
+  int16_t *counts;                 /* [K, N] coefficients as 16-bit integers */
+  float units[SUPINE_MODES_MAX];   /* [K] units of `counts`, mm, times the weights */
 } bench;
 
 typedef struct entry {
@@ -49,8 +49,8 @@ typedef struct entry {
   bench *work;
   const supine_basis *basis;
   size_t threads;
-  double bytes;   /* memory traffic, bytes per vertex */
-  double seconds; /* least time for all vertices so far, s */
+  double bytes;   /* bytes read and written per vertex */
+  double seconds; /* shortest time for all vertices so far, s */
 } entry;
 
 static void run_deform(void *context, size_t begin, size_t end, size_t thread) {
@@ -100,7 +100,8 @@ static void run_sgemv(void *context, size_t begin, size_t end, size_t thread) {
   displace(e->work, begin, end);
 }
 
-/* Evaluate by one plain loop, compiled with -march=native. */
+/* Compute positions by one plain loop, compiled with -march=native. The loop over 16 modes has a
+ * constant length, so that the compiler unrolls it. */
 static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   const bench *work = ((const entry *)context)->work;
   const supine_basis_info *m = work->info;
@@ -110,7 +111,7 @@ static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   for (size_t i = begin; i < end; ++i) {
     const float *c = m->coefficients + i * m->mode_count;
     float amount = 0;
-    if (m->mode_count == 16) { /* the compiler unrolls a loop with a constant count */
+    if (m->mode_count == 16) {
       for (size_t k = 0; k < 16; ++k) {
         amount += w[k] * c[k];
       }
@@ -125,7 +126,7 @@ static void run_plain(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Evaluate by sgemv with the modes as columns of a column-major matrix. */
+/* Compute displacements by sgemv from a matrix whose columns are the modes, then positions. */
 static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t thread) {
   const entry *e = context;
   const bench *work = e->work;
@@ -136,9 +137,9 @@ static void run_sgemv_columns(void *context, size_t begin, size_t end, size_t th
   displace(work, begin, end);
 }
 
-enum { BLOCK = 16384 }; /* number of vertices whose sums fit in the second-level cache */
+enum { BLOCK = 16384 }; /* number of vertices whose displacements fit in the second-level cache */
 
-/* Add mode k to the sums of vertices begin <= i < end. */
+/* Add the displacements by mode k to `amount` of vertices begin <= i < end. */
 typedef void add_mode(const bench *work, size_t k, size_t begin, size_t end);
 
 static void add_column(const bench *work, size_t k, size_t begin, size_t end) {
@@ -159,7 +160,7 @@ static void add_counts(const bench *work, size_t k, size_t begin, size_t end) {
   }
 }
 
-/* Evaluate mode by mode over blocks of vertices: the fastest simple loop. */
+/* Compute positions block by block, and in a block mode by mode. */
 static void run_blocks(const bench *work, add_mode *add, size_t begin, size_t end) {
   for (size_t at = begin; at < end; at += BLOCK) {
     const size_t last = end - at < BLOCK ? end : at + BLOCK;
@@ -181,7 +182,7 @@ static void run_planar_int16(void *context, size_t begin, size_t end, size_t thr
   run_blocks(((const entry *)context)->work, add_counts, begin, end);
 }
 
-/* Store the coefficients mode by mode, as float32 and as 16-bit counts. */
+/* Store the coefficients of each mode contiguously, as float32 and as 16-bit integers. */
 static void make_columns(bench *work) {
   const size_t n = work->info->vertex_count;
   const size_t modes = work->info->mode_count;
@@ -202,8 +203,7 @@ static void make_columns(bench *work) {
 }
 
 #if defined(__x86_64__)
-/* Repeat the loads and stores of the evaluation without its arithmetic, to measure the limit by
- * memory. */
+/* Load and store the same bytes as supine_deform, but compute nothing. */
 __attribute__((target("avx512f"))) static void run_traffic(void *context, size_t begin, size_t end,
                                                            size_t thread) {
   const entry *e = context;
@@ -276,13 +276,13 @@ static size_t add_entries(bench *work, entry *entries) {
   return count;
 }
 
-/* Measure all entries several times, beginning with another entry each time. */
+/* Measure all entries REPEATS times. Each time, begin with another entry. */
 static void measure(entry *entries, size_t count, size_t vertices) {
   const size_t rounds = 1 + ENOUGH / vertices;
   for (size_t turn = 0; turn < REPEATS; ++turn) {
     for (size_t i = 0; i < count; ++i) {
       entry *e = &entries[(i + turn) % count];
-      supine_parallel_for(vertices, 64, e->threads, e->range, e); /* warm-up: fills the caches */
+      supine_parallel_for(vertices, 64, e->threads, e->range, e);
       const double begin = supine_clock_seconds();
       for (size_t r = 0; r < rounds; ++r) {
         supine_parallel_for(vertices, 64, e->threads, e->range, e);
@@ -315,11 +315,12 @@ static void print(const entry *entries, size_t count, size_t vertices) {
   const double own = find(entries, count, "supine", "int16", 1);
   const double exact32 = find(entries, count, "supine", "exact", 1);
   (void)printf(
-      "int16: %.2f times as fast as sgemv and a loop that adds the displacement (%.2f with modes "
-      "as columns), %.2f times "
-      "as fast as one fused loop, %.2f times as fast as a planar loop of int16; float32: %.2f "
-      "times as fast as a planar loop of float32; int16: %.2f times as fast as its loads and "
-      "stores alone; two threads: %.2f times as fast as one\n",
+      "supine int16, 1 thread, compared with:\n"
+      "  sgemv_displace float32: %.2f times as fast\n  sgemv_columns float32: %.2f times as fast\n"
+      "  plain_native float32: %.2f times as fast\n  planar int16: %.2f times as fast\n"
+      "supine exact compared with planar float32: %.2f times as fast\n"
+      "supine int16, 1 thread, compared with traffic int16: %.2f times as fast\n"
+      "supine int16, 2 threads compared with 1 thread: %.2f times as fast\n",
       find(entries, count, "sgemv_displace", "float32", 1) / own,
       find(entries, count, "sgemv_columns", "float32", 1) / own,
       find(entries, count, "plain_native", "float32", 1) / own,
@@ -329,14 +330,15 @@ static void print(const entry *entries, size_t count, size_t vertices) {
       own / find(entries, count, "supine", "int16", 2));
   const double exact = find(entries, count, "exact_normals", "float32", 1);
   if (isfinite(exact)) {
-    (void)printf("normals: %.2f times as fast as exact normals; a lit frame takes %.2f of the time "
-                 "of a frame with exact normals\n",
-                 exact / find(entries, count, "normals", "int16", 1),
-                 find(entries, count, "lit", "int16", 1) / (own + exact));
+    (void)printf(
+        "normals from modes: %.2f times as fast as exact normals; positions and normals from modes "
+        "take %.2f times as long as positions and exact normals\n",
+        exact / find(entries, count, "normals", "int16", 1),
+        find(entries, count, "lit", "int16", 1) / (own + exact));
   }
 }
 
-/* Check that all measured loops give the same positions. */
+/* Check that all measured loops compute the same positions. */
 static bool check_same(bench *work, entry *entries, size_t count) {
   const size_t n = work->info->vertex_count;
   float *expected = fixture_allocate(3 * n, sizeof *expected);
@@ -356,8 +358,8 @@ static bool check_same(bench *work, entry *entries, size_t count) {
         moved = fmax(moved, fabs((double)expected[k] - (double)work->info->vertices[k]));
       }
       if (apart > 1e-3 * moved) {
-        (void)fprintf(stderr, "%s %s and the plain loop differ by %g mm\n", entries[i].what,
-                      entries[i].how, apart);
+        (void)fprintf(stderr, "positions by %s %s and by the plain loop differ by %g mm\n",
+                      entries[i].what, entries[i].how, apart);
         same = false;
       }
     }

@@ -7,9 +7,9 @@
  * This program sends 66.66 poses a second, like a tracker, to a server on the same machine, and
  * receives frames of weights, points or surfaces (WHAT). Print a row for each kind, and below it a
  * row for a server that sends messages of the same size without any computation. A row has
- * - the number of poses sent, and of frames received
- * - "old": number of frames that ended after a newer pose was sent
- * - "oldest": largest number of newer poses sent before the end of a frame
+ * - the numbers of poses sent and of frames received
+ * - "old": the number of frames that arrived after a newer pose had been sent
+ * - "oldest": the largest number of newer poses that had been sent when a frame arrived
  * - median, 99th percentile and maximum of the time from the first byte of a pose sent to the last
  *   byte of its frame received, ms
  * - memory of the server after 1 s and at the end, KiB
@@ -41,8 +41,7 @@ static int fail(const char *what) {
   return 1;
 }
 
-/* Start the server; return its port, or 0 on failure. The caller closes `lines`, the server's
- * output. */
+/* Start the server, and open its output `lines`. Return its port, or 0 on failure. */
 static int serve(const char *supine, const char *basis, const char *what, pid_t *server,
                  FILE **lines) {
   int ends[2];
@@ -67,8 +66,8 @@ static int serve(const char *supine, const char *basis, const char *what, pid_t 
   return port;
 }
 
-/* Start a server that answers each pose by a message of `size` bytes without any computation. No
- * frame of this size can take less time. Return its port, or 0 on failure. */
+/* Start a server that answers each pose by `size` bytes without any computation, to measure the
+ * shortest possible latency. Return the port, or 0 on failure. */
 static int serve_bare(size_t size, pid_t *server) {
   struct sockaddr_in here = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
   socklen_t length = sizeof here;
@@ -129,11 +128,10 @@ static int dial(int port) {
   return s;
 }
 
-/* Write the message of the pose at `time` s, of a body that turns about its long axis twice a
- * minute. */
+/* Encode the pose of a body that turns about its long axis twice a minute. */
 static void make_pose(double time, uint64_t stamp, unsigned char bytes[POSE_SIZE]) {
   const double angle = time * (2.0 * M_PI / 30.0);
-  /* columns of the rotation: directions of left, back and head */
+  /* rotation matrix by columns: the body's left, back and head */
   float columns[12] = {
       (float)cos(angle), 0, (float)-sin(angle), (float)-sin(angle), 0, (float)-cos(angle), 0, 1, 0};
   unsigned char *body = bytes + SUPINE_STREAM_HEADER;
@@ -153,46 +151,45 @@ static int compare(const void *a, const void *b) {
 }
 
 typedef struct tally {
-  double *sent;           /* [poses] time at which the pose with stamp index + 1 was sent, s */
-  double *latency;        /* [answered] time from sending a pose to receiving its frame, s */
-  size_t poses, answered; /* number of poses sent, and of frames received */
-  size_t old;             /* number of frames that ended after a newer pose was sent */
-  size_t oldest;          /* largest number of newer poses sent before the end of a frame */
-  /* Bytes of the current message: received, and expected (at first only the header). */
-  size_t got, wanted;
+  double *sent;    /* [poses] times at which poses were sent, s; pose i has the time stamp i + 1 */
+  double *latency; /* [frames] times from sending a pose to receiving its frame, s */
+  size_t poses, frames;
+  size_t old;    /* number of frames that arrived after a newer pose had been sent */
+  size_t oldest; /* largest number of newer poses that had been sent when a frame arrived */
+  /* numbers of bytes of the current message: arrived so far, needed to go on */
+  size_t arrived, needed;
   unsigned char head[SUPINE_STREAM_HEADER];
   supine_stream_header header;
 } tally;
 
-/* Receive the bytes that have arrived, without waiting; return false if the connection is closed or
- * a message is malformed. */
+/* Receive what has arrived. Return false if the connection is closed or a message is invalid. */
 static bool take(int s, tally *t) {
   static unsigned char bytes[1 << 20];
   for (;;) {
-    const size_t left = t->wanted - t->got;
-    const bool head = t->wanted == SUPINE_STREAM_HEADER;
-    const ssize_t n = recv(s, head ? t->head + t->got : bytes,
+    const size_t left = t->needed - t->arrived;
+    const bool head = t->needed == SUPINE_STREAM_HEADER;
+    const ssize_t n = recv(s, head ? t->head + t->arrived : bytes,
                            left < sizeof bytes ? left : sizeof bytes, MSG_DONTWAIT);
     if (n <= 0) {
       return n < 0;
     }
-    t->got += (size_t)n;
-    if (t->got < t->wanted) {
+    t->arrived += (size_t)n;
+    if (t->arrived < t->needed) {
       continue;
     }
-    t->got = 0;
+    t->arrived = 0;
     if (head) {
       supine_error error;
       if (supine_stream_header_read(t->head, &t->header, &error) != SUPINE_OK) {
         return false;
       }
-      t->wanted = SUPINE_STREAM_HEADER + (size_t)t->header.size;
-      t->got = SUPINE_STREAM_HEADER;
+      t->needed = SUPINE_STREAM_HEADER + (size_t)t->header.size;
+      t->arrived = SUPINE_STREAM_HEADER;
       continue;
     }
-    t->wanted = SUPINE_STREAM_HEADER;
+    t->needed = SUPINE_STREAM_HEADER;
     if (t->header.stamp >= 1 && t->header.stamp <= t->poses) {
-      t->latency[t->answered++] = supine_clock_seconds() - t->sent[t->header.stamp - 1];
+      t->latency[t->frames++] = supine_clock_seconds() - t->sent[t->header.stamp - 1];
       const size_t since = t->poses - (size_t)t->header.stamp;
       t->old += since > 0;
       t->oldest = since > t->oldest ? since : t->oldest;
@@ -200,8 +197,9 @@ static bool take(int s, tally *t) {
   }
 }
 
-/* Measure one kind of frame, and set `size` to the size of its message. If `*size` is not 0,
- * measure the server without computation instead, with messages of this size. */
+/* Measure the latency of frames of kind `what`, and set `size` to the size of their messages. If
+ * `*size` is above 0 on entry, measure the server without computation, with messages of this
+ * size. */
 static int measure(const char *supine, const char *basis, const char *what, double seconds,
                    size_t *size) {
   pid_t server = 0;
@@ -213,9 +211,9 @@ static int measure(const char *supine, const char *basis, const char *what, doub
   const size_t count = (size_t)(seconds / interval);
   tally t = {.sent = calloc(count, sizeof(double)),
              .latency = calloc(count + 1, sizeof(double)),
-             .wanted = SUPINE_STREAM_HEADER};
+             .needed = SUPINE_STREAM_HEADER};
   if (s < 0 || t.sent == NULL || t.latency == NULL) {
-    return fail("cannot start the server, or out of memory");
+    return fail("cannot start the server or connect to it, or out of memory");
   }
   const double begun = supine_clock_seconds();
   long before = -1;
@@ -244,13 +242,13 @@ static int measure(const char *supine, const char *basis, const char *what, doub
   const long after = memory_of(server);
   (void)close(s);
   (void)kill(server, SIGTERM);
-  qsort(t.latency, t.answered, sizeof(double), compare);
-  const double within = t.latency[(size_t)(0.99 * (double)t.answered)];
-  const double wanted = strcmp(what, "weights") == 0 ? 2e-3 : 15e-3;
+  qsort(t.latency, t.frames, sizeof(double), compare);
+  const double within = t.latency[(size_t)(0.99 * (double)t.frames)];
+  const double limit = strcmp(what, "weights") == 0 ? 2e-3 : 15e-3;
   (void)printf("%-8s %8zu %8zu %6zu %6zu %10.3f %10.3f %10.3f %10ld %10ld  %s\n", what, t.poses,
-               t.answered, t.old, t.oldest, 1e3 * t.latency[t.answered / 2], 1e3 * within,
-               1e3 * t.latency[t.answered == 0 ? 0 : t.answered - 1], before, after,
-               t.answered > 0 && t.oldest <= 1 && within <= wanted ? "holds" : "misses");
+               t.frames, t.old, t.oldest, 1e3 * t.latency[t.frames / 2], 1e3 * within,
+               1e3 * t.latency[t.frames == 0 ? 0 : t.frames - 1], before, after,
+               t.frames > 0 && t.oldest <= 1 && within <= limit ? "holds" : "misses");
   while (lines != NULL && fgets(line, sizeof line, lines) != NULL) {
     if (strstr(line, "pose received to") != NULL) {
       (void)printf("         %s", line);
@@ -277,7 +275,7 @@ int main(int count, char **word) {
   char **what = count > 4 ? word + 4 : all;
   const int kinds = count > 4 ? count - 4 : 3;
   (void)printf(
-      "what        poses answered    old oldest  median ms    99 %% ms   worst ms  KiB 1 s "
+      "what        poses   frames    old oldest  median ms    99 %% ms   worst ms  KiB 1 s "
       "   KiB end\n");
   for (int i = 0; i < kinds; ++i) {
     size_t size = 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Repeat the validations of [Santhanam2008] as figures: CSV files, and PNG if gnuplot is installed.
+/* Repeat the validations of [Santhanam2008]. Write the data of each figure as CSV and, if gnuplot
+ * is installed, the figure as PNG.
  *
  *     bench_validation [FOLDER [DATA]]
  *
@@ -38,10 +39,9 @@ static FILE *begin_csv(const char *name, const char *header) {
   return file;
 }
 
-/* Close the CSV file, and draw NAME.png by gnuplot commands, in which `csv` is the path of the
- * file. */
+/* Close the CSV file, and draw NAME.png by gnuplot commands, which call that file `csv`. */
 static void end_figure(FILE *csv, const char *name, const char *commands) {
-  need(fclose(csv) == 0, "cannot write");
+  need(fclose(csv) == 0, "cannot write a CSV file");
   FILE *gnuplot = popen("gnuplot 2>/dev/null", "w"); /* NOLINT(cert-env33-c) */
   if (gnuplot == NULL) {
     return;
@@ -57,11 +57,11 @@ static void end_figure(FILE *csv, const char *name, const char *commands) {
 
 /* Convergence curve of one method. */
 typedef struct curve {
-  FILE *csv; /* file for the points of the curve */
+  FILE *csv;
   const char *method;
   size_t count;        /* number of displacements */
-  const double *exact; /* [count] exact displacements */
-  double links;        /* link visits per step or evaluation of the method */
+  const double *exact; /* [count] */
+  double links;        /* number of link visits in one step or evaluation of y'' */
 } curve;
 
 static void add_point(const curve *c, double work, const double *found) {
@@ -80,7 +80,7 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* Draw Fig. 7, convergence. Work is measured in link visits; both ends of a link visit it. */
+/* Draw Fig. 7: error against work. A visit of a link from one of its ends is a unit of work. */
 static void convergence(void) {
   frame f = frame_plane(21, 10.0);
   const size_t n = f.mesh.vertex_count;
@@ -91,10 +91,9 @@ static void convergence(void) {
   double *found = calloc(n, sizeof *found);
   need(frame_solve(&f, NULL, force, exact) == SUPINE_OK, "no solution");
   FILE *csv = begin_csv("fig7_convergence", "method,link_visits,relative_rms_error");
-  curve c = {
-      csv, "Pitcher/Catcher", n, exact,
-      2.0 * links /
-          (double)(n + f.topology.edge_count)}; /* number of links of a node, mean over all nodes */
+  /* mean number of links of the mass or spring that a step visits */
+  const double visits = 2.0 * links / (double)(n + f.topology.edge_count);
+  curve c = {csv, "Pitcher/Catcher", n, exact, visits};
   for (int k = 1; k <= 13; ++k) {
     size_t steps = 0;
     need(supine_physics_pitcher_catcher(&f.mesh, &f.topology, NULL, force, pow(10.0, -k), found,
@@ -120,7 +119,7 @@ static void convergence(void) {
   free(found);
 }
 
-/* Draw Fig. 8, a plane sheet solved by both methods. */
+/* Draw Fig. 8: a plane sheet, solved by Supine and by a mass-spring-damper system. */
 static void plane(void) {
   enum { SIDE = 31 };
   frame f = frame_plane(SIDE, 10.0);
@@ -133,11 +132,11 @@ static void plane(void) {
   mass_spring_damper system = damper_create(&f, stiffness, force);
   need(damper_integrate(&system, stiffness, 40.0, 1, theirs, NULL, NULL), "no integration");
   FILE *csv = begin_csv("fig8_plane", "x_mm,supine,mass-spring-damper");
-  for (size_t x = 0; x < SIDE; ++x) { /* along the middle row */
+  for (size_t x = 0; x < SIDE; ++x) {
     const size_t i = SIDE / 2 * SIDE + x;
     (void)fprintf(csv, "%.9g,%.9g,%.9g\n", f.mesh.vertices[3 * i], ours[i], theirs[i]);
   }
-  (void)printf("sheet: %.2e %% RMS difference between the two\n",
+  (void)printf("sheet: displacements by supine and by mass-spring-damper differ by %.2e %% RMS\n",
                100.0 * relative_rms(n, ours, theirs));
   end_figure(csv, "fig8_plane",
              "set xlabel 'x, mm'\nset ylabel 'displacement'\n"
@@ -150,8 +149,7 @@ static void plane(void) {
   free(theirs);
 }
 
-/* Draw Fig. 9: rings before and after deformation, of uniform stiffness and with a stiffer third.
- */
+/* Draw Fig. 9: a ring of uniform stiffness, and rings of which one third is stiffer. */
 static void ring(void) {
   enum { COUNT = 90 };
   static const double factors[] = {1.0, 2.0, 4.0};
@@ -182,7 +180,7 @@ static void ring(void) {
   free(force);
 }
 
-/* Load the lungs at one of three resolutions, 0 to 2, or make synthetic ones. */
+/* Load lungs at a resolution from 0 (coarse) to 2. If they are missing, make synthetic lungs. */
 static bool load_lungs(int resolution, supine_lungs *lungs) {
   static const char *const names[3][2] = {{"chaste_left_5k.obj", "chaste_right_5k.obj"},
                                           {"chaste_left.ply", "chaste_right.ply"},
@@ -211,7 +209,7 @@ static bool load_lungs(int resolution, supine_lungs *lungs) {
   return good;
 }
 
-/* Plot the largest displacement against the volume ([Santhanam2008] III-C, IV-B). */
+/* Plot how the largest displacement grows with the volume inhaled ([Santhanam2008] III-C, IV-B). */
 static void linearity(const supine_lungs *lungs) {
   const supine_model model = supine_physics_model(SUPINE_LAW_PAPER);
   double cubic[4][3];
@@ -242,7 +240,8 @@ static void linearity(const supine_lungs *lungs) {
     (void)fputc('\n', csv);
   }
   (void)printf(
-      "displacement deviates by at most %.2f %% from proportional to the volume up to 500 mL\n",
+      "up to 500 mL, displacements deviate from proportionality to the volume by at most %.2f %% "
+      "of their value at 500 mL\n",
       100.0 * bend);
   end_figure(csv, "linearity",
              "set xlabel 'volume above rest, mL'\nset ylabel 'largest displacement, mm'\n"
@@ -253,7 +252,7 @@ static void regional_ventilation(const supine_lungs *lungs) {
   ventilation found[4];
   for (size_t p = 0; p < 4; ++p) {
     need(ventilation_measure(lungs, postures[p], 500.0, &found[p]) == SUPINE_OK, "no ventilation");
-    (void)printf("%-6s ventilation index rises by %.2f over the height, %.3f per cm\n",
+    (void)printf("%-6s ventilation index rises by %.2f from top to bottom, %.3f per cm\n",
                  posture_names[p], found[p].slope, 10.0 * found[p].slope / found[p].height);
   }
   FILE *csv =
@@ -269,14 +268,14 @@ static void regional_ventilation(const supine_lungs *lungs) {
     }
     (void)fputc('\n', csv);
   }
-  end_figure(csv, "ventilation",
-             "set xlabel 'ventilation index, mean 1'\n"
-             "set ylabel 'place along gravity: 0 uppermost, 1 lowermost'\nset yrange [1:0]\n"
-             "plot for [i=2:5] csv using i:1 with linespoints title columnheader(i)");
+  end_figure(
+      csv, "ventilation",
+      "set xlabel 'ventilation index, mean 1'\n"
+      "set ylabel 'position along gravity: 0 at the top, 1 at the bottom'\nset yrange [1:0]\n"
+      "plot for [i=2:5] csv using i:1 with linespoints title columnheader(i)");
 }
 
-/* Plot how displacements change with mesh resolution, and print the spread of a unit force, for
- * several reaches in mm. */
+/* Plot how displacements change with mesh resolution, and print how far a unit force spreads. */
 static void resolution(void) {
   static const double reaches[] = {0.0, 3.0, 5.0, 10.0, 20.0};
   static const char *const names[] = {"5k", "20k", "250k"};
@@ -293,7 +292,8 @@ static void resolution(void) {
     nearest_grid grid = nearest_create(&lungs[r].mesh, 5.0);
     vertex[r] = nearest_find(&grid, lungs[0].mesh.vertices + 3 * vertex[0]);
     nearest_free(&grid);
-    need(vertex[r] != SIZE_MAX, "the surfaces do not match");
+    need(vertex[r] != SIZE_MAX,
+         "no vertex of the finer mesh is near the vertex that gets the unit force");
   }
   FILE *csv = begin_csv("resolution", "reach_mm,drift 5k to 20k %,drift 20k to 250k %,drift 5k to "
                                       "250k %,spread 5k mm,spread 20k mm,spread 250k mm");
@@ -308,8 +308,8 @@ static void resolution(void) {
                              100.0 * drift_of(&lungs[1].mesh, moves[1], &lungs[2].mesh, moves[2]),
                              100.0 * drift_of(&lungs[0].mesh, moves[0], &lungs[2].mesh, moves[2])};
     (void)printf(
-        "reach %2.0f mm: displacements change by %.2f %% from 5k to 20k, %.2f %% from 20k to "
-        "250k, %.2f %% from 5k to 250k; a unit force spreads",
+        "reach %2.0f mm: displacements change by %.2f %% RMS from 5k to 20k vertices, %.2f %% from "
+        "20k to 250k, %.2f %% from 5k to 250k; a unit force spreads",
         reaches[k], drift[0], drift[1], drift[2]);
     for (int r = 0; r < 3; ++r) {
       (void)printf("%s %.2f mm at %s", r == 0 ? "" : ",", spread[r], names[r]);
@@ -319,7 +319,7 @@ static void resolution(void) {
                   drift[2], spread[0], spread[1], spread[2]);
   }
   end_figure(csv, "resolution",
-             "set xlabel 'reach, mm (0: the paper)'\nset ylabel 'drift of displacements, % RMS'\n"
+             "set xlabel 'reach, mm (0: the paper)'\nset ylabel 'change of displacements, % RMS'\n"
              "plot for [i=2:4] csv using 1:i with linespoints");
   for (int r = 0; r < 3; ++r) {
     supine_lungs_free(&lungs[r]);
@@ -331,7 +331,7 @@ int main(int argc, char **argv) {
   folder = argc > 1 ? argv[1] : folder;
   data = argc > 2 ? argv[2] : data;
   (void)gsl_set_error_handler_off();
-  need(mkdir(folder, 0777) == 0 || errno == EEXIST, "cannot make the folder");
+  need(mkdir(folder, 0777) == 0 || errno == EEXIST, "cannot make the folder of the figures");
   convergence();
   plane();
   ring();

@@ -6,17 +6,18 @@
                       [--stream path/to/bench_stream]
 
 The old version makes the inputs. Print the least wall and processor seconds and the largest memory
-of all rounds, and the ratios of new to old. Count the bytes in which outputs differ, except in
-compressed VTP. The library of a program is runtime/libsupine_runtime.so in its folder. --stream
-adds the least median time from sending a pose to receiving the last point.
+of R rounds for both versions, and the ratios of new to old. Count the bytes in which outputs differ,
+except in compressed VTP. The library of a program must be runtime/libsupine_runtime.so in the
+program's folder. --stream adds the median time from sending a pose to receiving its last point, the
+least of R rounds.
 
 Expected differences from version 0.2.0:
-- deform --image, --labels: because a lung has a gain for each axis, products are rounded in another
-  order. Displacements differ by one unit in the last place (3e-5 mm). Therefore about 1 % of the
-  voxels of 16-bit noise differ by 1, and 5 of 65 million labels differ.
-- embed: the version in the header and its place, and the checksum. In large grids, one coefficient
-  in 200,000 differs in the last place, because Cholesky's factorisation replaced LU.
-- render: the processor draws instead of OpenGL, a grey shell shows opacity, and names changed."""
+- deform --image, --labels: the gains of a lung now differ between axes, which changes the order in
+  which products are rounded. Displacements differ by one unit in the last place (3e-5 mm). About 1 %
+  of the voxels of 16-bit noise therefore differ by 1, and 5 of 65 million labels differ.
+- embed: the version in the header has another value and position, and the checksum differs. In large
+  grids, one coefficient in 200,000 differs in the last place: Cholesky's factorisation replaced LU.
+- render: pictures are drawn by the processor instead of OpenGL, with a grey shell and other names."""
 import argparse
 import operator
 import os
@@ -30,7 +31,7 @@ VOXELS = (512, 512, 248)
 
 
 def write_image(path, label):
-    """Write a NIfTI image that contains the synthetic lungs: 8-bit labels if `label`, else 16-bit noise."""
+    """Write a NIfTI image that covers the synthetic lungs, of 8-bit labels if `label`, else of 16-bit noise."""
     step, origin = (0.7, 0.7, 1.2), (-2.0 - 0.35 * 512, -173.0 - 0.35 * 512, -130.0 - 0.6 * 248)
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
@@ -38,9 +39,9 @@ def write_image(path, label):
     struct.pack_into("<hh", header, 70, 2 if label else 4, 8 if label else 16)
     struct.pack_into("<4f", header, 76, 1.0, *step)
     struct.pack_into("<2f", header, 108, 352.0, 1.0)
-    header[123] = 2  # unit: mm
+    header[123] = 2  # the unit is mm
     struct.pack_into("<hh", header, 252, 0, 1)
-    for axis in range(3):  # rows of the matrix from voxels to RAS
+    for axis in range(3):  # a row of the matrix from voxels to RAS
         sign = 1.0 if axis == 2 else -1.0
         row = [sign * step[axis] if k == axis else 0.0 for k in range(3)]
         struct.pack_into("<4f", header, 280 + 16 * axis, *row, sign * origin[axis])
@@ -57,7 +58,7 @@ def write_image(path, label):
 
 
 def run(command):
-    """Run a command that must succeed; return its wall seconds, processor seconds and memory in MiB."""
+    """Run a command that must succeed. Return its wall seconds, processor seconds and memory in MiB."""
     start = time.perf_counter()
     null = os.open(os.devnull, os.O_WRONLY)
     child = os.posix_spawn(command[0], command, os.environ,
@@ -70,7 +71,7 @@ def run(command):
 
 
 def count_differences(first, second):
-    """Count the unequal bytes of two files. Bytes that only one file has count too."""
+    """Count the unequal bytes of two files, including those by which one file is longer."""
     count, step = abs(os.path.getsize(first) - os.path.getsize(second)), 1 << 20
     with open(first, "rb") as one, open(second, "rb") as other:
         while (a := one.read(step)) and (b := other.read(step)):
@@ -79,14 +80,14 @@ def count_differences(first, second):
 
 
 def compare(name, programs, arguments, rounds, output=None):
-    """Run both programs in turn with these arguments, and print a row of the table."""
+    """Run both programs in turn with these arguments, and print a row of times and memory."""
     best = [[float("inf"), float("inf"), 0.0] for _ in programs]
     for _ in range(rounds):
         for which, program in enumerate(programs):
             wall, cpu, memory = run([program] + arguments)
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
-            if output is not None:  # both programs write to one name, because files contain the command line
+            if output is not None:  # both programs run the same command, because outputs contain the command
                 os.replace(output, f"{which}-{output}")
     differing = 0 if output is None else count_differences("0-" + output, "1-" + output)
     old, new = best
@@ -96,7 +97,7 @@ def compare(name, programs, arguments, rounds, output=None):
           f"{f'   outputs differ in {differing} bytes' if differing else ''}", flush=True)
 
 
-# Python program that opens a basis five times and prints the least processor seconds.
+# A Python program that opens a basis five times and prints the processor seconds of the fastest.
 OPEN = """
 import ctypes, sys, time
 library, basis = ctypes.CDLL(sys.argv[1]), ctypes.c_void_p()
@@ -112,7 +113,8 @@ print(least)
 
 
 def compare_numbers(name, commands, rounds, number):
-    """Run the commands in turn; print the least number that `number` reads from the output of each."""
+    """Run both commands in turn, `rounds` times. `number` reads a number from the output of a command. Print
+    the least number of each command."""
     best = [float("inf"), float("inf")]
     for _ in range(rounds):
         for which, command in enumerate(commands):
@@ -148,7 +150,7 @@ def main():
         write_image("labels.nii", True)
         with open("points.csv", "w", encoding="ascii") as file:
             file.write("x,y,z\n")
-            for i in range(20000):  # within the left lung
+            for i in range(20000):  # a point in the left lung
                 file.write(f"{40 + i % 61},{-200 + i // 61 % 61},{-170 + i // 3721 * 10}\n")
 
         print(f"{'':28} {'wall, s':^24}   {'processors, s':^24}   {'memory, MB':^22}")

@@ -4,11 +4,12 @@
 
     tests/evidence/evidence.py [--check] BUILD FOLDER[:AXES]...
 
-BUILD is the folder of the build; FOLDER holds pairs NAME_left.* and NAME_right.* of closed surfaces at full
-inflation; AXES, such as RAS, is passed to 'supine precompute --axes'. Every basis is made with default options.
-The columns show the spread over shapes, not the uncertainty of the model. Only the bend of the path between rest
-and full inflation, one number, was fitted to data of this kind: to quiet breaths of ten people. With --check, the
-exit code is 1 if a value is outside its range. The exit code is 77 if there is no pair.
+BUILD is the folder of the build. FOLDER holds pairs NAME_left.* and NAME_right.* of closed surfaces at full
+inflation. AXES, such as RAS, is passed to 'supine precompute --axes'. Every basis is made with default options.
+There is a column for each pair. Columns differ because lungs have different shapes; they do not show the uncertainty
+of the model. Only one constant of the model, the bend of the path between rest and full inflation, was fitted to
+data of this kind (quiet breaths of ten people). With --check, the exit code is 1 if a value is outside its range.
+The exit code is 77 if there is no pair.
 """
 import ctypes
 import glob
@@ -23,7 +24,7 @@ import numpy as np
 POSTURES = ("supine", "prone", "left", "right", "upright", "inverted")
 FULL_DENSITY = 0.12  # g/mL at full inflation: 0.86 L of tissue (Denison 1986) in lungs of 7.2 L
 
-# Quantity, lower and upper end of its range (None if not checked), unit, published value.
+# Name of the quantity, lowest and highest value allowed (None: any), unit, published value.
 ROWS = (
     ("lowest / uppermost third, supine", 1.6, 1.9, "", "1.75, supine (Sa 2010, n 8)"),
     ("lowest / uppermost third, prone", 1.1, 1.3, "", "1.0 to 1.4"),
@@ -64,7 +65,7 @@ def take_package(build, folder):
 
 
 class Lungs:
-    """The basis of one pair of lungs, and its measurements."""
+    """A basis of one pair of lungs, and what is measured on it."""
 
     def __init__(self, supine, path):
         self.basis = supine.open(path)
@@ -74,7 +75,7 @@ class Lungs:
         self.gravity = supine.gravity
 
     def at(self, state):
-        """Return positions, mm, and the volume of each lung, mL."""
+        """Return the positions of the vertices, mm, and the volume of each lung, mL, in a state."""
         pose = self.basis.pose(state)
         return self.basis.deform(pose), np.array(self.basis.volumes(pose))
 
@@ -83,7 +84,8 @@ class Lungs:
         return np.cross(b - a, c - a) / 2
 
     def thirds(self, posture, before, after):
-        """Return volume and gain, mL, of both lungs together in each third of their height, uppermost first."""
+        """Return the volume at positions `before`, and the gain until positions `after`, mL, of both lungs together, in the
+        upper, the middle and the lower third of their height."""
         slabs = (Slab * 6)()
         g = (ctypes.c_double * 3)(*self.gravity(posture))
         pointers = [ctypes.c_void_p(np.ascontiguousarray(x).ctypes.data) for x in (before, after)]
@@ -96,12 +98,13 @@ class Lungs:
         return int((np.einsum("ij,ij->i", self.area_vectors(xyz), self.reference) < 0).sum())
 
     def straight(self, posture, total):
-        """Return positions without the bend: with equal gains on all axes, but the same volume of each lung."""
+        """Return positions in a state of `total` mL without the bend: the gains of a lung are equal on all axes, but
+        chosen so that the lung has the same volume."""
         pose = self.basis.pose(f"{posture}:{total:.3f}mL")
         wanted = np.array(self.basis.volumes(pose))
         gains = self.basis.gains(pose)
         gains[:] = gains[:, :1]
-        for _ in range(40):  # Newton's method, with the slope from a difference quotient
+        for _ in range(40):  # Newton's method, with a difference quotient as slope
             held = np.array(self.basis.volumes(pose))
             gains *= 1.0001
             slope = (np.array(self.basis.volumes(pose)) - held) / 1e-4
@@ -109,7 +112,7 @@ class Lungs:
         return self.basis.deform(pose)
 
     def measure(self):
-        """Return the quantities of ROWS."""
+        """Return the values of all quantities in ROWS, by name."""
         out = {}
         full, full_ml = self.at("supine:full")
         self.reference = self.area_vectors(full)
@@ -130,7 +133,7 @@ class Lungs:
             out[f"{side} lung full, upright"] = 100 * (self.at("upright:full")[1][lung] / full_ml[lung] - 1)
         out["both lungs at rest, upright"] = 100 * (rest["upright"][1].sum() / rest["supine"][1].sum() - 1)
         density = {}
-        for p in ("supine", "prone"):  # density of each third of the resting lungs, from front to back
+        for p in ("supine", "prone"):  # density of the front, middle and back third of the lungs at rest
             volume, gain = self.thirds("supine", rest[p][0], full)
             density[p] = FULL_DENSITY * (volume + gain) / volume
         for name, third in (("front", 0), ("back", 2)):

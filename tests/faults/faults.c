@@ -5,9 +5,9 @@
  *
  *     FAULT_KIND    "memory" or "file"
  *     FAULT_NTH     number of the call that fails, from 0; if unset, no call fails
- *     FAULT_ALSO    parts of the names of further libraries, such as gsl,jansson
- *     FAULT_REPORT  file to write at exit: numbers of calls, of failed calls, and of blocks that
- *                   the counted code allocated but nobody freed */
+ *     FAULT_ALSO    libraries, each by a part of the file name, such as gsl,jansson
+ *     FAULT_REPORT  file to write at exit, with three numbers: counted calls, failed calls, and
+ *                   blocks allocated by counted calls but not freed */
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
@@ -36,13 +36,13 @@ static long seen, failed;
 static pid_t process;
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
-/* Addresses of blocks that the counted code allocated and that are not freed: a hash table with
- * open addressing, in which 1 marks a freed entry. */
+/* Addresses of blocks that were allocated by counted calls and are not freed. This is a hash table
+ * with open addressing, in which 1 marks a freed entry. */
 static uintptr_t blocks[BLOCKS];
 static long live;
 
-/* Functions of the C library, looked up once by dlsym. The allocations of dlsym itself are taken
- * from `few` and never freed. */
+/* Functions of the C library, looked up once by dlsym. While dlsym allocates memory, it gets that
+ * memory from `few`, which is never freed. */
 static void *(*next_malloc)(size_t);
 static void *(*next_calloc)(size_t, size_t);
 static void *(*next_realloc)(void *, size_t);
@@ -65,7 +65,7 @@ static bool is_few(const void *pointer) {
 static int note_object(struct dl_phdr_info *info, size_t size, void *context) {
   (void)size;
   const char *also = context;
-  bool counts = info->dlpi_name[0] == '\0'; /* the program itself */
+  bool counts = info->dlpi_name[0] == '\0'; /* only the program itself has an empty name */
   for (const char *at = also; !counts && at != NULL && *at != '\0';) {
     char part[64] = "";
     const size_t length = strcspn(at, ",");
@@ -161,7 +161,7 @@ __attribute__((destructor)) static void end(void) {
   }
 }
 
-/* ISO C has no cast from dlsym's result to a function. */
+/* ISO C cannot cast the result of dlsym to a function pointer. */
 #define FIND(function, name) *(void **)&(function) = dlsym(RTLD_NEXT, name)
 #define CALLER __builtin_return_address(0)
 
@@ -240,7 +240,7 @@ void free(void *pointer) {
   next_free(pointer);
 }
 
-/* Replace the functions of the C library that allocate a result for the caller. */
+/* Replace functions of the C library that return newly allocated memory. */
 char *strdup(const char *text) {
   const size_t size = strlen(text) + 1;
   find_memory();

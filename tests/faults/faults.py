@@ -5,12 +5,13 @@
     faults.py PROGRAM LIBFAULTS [EACH] [WORD]
     faults.py PROGRAM            run each command once without faults, for a program built with a sanitizer
 
-By default, the n-th call of a command fails in its n-th run. If EACH is above 0, only about EACH calls, spread
-over the command, fail (CTest uses 1). WORD selects the commands that contain it.
+By default, a command runs once for each call that it makes, and in the n-th run the n-th call fails. If EACH is above
+0, only about EACH of these runs are made, spread over all calls (CTest uses 1). If WORD is given, only commands that
+contain WORD run.
 
-Each run must end within a minute and without a signal: with the complete outputs, or with an exit code
-above 0 and a message that gives the reason. A run that fails must leave no file, and no block of memory
-that a run without faults frees.
+Each run must end within a minute and without a signal. It must either write its complete outputs, or exit with a code
+above 0 and a message that gives the reason. A run that fails must leave no file. It may leave no more blocks of memory
+than a run without faults.
 """
 import filecmp
 import json
@@ -24,7 +25,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-# Commands that make the inputs once, without faults.
+# Commands that make the input files, before any faults.
 BEFORE = """
 phantom --vertices 100 -o lungs.ply
 phantom --vertices 100 -o lungs.stl
@@ -37,7 +38,7 @@ fit --landmarks pairs.csv --law deep -o patient.json
 pv fit samples.csv -o patient.pv.json
 """
 
-# Commands to test. They write to the folder out.
+# Commands to test, which write to the folder `out`.
 COMMANDS = """
 phantom --vertices 100 -o out/a.ply
 phantom --vertices 100 -o out/a.obj
@@ -88,7 +89,7 @@ REASONS = {
     "file": "memory|No space left|Too many open files|Input/output error|Resource temporarily|"
             "Cannot allocate|short|truncated|changed",
 }
-# Libraries whose allocations fail as well. Those of drivers, fonts and the web server do not.
+# Libraries in which allocations fail, too. They do not fail in drivers, fonts and the web server.
 ALSO = {"memory": "gsl,jansson", "file": ""}
 LIMIT = 60  # time limit of a command, s
 
@@ -96,14 +97,15 @@ LIMIT = 60  # time limit of a command, s
 class Trial:
     def __init__(self, program, library, folder):
         self.program, self.folder = program, folder
-        self.library = library and shutil.copy(library, folder / "libfaults.so")  # LD_PRELOAD splits paths at spaces
+        self.library = library and shutil.copy(library, folder / "libfaults.so")  # LD_PRELOAD needs a path without spaces
         self.out = folder / "out"
         self.report = folder / "report"
         self.environment = {"SUPINE_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ,
                             "LIBGL_ALWAYS_SOFTWARE": "1", "FAULT_REPORT": str(self.report)}
 
     def run(self, arguments, kind=None, nth=None):
-        """Return exit code, stdout, stderr, and the numbers of calls, of failed calls and of blocks not freed."""
+        """Run the program. If `nth` is given, its nth call of this kind fails. Return the exit code, stdout, stderr, and the
+        numbers of calls, of failed calls and of blocks not freed."""
         shutil.rmtree(self.out, ignore_errors=True)
         self.out.mkdir()
         self.report.unlink(missing_ok=True)
@@ -118,7 +120,7 @@ class Trial:
                                   timeout=LIMIT if kind else None, check=False)
         except subprocess.TimeoutExpired:
             return None, b"", "", (0, 0, 0)
-        said = re.sub(rb"[0-9.]+ ms", b"# ms", done.stdout)  # times differ from run to run
+        said = re.sub(rb"[0-9.]+ ms", b"# ms", done.stdout)  # times vary between runs
         seen = tuple(map(int, self.report.read_text().split())) if self.report.exists() else None
         return done.returncode, said, done.stderr.decode(errors="replace"), seen
 
@@ -133,7 +135,7 @@ def same_files(folder, kept):
 
 
 def what_is_wrong(trial, kind, kept, whole, result):
-    """Return what is wrong with a run, or ''."""
+    """Return what is wrong with a run, or ''. `whole` is the result of the run without faults, `kept` its files."""
     code, said, words, seen = result
     if code is None:
         return f"did not end within {LIMIT} s"
@@ -159,7 +161,8 @@ def what_is_wrong(trial, kind, kept, whole, result):
 
 
 def faultless(trial, arguments):
-    """Return the result of a run without faults for each kind of fault. Its output is None if it varies."""
+    """For each kind of fault, count calls in a run without faults, and return the result of that run. Its stdout is None
+    if it differs between runs."""
     runs = {kind: trial.run(arguments, kind) for kind in REASONS}
     same = len({run[1] for run in runs.values()}) == 1
     return {kind: (run[0], run[1] if same else None, *run[2:]) for kind, run in runs.items()}
@@ -201,7 +204,7 @@ def main():
     word = sys.argv[4] if len(sys.argv) > 4 else ""
     faults = dict.fromkeys(REASONS, 0)
     wrong = []
-    shared = "/dev/shm"  # a folder in memory, because a disk would be slow
+    shared = "/dev/shm"  # a folder in memory, which is faster than a disk
     with tempfile.TemporaryDirectory(dir=shared if os.access(shared, os.W_OK) else None) as name:
         trial = Trial(program, library, Path(name))
         samples(trial.folder)
@@ -244,7 +247,7 @@ def main():
 
 
 def hash_of(text):
-    """Return a number that selects the first failing call: the same in every run, different for each command."""
+    """Return a number that depends only on the text. It selects the first call that fails."""
     return sum(text.encode())
 
 

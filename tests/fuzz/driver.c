@@ -41,7 +41,7 @@ static size_t seed_count;
 static uint64_t state;
 static double slowest;
 
-/* current input, which the crash handler saves */
+/* the input that is being run, which the crash handler saves */
 static const uint8_t *current;
 static size_t current_size;
 
@@ -60,7 +60,8 @@ static void keep_crasher(int number) {
   (void)raise(number);
 }
 
-/* Read a dictionary with a line name="word" or "word" for each word, and the escapes \\ \" \xHH. */
+/* Read words from a file with a line name="word" or "word" for each word, in which \\, \" and \xHH
+ * are escapes. */
 static void read_dictionary(const char *path) {
   char line[512];
   FILE *file = fopen(path, "r");
@@ -93,8 +94,8 @@ static size_t put_word(uint8_t *bytes, size_t size, size_t place, const uint8_t 
   return size;
 }
 
-/* Apply one random mutation: change a bit or byte; delete or repeat a piece; put in a number, a
- * piece of a seed or a word; or truncate. */
+/* Apply one random mutation: change a bit or a byte; delete or repeat some bytes; insert a number,
+ * bytes of a seed or a word, or overwrite with one of these; or truncate. Return the new size. */
 static size_t change(uint8_t *bytes, size_t size) {
   static const char *const numbers[] = {"-1",    "0",   "4294967296",
                                         "1e999", "nan", "99999999999999999999"};
@@ -135,15 +136,14 @@ static size_t change(uint8_t *bytes, size_t size) {
   }
 }
 
-/* Return the processor time of the process, s: it does not depend on the load of the machine. */
+/* Return the processor time that this process has used, s. */
 static double seconds(void) {
   struct timespec now;
   (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Run one input from a block of exactly its size, so that a sanitizer sees every read past its
- * end. */
+/* Run one input from a block of its exact size, so that a sanitizer detects reads past the end. */
 static void run(const uint8_t *bytes, size_t size) {
   uint8_t *copy = malloc(size + (size == 0));
   supine_fuzz_expect(copy != NULL, "memory for an input");
@@ -223,7 +223,7 @@ int main(int argc, char **argv) {
   struct rusage usage;
   (void)getrusage(RUSAGE_SELF, &usage);
   const double megabytes = (double)usage.ru_maxrss / 1024.0;
-  (void)printf("%lu inputs, slowest %.3f s, %.0f MB\n", inputs, slowest, megabytes);
+  (void)printf("%lu inputs, slowest %.3f s, peak memory %.0f MB\n", inputs, slowest, megabytes);
   for (size_t i = 0; i < seed_count; ++i) {
     free(seeds[i]);
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Helpers of all fuzzers: inputs as files, and assertions. */
+/* Functions that all fuzzers share: inputs as files, and assertions. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz basis files, each twice: as it is, and with a corrected checksum, so that the code behind
- * the check is reached. A basis that opens is evaluated. */
+/* Fuzz basis files. Each file is opened twice: unchanged, and with the correct checksum, without
+ * which it would be refused before most of the code runs. A basis that opens is evaluated. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 
 #include "tests/poses.h"
 
-/* Largest number of vertices to evaluate: a small file may declare many. */
+/* Largest number of vertices to evaluate, because a small file may claim to have very many. */
 enum { VERTICES_MOST = 4096 };
 
 static void evaluate(const supine_basis *basis) {
@@ -25,14 +25,14 @@ static void evaluate(const supine_basis *basis) {
   double scales[SUPINE_LUNGS_MAX];
   double scale = 1.0;
   supine_fuzz_expect(info->mode_count <= SUPINE_MODES_MAX && info->lung_count <= SUPINE_LUNGS_MAX,
-                     "numbers of modes and lungs within their limits");
+                     "at most SUPINE_MODES_MAX modes and SUPINE_LUNGS_MAX lungs");
   supine_fuzz_expect(supine_basis_weights(basis, gravity, weights) == SUPINE_OK,
-                     "weights for a direction of gravity");
+                     "weights of the modes for a direction of gravity");
   for (size_t k = 0; k < info->mode_count; ++k) {
-    supine_fuzz_expect(isfinite(weights[k]), "finite weights");
+    supine_fuzz_expect(isfinite(weights[k]), "finite weights of the modes");
   }
   if (info->has_volume && posed_scale(basis, weights, 500.0, &scale, NULL) == SUPINE_OK) {
-    supine_fuzz_expect(isfinite(scale), "a finite scale");
+    supine_fuzz_expect(isfinite(scale), "a finite gain for 500 mL");
   }
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     scales[lung] = 1.0;
@@ -58,8 +58,8 @@ static void open_and_evaluate(const uint8_t *bytes, size_t size) {
   supine_basis_close(basis);
 }
 
-/* Replace the stated checksum by the right one; return false if the file states none. */
-static bool state_checksum(uint8_t *bytes, size_t size) {
+/* Replace the checksum in the file by the correct one. Return false if the file has no checksum. */
+static bool correct_checksum(uint8_t *bytes, size_t size) {
   supine_safetensors *file = NULL;
   if (supine_safetensors_open_memory(bytes, size, "input", &file, NULL) != SUPINE_OK) {
     return false;
@@ -84,7 +84,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   uint8_t *copy = malloc(size + 1);
   supine_fuzz_expect(copy != NULL, "memory for a copy");
   memcpy(copy, bytes, size);
-  if (state_checksum(copy, size)) {
+  if (correct_checksum(copy, size)) {
     open_and_evaluate(copy, size);
   }
   free(copy);

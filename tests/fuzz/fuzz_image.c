@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz images of the format FUZZ_ENDING. Small images are also taken as label maps and converted to
- * lungs. */
+/* Fuzz images in the file format FUZZ_ENDING. Small images are also converted to surfaces. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -12,7 +11,7 @@
 
 #include "fuzz.h"
 
-enum { SMALL = 1 << 15 }; /* voxels; larger images take too long to convert */
+enum { SMALL = 1 << 15 }; /* largest number of voxels of an image that is converted */
 
 static void expect_words(supine_status status, const supine_error *error) {
   supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
@@ -21,7 +20,7 @@ static void expect_words(supine_status status, const supine_error *error) {
 }
 
 static void expect_lungs(const char *path) {
-  /* Large triangles make the conversion 20 times as fast. */
+  /* large triangles, with which the conversion is 20 times as fast */
   const supine_labels_options options = {.edge = 12.0};
   supine_mesh surfaces[2] = {0};
   supine_labels_report report = {0};
@@ -59,7 +58,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   return 0;
 }
 
-/* Make a map of two boxes with labels 1 and 2; `index` selects the voxel type. */
+/* Make a label map of two boxes with labels 1 and 2. The type of the voxels depends on `index`. */
 uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   static const supine_image_voxel voxels[] = {SUPINE_VOXEL_U8, SUPINE_VOXEL_I16, SUPINE_VOXEL_F32};
   enum { SEEDS = sizeof voxels / sizeof *voxels, X = 16, Y = 9, Z = 10 };

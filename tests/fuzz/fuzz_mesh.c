@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz surfaces of the format FUZZ_ENDING. A mesh that loads must be valid; the message about a
- * refused file must name it. */
+/* Fuzz surfaces in the file format FUZZ_ENDING. A mesh that loads must be valid. If a file is
+ * refused, the message must name the file. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,9 +18,9 @@ static void expect_whole(const supine_mesh *mesh) {
     supine_fuzz_expect(isfinite(mesh->vertices[i]), "finite coordinates");
   }
   supine_fuzz_expect(supine_mesh_topology_create(mesh, &topology) == SUPINE_OK,
-                     "the topology of a loaded mesh");
+                     "a loaded mesh whose topology can be computed");
   supine_fuzz_expect(!topology.closed || topology.genus >= -1,
-                     "a genus of at least -1 of a closed surface");
+                     "a genus of at least -1 if the surface is closed");
   supine_mesh_topology_free(&topology);
 }
 
@@ -32,16 +32,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   if (status == SUPINE_OK) {
     expect_whole(&mesh);
   } else {
-    supine_fuzz_expect(error.status == status && strstr(error.message, path) != NULL &&
-                           strchr(error.message, '\n') == NULL && mesh.vertices == NULL,
-                       "no mesh, and a message of one line that names the file");
+    supine_fuzz_expect(
+        error.status == status && strstr(error.message, path) != NULL &&
+            strchr(error.message, '\n') == NULL && mesh.vertices == NULL,
+        "no mesh from a refused file, and a message of one line that names the file");
   }
   supine_mesh_free(&mesh);
   (void)unlink(path);
   return 0;
 }
 
-/* Return the bytes of a tetrahedron as supine_mesh_save writes it. */
+/* Return the file that supine_mesh_save writes for a tetrahedron. */
 static uint8_t *saved(size_t *size) {
   double vertices[] = {0, 0, 0, 120, 0, 0, 0, 120, 0, 0, 0, 120};
   uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};

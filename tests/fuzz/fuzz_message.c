@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz OpenIGTLink messages, whose body size and checksum are corrected so that the code behind
- * these checks is reached, and tables of recorded poses. */
+/* Fuzz OpenIGTLink messages and tables of recorded poses. The size and the checksum in a message
+ * are corrected, because a message with wrong ones is refused before most of the code runs. */
 #include <endian.h>
 #include <math.h>
 #include <stdbool.h>
@@ -34,12 +34,13 @@ static void read_message(const uint8_t *bytes, size_t size, bool mend) {
       supine_stream_message_read(&header, bytes + SUPINE_STREAM_HEADER, NULL, &message, &error);
   supine_fuzz_expect(status == SUPINE_OK || error.message[0] != '\0', "an error message");
   supine_fuzz_expect(memchr(message.text, '\0', sizeof message.text) != NULL,
-                     "a text that ends with NUL");
+                     "a text that contains NUL");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   if (size >= SUPINE_STREAM_HEADER) {
-    uint8_t *copy = malloc(size); /* an exact copy, so that a sanitizer sees reads past its end */
+    uint8_t *copy = malloc(
+        size); /* a block of exactly this size, so that a sanitizer detects reads past its end */
     supine_fuzz_expect(copy != NULL, "memory for a copy of the input");
     memcpy(copy, bytes, size);
     read_message(copy, size, false);
@@ -53,7 +54,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
     for (size_t i = 0; i < poses.count; ++i) {
       const double *g = poses.pose[i].gravity;
       supine_fuzz_expect(fabs(g[0] * g[0] + g[1] * g[1] + g[2] * g[2] - 1.0) < 1e-6,
-                         "a direction of unit length");
+                         "directions of gravity of unit length");
     }
     supine_stream_poses_free(&poses);
   } else {
@@ -81,7 +82,7 @@ uint8_t *supine_fuzz_seed(size_t index, size_t *size) {
   supine_fuzz_expect(bytes != NULL, "memory for a seed");
   uint8_t *body = bytes + SUPINE_STREAM_HEADER;
   for (size_t i = 0; i < BODY; i += 4) {
-    /* Bits of 1.0F and of smaller floats. */
+    /* The bits of 1.0F, or of a smaller float. */
     const uint32_t word = htobe32(UINT32_C(0x3F800000) >> (i % 12));
     memcpy(body + i, &word, sizeof word);
   }

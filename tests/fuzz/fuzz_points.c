@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz lists of points of the format FUZZ_ENDING. */
+/* Fuzz lists of points in the file format FUZZ_ENDING. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,7 +26,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   } else {
     supine_fuzz_expect(error.status == status && strstr(error.message, path) != NULL &&
                            points.names == NULL,
-                       "no points, and a message that names the file");
+                       "no points from a refused file, and a message that names the file");
   }
   supine_mesh_points_free(&points);
   (void)unlink(path);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fuzz tables of numbers with three readers: expandability by vertex, samples of pressure and
- * volume, and fitted curves. */
+/* Fuzz three readers of text files: expandability of vertices, samples of pressure and volume, and
+ * fitted pressure-volume curves. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   expect_words(status, &error);
   for (int limb = 0; status == SUPINE_OK && limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     supine_fuzz_expect(supine_breath_curve_check(&pv.limb[limb], NULL) == SUPINE_OK,
-                       "a valid curve for each limb");
+                       "valid curves for inhaling and exhaling");
   }
   (void)unlink(path);
   return 0;

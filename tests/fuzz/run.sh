@@ -4,8 +4,8 @@
 #
 #     tests/fuzz/run.sh [SECONDS] [FOLDER]       3600 s per reader and build/fuzz by default
 #
-# Needs clang and its runtime (libclang-rt-14-dev in Debian 12). Failing inputs are left in FOLDER as
-# crash-*, slow-unit-* or oom-*; inputs that reach new code are kept in FOLDER/corpus for the next run.
+# Needs clang and its runtime (libclang-rt-14-dev in Debian 12). Inputs that fail are saved in
+# FOLDER as crash-*, slow-unit-* or oom-*. Inputs that reach new code are saved in FOLDER/corpus for the next run.
 set -e
 seconds=${1:-3600}
 source=$(cd "$(dirname "$0")/../.." && pwd)

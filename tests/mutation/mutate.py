@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mutation testing: change the code in one place, build it, and check that a test fails.
 
-    mutate.py named [PATTERN]          mutants of named.txt whose title matches the pattern (default: all)
+    mutate.py named [PATTERN]          the mutants in named.txt, or those whose title matches PATTERN
     mutate.py random [COUNT] [SEED]    COUNT (default 100) random mutants of the code in FOLDERS
 
-The mutants are made in a copy of the last commit, in build/mutation. A mutant is killed if a test fails or exceeds
-its time limit. A mutant that does not compile does not count. For a random mutant, the tests that reach its line
-are run, quick ones first, until one fails or they have taken ENOUGH seconds. An instrumented build, in which each
-test runs once alone, shows which tests reach a line; the result is kept for other seeds of the same commit. Tests
-that fail in that build, take longer than SLOW or are listed in LEFT_OUT are not used. The number of survivors is
-therefore an upper bound. The environment variable SUPINE_CMAKE_OPTIONS has options such as -DSUPINE_LUNGS=FOLDER.
+A mutant is the code of the last commit with one change, made in a copy in build/mutation. The mutant is killed if a test
+fails or exceeds its time limit. A mutant that does not compile does not count. For a random mutant, only tests that
+reach the changed line are run, quick ones first, until one fails or they have taken ENOUGH seconds. Which tests reach a
+line is found by an instrumented build, in which each test runs once alone, and is kept for other seeds of the same
+commit. Tests that fail in the instrumented build, take longer than SLOW seconds there or are listed in LEFT_OUT are not
+used. Because some tests are not used, the number of survivors is an upper bound. The environment variable
+SUPINE_CMAKE_OPTIONS adds options for cmake, such as -DSUPINE_LUNGS=FOLDER.
 """
 import json
 import os
@@ -32,9 +33,9 @@ BUILD = FOLDER / "build"
 COMMIT = subprocess.run(["git", "-C", str(SOURCE), "rev-parse", "HEAD"], check=True, text=True,
                         stdout=subprocess.PIPE).stdout.strip()
 FOLDERS = ("sh", "mesh", "precompute", "runtime", "program")
-QUICK, SLOW = 2.0, 320.0  # time of a test in the instrumented build, s: about three times that of an optimised build
-ENOUGH = 240.0  # largest total time of the tests of one mutant, s
-JOBS = str(len(os.sched_getaffinity(0)))  # number of processors available
+QUICK, SLOW = 2.0, 320.0  # limits of the time of a test in the instrumented build, s
+ENOUGH = 240.0  # longest total time of the tests of one mutant, s
+JOBS = str(len(os.sched_getaffinity(0)))  # number of processors
 LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"  # tests that read the sources, rebuild the project, or accept any input
 
 
@@ -67,14 +68,14 @@ def build(folder=BUILD):
 
 
 def failed_tests(names):
-    """Return the tests that fail or exceed their time limit; ctest stops at the first."""
+    """Run these tests until one fails or exceeds its time limit. Return the names of the failed tests."""
     _, said = run("ctest", "-R", f"^({'|'.join(names)})$", "-j", JOBS, "--stop-on-failure") if names else (0, "")
     return re.findall(r"Test +#\d+: (\S+) \.*\*\*\*(?!Skipped)", said)
 
 
 def tries(path, changed, groups):
-    """Run groups of tests, each a list of names, with the changed text of a file. Return the first test that fails,
-    '' if none does, None if the change does not compile."""
+    """Replace the text of a file by `changed` and run groups of tests, each a list of names. Return the first test that
+    fails, '' if none fails, or None if the change does not compile."""
     file = COPY / path
     before = file.read_text()
     file.write_text(changed)
@@ -115,7 +116,7 @@ def named(word):
     return survived == 0
 
 
-OPERATORS = [  # pattern, and the replacements to choose from
+OPERATORS = [  # pattern, and replacements, one of which is chosen at random
     (r" < ", [" <= ", " > "]), (r" > ", [" >= ", " < "]), (r" <= ", [" < "]), (r" >= ", [" > "]),
     (r" == ", [" != "]), (r" != ", [" == "]), (r" && ", [" || "]), (r" \|\| ", [" && "]),
     (r" \+ ", [" - "]), (r" - ", [" + "]), (r" \* (?=[\w(])", [" / "]), (r" / ", [" * "]),
@@ -123,7 +124,7 @@ OPERATORS = [  # pattern, and the replacements to choose from
     (r"\b\d+\.\d+\b", ["(1.3 * \\g<0>)", "(0.5 + \\g<0>)"]), (r"(?<=if \()(?=.)", ["!"]),
     (r"\btrue\b", ["false"]), (r"\bfalse\b", ["true"]), (r"\bfmax\b", ["fmin"]),
     (r"\bfmin\b", ["fmax"]),
-    (r"^ +[a-z][\w>.\[\]-]*(\([^()]*\))?( [+-]?= [^;{}]*)?;$", [";"]),  # delete a statement
+    (r"^ +[a-z][\w>.\[\]-]*(\([^()]*\))?( [+-]?= [^;{}]*)?;$", [";"]),  # deletes a statement
 ]
 
 
@@ -147,7 +148,7 @@ def places():
 def random_ones(count, seed):
     chosen = random.Random(seed)
     took, reached = measured()
-    for file in BUILD.rglob("CTestTestfile.cmake"):  # shorter time limits, because some mutants never end
+    for file in BUILD.rglob("CTestTestfile.cmake"):  # shorten the time limits, because some mutants never end
         file.write_text(re.sub(r'(set_tests_properties\(\[=\[(\S+)\]=\].* TIMEOUT )"\d+"',
                                lambda m: f'{m[1]}"{20 + took.get(m[2], 0):.0f}"', file.read_text()))
     every = places()
@@ -161,7 +162,7 @@ def random_ones(count, seed):
         line = lines[number]
         lines[number] = line[:match.start()] + match.expand(chosen.choice(instead)) + line[match.end():]
         path = str(file.relative_to(COPY))
-        # If gcov does not count the line, use the tests that reach the file; if it does not count the file, all tests.
+        # If gcov does not count this line, use the tests that reach the file. If gcov does not count the file, use all tests.
         tests = reached.get((path, number + 1), reached.get((path, 0), sorted(took, key=took.get)))
         used = list(accumulate(took[t] for t in tests))
         tests = [t for t, so_far in zip(tests, used) if so_far <= ENOUGH] or tests[:1]
@@ -178,7 +179,8 @@ def random_ones(count, seed):
 
 
 def measured():
-    """Return the time of each test, s, and the tests that reach each (file, line). Line 0 stands for the whole file."""
+    """Return the time of each test, s, and for each (file, line) the tests that reach it. Line 0 stands for any line of the
+    file."""
     covered = FOLDER / "covered"
     configure(covered, "-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_C_FLAGS_DEBUG=-Og", "-DSUPINE_COVERAGE=ON")
     if not build(covered):
@@ -202,8 +204,9 @@ def measured():
 
 
 def lines_reached(name, covered, kept):
-    """Run a test of the instrumented build, unless `kept` has its result. Return its time in s (infinite if it fails),
-    each (file, line) that gcov counts, and each that the test reached. Line 0 stands for the whole file."""
+    """Run a test of the instrumented build, or read its result from `kept` if it has run before. Return three things: its
+    time, s (infinite if it fails), the list of (file, line) that gcov counts, and the list of those that the test
+    reached. Line 0 stands for any line of the file."""
     kept, counts = kept / f"{name}.json", FOLDER / "counts" / name
     if kept.exists():
         return json.loads(kept.read_text())
@@ -212,7 +215,7 @@ def lines_reached(name, covered, kept):
     _, said = run("ctest", "-R", f"^{name}$", cwd=covered, GCOV_PREFIX=str(counts))
     passed = re.search(r"(?:Passed|\*Skipped) +([\d.]+) sec", said)
     files = [str(file) for file in counts.rglob("*.gcda")] if passed else []
-    for file in files:  # gcov looks for .gcno files beside the .gcda files
+    for file in files:  # put .gcno files beside the .gcda files, where gcov looks for them
         notes = file.removesuffix("gcda") + "gcno"
         os.symlink(notes.removeprefix(str(counts)), notes)
     counted, found = set(), set()

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Evaluate each basis in several states by the JavaScript package, in node or a browser, and compare with plain C.
+// Compare the results of the JavaScript package, in node or in a browser, with those of plain C: each basis in several
+// states.
 import assert from 'node:assert/strict';
 import { bases, native } from './made.mjs';
 import { largestDistance } from '../export/support.mjs';
@@ -25,7 +26,8 @@ export function pose(lungs, states) {
   });
 }
 
-/** Compare the results for each basis and its last `most` states. `ask(basis, states)` returns what `pose` returns. */
+/** Compare the results for each basis in the last `most` of its states. `ask(basis, states)` must open the basis and
+ * return what `pose` returns. */
 export async function checkAll(ask, most = Infinity) {
   for (const [basis, states] of bases) await check(basis, states.slice(-most), ask);
   console.log(`${bases.length} bases give the same results as in C`);

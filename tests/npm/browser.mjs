@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the JavaScript package in Chromium: results equal those of plain C, and the examples draw moving lungs.
+// Test the JavaScript package in Chromium: its results equal those of plain C, and its examples draw moving lungs.
 import assert from 'node:assert/strict';
 import { copyFileSync, existsSync, readFileSync, symlinkSync, writeFileSync } from 'node:fs';
 import { basename, extname, join } from 'node:path';
@@ -9,7 +9,7 @@ import { folder } from '../export/support.mjs';
 
 const origin = 'http://lungs.test/';
 const kinds = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
-/** Open a page of the folder. This process answers its requests, without a network. */
+/** Open a page of the temporary folder. This process answers the requests of the page, without a network. */
 async function visit(path) {
   const page = await browser.newPage({ viewport: { width: 320, height: 240 } });
   const complaints = [];
@@ -47,7 +47,7 @@ async function look(page) {
   }, shot);
 }
 
-/** Check that an example draws lungs, and that `change` changes its picture. */
+/** Check that the example with this name draws lungs, and that the picture differs after `change`. */
 async function check(name, change) {
   if (!existsSync(join(process.env.MODULES, 'node_modules', name))) {
     console.log(`${name} is not installed: its example is not tried`);

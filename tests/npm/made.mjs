@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Helpers for tests of the JavaScript package: a folder with the package in node_modules, bases, and their results
-// in plain C. Environment variables are paths: NATIVE (program npm_native), TARBALL (the package), GOLDEN (a basis of
-// version 1), LUNGS (folder of real lungs).
+// Make what tests of the JavaScript package need: a folder with the package in node_modules, bases, and the results of
+// plain C for these bases. The environment variables NATIVE (program npm_native), TARBALL (the package), GOLDEN (a
+// basis file of version 1) and LUNGS (folder of real lungs) are paths.
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -19,8 +19,8 @@ supine('precompute', mesh, '-o', demo);
 writeFileSync(content, 'name,x,y,z\nnodule,-80,-120,-90\nother,70,-150,-120\n');
 supine('embed', demo, content, mesh, '-o', inside);
 const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+120', '0.6:0.2:-0.7:2600mL', 'upright:full'];
-const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // a basis of version 1 has no rest volumes
-/** Bases, each with the states to test. */
+const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // a basis of version 1 has no volume at rest
+/** Paths of bases, each with the states to test. */
 export const bases = [[demo, states], [inside, states], [old, ofScan]];
 const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `lungs/chaste_${side}.ply`));
 if (real.every(existsSync)) {
@@ -28,7 +28,7 @@ if (real.every(existsSync)) {
   supine('precompute', ...real, '-o', bases.at(-1)[0]);
 }
 
-/** Run npm_native; return its output as {volumes, positions, normals, expected}. */
+/** Run npm_native for one state. Return its results; `expected` are the expected errors of vertices. */
 export function native(basis, state, lungs) {
   const out = join(folder, 'native');
   execFileSync(process.env.NATIVE, [basis, state, out], { stdio: 'pipe' });

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Compute reference results for the JavaScript package, in portable C (SUPINE_SIMD_PORTABLE).
  *
- *     native BASIS STATE OUT    write the volume of each lung as float64, then as float32 the
- *                               positions, the normals of supine_deform_lit (supine_normals if the
- *                               file has none) and the expected errors (0 if unknown)
+ *     native BASIS STATE OUT    write the volume of each lung as float64. Then write as float32 the
+ *                               positions, the normals by supine_deform_lit (or by supine_normals
+ *                               if the file has no normals) and the expected errors (0 if unknown)
  *     native BASIS STATE        print the times of supine_deform and of supine_deform_lit (0 if the
- *                               file has no normals), ns per vertex: the fastest of nine rounds */
+ *                               file has no normals), ns per vertex: fastest of nine runs */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the JavaScript package in node: equal results in plain C, size, speed, refused input, examples, types.
+// Test the JavaScript package in node: its results equal those of plain C, its size and speed are within limits, wrong
+// input is refused, and its examples and types are correct.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -14,14 +15,14 @@ const bytes = readFileSync(demo);
 
 await checkAll(async (basis, states) => pose(await open(readFileSync(basis)), states));
 
-/* The library has at most 150 kB, and 40 kB when compressed. */
+/* supine.wasm has at most 150 kB, and at most 40 kB if compressed. */
 const wasm = readFileSync(join(packed, 'supine.wasm'));
 const small = brotliCompressSync(wasm).length;
 console.log(`supine.wasm: ${wasm.length} bytes, ${small} with brotli`);
 assert.ok(wasm.length <= 150000 && small <= 40000);
 
-/* Two bases at once do not affect each other, and their arrays stay valid. A state can be given by gravity and volume
- * or gain. A refused state changes nothing. */
+/* Two open bases do not affect each other, and their arrays stay valid. A state can be given as text, or as gravity with
+ * a volume or a gain. A refused state changes nothing. */
 const [lungs, other] = [await open(bytes), await open(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), { wasm })];
 const { positions, normals } = lungs;
 assert.ok(largestDistance(positions, lungs.vertices) < 0.002, 'positions before the first pose differ from those in the file');
@@ -62,7 +63,7 @@ assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
-/* A basis of an open surface, made by an older version, has no volumes, but a gain poses it. */
+/* A basis of an open surface, which an older version made, has no volumes. It can only be posed by a gain. */
 const opened = await open(readFileSync(join(dirname(process.env.GOLDEN), 'open_surface.safetensors')));
 assert.throws(() => opened.volumes, { status: 'open surface' });
 assert.throws(() => opened.pose('prone:rest+500'), SupineError);
@@ -70,14 +71,14 @@ opened.pose({ gravity: [0, -1, 0], gain: 3 }).deformLit();
 assert.notDeepEqual(opened.positions, opened.vertices);
 assert.ok(Math.abs(Math.hypot(...opened.normals.slice(0, 3)) - 1) < 1e-6);
 
-/* The examples in README.md of the package and of the project run without errors. */
+/* The JavaScript examples in the README.md of the package and in that of the project run without errors. */
 for (const readme of [join(packed, 'README.md'), process.env.README]) {
   const [, code] = /```js\n([\s\S]*?)```/.exec(readFileSync(readme, 'utf8'));
   writeFileSync(join(folder, 'readme.mjs'), code);
   assert.match(execFileSync(process.execPath, ['readme.mjs'], { cwd: folder, encoding: 'utf8' }), /Float32Array/);
 }
 
-/* Types: correct use compiles, and each wrong line gives one error. */
+/* In TypeScript, correct use of the package compiles, and each line of wrong use gives one error. */
 const typescript = loadCommon('typescript');
 const use = `import { open, SupineError, type State } from 'supine';
 const lungs = await open(new ArrayBuffer(8), { wasm: new Uint8Array(8) });
@@ -97,7 +98,7 @@ writeFileSync(join(folder, 'package.json'), '{ "type": "module" }');
 assert.deepEqual(compile(use), []);
 for (const line of wrong) assert.equal(compile(use + line).length, 1, line);
 
-/* The time per vertex is at most 2.5 times that of plain C; each is the fastest of several alternating runs. */
+/* The package takes at most 2.5 times as long per vertex as plain C, in the fastest of several alternating runs. */
 const fastest = [[Infinity, Infinity], [Infinity, Infinity]];
 const calls = Math.ceil(1000000 / lungs.vertexCount);
 for (let round = 0; round < 5; ++round) {

@@ -33,7 +33,7 @@ lungs = supine.open(path)
 n, k = lungs.vertex_count, lungs.mode_count
 assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", "right"]
 
-# Arrays are read-only views of the basis, not copies. The basis stays open while an array exists.
+# Arrays of a basis are read-only views, not copies. The basis stays open while one of its arrays exists.
 for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
                             (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
                             (lungs.modes, (k, (lungs.band + 1) ** 2), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
@@ -52,7 +52,7 @@ kept, first = supine.open(path).vertices, lungs.vertices.copy()
 gc.collect()
 assert (kept == first).all()
 
-# Results have the same bits as in C: for a basis from a file or from memory, and for ranges of vertices.
+# Results have the same bits as in C, for a basis from a file, for a basis from memory, and for ranges of vertices.
 STATE = "prone:rest+321.5"
 pose, supine_rest = lungs.pose(STATE), lungs.pose("supine")
 assert abs(lungs.volumes(pose).sum() - lungs.volumes(lungs.pose("prone:rest")).sum() - 321.5) < 1e-6
@@ -60,7 +60,7 @@ assert lungs.weights(pose).shape == (k,) and lungs.gains(pose).shape == (2, 3)
 out = path + ".raw"
 subprocess.run([reference, path, STATE, out], check=True)
 raw = np.fromfile(out, np.float32).reshape(5, n, 3)
-assert np.ptp(raw[0] - lungs.vertices) > 1.0  # displacements vary by more than 1 mm
+assert np.ptp(raw[0] - lungs.vertices) > 1.0  # the state must displace the vertices, or nothing is tested
 with open(path, "rb") as file:
     in_memory = supine.open(file.read())
 for basis in (lungs, in_memory):
@@ -76,22 +76,22 @@ assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(pose)
 assert bytes(lungs.pose((0, -2, 0), "rest+321.5")) == bytes(pose) == bytes(lungs.pose(STATE, out=supine.Pose()))
 assert (lungs.deform(supine.Pose().fill(0.0)) == lungs.deform(lungs.pose("full"))).all()
 
-# Directions of gravity from a name, a tilt or a quaternion.
+# The direction of gravity can be given as a name, a tilt or a quaternion.
 assert tuple(supine.gravity("HFP")) == (0.0, -1.0, 0.0) and "prone" in supine.postures()
 assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))
 assert np.allclose(supine.gravity_of_quaternion((1, 0, 0, 0)), supine.gravity("upright"))
 
-# The volume during a breath.
+# supine.breath computes the volume inhaled at each time of a breath.
 times = np.array([[0, 5 / 3], [5, 2]])
 volumes = supine.breath(times)
 assert volumes.shape == (2, 2) and np.allclose(volumes[:, 0], 0, atol=1e-9) and abs(volumes[0, 1] - 500) < 1e-9
 assert np.allclose(supine.breath([0.5, 3], course="flow", inhale=0.5, tidal=100), [20, 80])
-straight = [[0, 30, 0, 3000, 0, 0, 0, 0, 0]] * 2  # a straight line: 100 mL per cmH2O
+straight = [[0, 30, 0, 3000, 0, 0, 0, 0, 0]] * 2  # a pressure-volume relation of 100 mL per cmH2O
 assert np.allclose(supine.breath([5 / 6], pv=straight, course="ramp"), 250) and supine.breath(5 / 6).shape == ()
 refused(supine.ArgumentError, "tidal volume", supine.breath, [0], tidal=9000)
 refused(ValueError, "pv must be 18 numbers", supine.breath, [0], pv=straight[0])
 
-# An error of the C library raises an exception of Supine that is also one of Python.
+# An error in the C library raises an exception of Supine that is also an exception of Python, such as ValueError.
 with open(path, "rb") as file:
     whole = file.read()
 with open(path + ".cut", "wb") as file:
@@ -108,7 +108,7 @@ refused(supine.ArgumentError, "gravity", lungs.pose, (0, 0, float("nan")))
 refused(supine.NumericalError, "volume", lungs.pose, "rest-1e6")
 refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, pose)
 assert issubclass(supine.NumericalError, supine.Error) and issubclass(supine.Error, Exception)
-# Exceptions that the package itself raises.
+# These exceptions are raised by the package itself, not for an error in the C library.
 refused(ValueError, "float32", lungs.deform, pose, np.empty((n, 3)))
 refused(ValueError, "float32", lungs.deform, pose, np.empty((n - 1, 3), np.float32))
 refused(ValueError, "contiguous", lungs.deform, pose, np.empty((n, 6), np.float32)[:, ::2])
@@ -123,7 +123,7 @@ try:
 except ValueError:
     pass
 
-# Lungs located from observed points: a wrong point is reported, a rotation is found, invalid points are refused.
+# Lungs are located from observed points: a wrong point is reported, a rotation is found, and invalid points are refused.
 seen = list(range(0, n, n // 20))
 truth = lungs.deform(lungs.pose("left:rest+300"))
 turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
@@ -144,8 +144,8 @@ refused(supine.ArgumentError, "give a vertex below", lungs.locate, [n], [(0, 0, 
 refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=True)
 refused(ValueError, "positions", lungs.locate, [0, 1], truth[:1])
 
-# Calls that visit vertices release the interpreter's lock. With the long switch interval below, a waiting thread gets
-# the lock only if a call releases it; `repr` does not.
+# Calls that compute all vertices release the interpreter's lock. The switch interval below is so long that another
+# thread runs only if a call releases the lock. `repr` must not release it.
 def lets_others_run(call, *arguments, tries=None):
     gate, ran = threading.Lock(), []
 
@@ -157,7 +157,7 @@ def lets_others_run(call, *arguments, tries=None):
     waiting = threading.Thread(target=wait)
     waiting.start()
     gate.release()
-    count, until = 0, time.monotonic() + 60  # s, enough on a busy machine
+    count, until = 0, time.monotonic() + 60  # 60 s are enough even on a busy machine
     while not ran and (count < tries if tries else time.monotonic() < until):
         call(*arguments)
         count += 1
@@ -175,7 +175,8 @@ for call, *arguments in ((lungs.deform, pose, points), (lungs.displace, pose, po
     assert lets_others_run(call, *arguments), f"{call} does not release the lock"
 sys.setswitchinterval(0.005)
 
-# Images: unchanged in the state of the scan, warped in other states, several states in one call, refused input.
+# An image is unchanged in the state of the scan, and warped in other states. A call may get one state or several.
+# Wrong input is refused.
 grid = supine.open("grid.safetensors")
 low, high = lungs.vertices.min(0) - 20, lungs.vertices.max(0) + 20
 size = ((high - low) / [6, 7, 8]).astype(int)
@@ -200,7 +201,7 @@ refused(ValueError, "[z, y, x]", grid.warp, image[0], "prone:rest", **frame)
 refused(ValueError, "uint8", grid.warp, image.astype(np.int64), "prone:rest", **frame)
 refused(supine.ArgumentError, "needs a reference", grid.warp, image, "500", **frame)
 
-# A basis made from arrays has the same bits as `path`, which the program made with --band 3.
+# A basis made from arrays has the same bits as the file `path`, which the program made with --band 3.
 parts = []
 made = supine.precompute(lungs.vertices, lungs.triangles, band=3, progress=parts.append)
 for name in ("vertices", "triangles", "coefficients", "modes", "volume_cubic"):
@@ -214,7 +215,7 @@ apart = supine.precompute((lungs.vertices[right], halves[1]), (lungs.vertices[le
                           held_out=60, resting={"supine": "2600mL"}, output=path + ".made")
 assert apart.vertex_count == n and supine.open(path + ".made").metadata["resting_known"]
 assert "--held-out 60" in apart.metadata["made_by"]
-assert supine.precompute(lungs.vertices, lungs.faces, band=3, modes=2).mode_count == 2  # faces in VTK's layout
+assert supine.precompute(lungs.vertices, lungs.faces, band=3, modes=2).mode_count == 2  # `faces` has VTK's layout
 with warnings.catch_warnings(record=True) as warned:
     warnings.simplefilter("always")
     supine.precompute(1.4 * lungs.vertices, lungs.triangles, band=3)
@@ -240,8 +241,8 @@ try:
 except KeyboardInterrupt:
     assert not os.path.exists(path + ".stopped")
 
-# Content of a basis from a file or from arrays: points with or without names, a mesh, a grid. A point on the surface
-# moves with the surface.
+# Points with or without names, a mesh and a grid can be embedded into a basis, made from a file or from arrays. A point
+# on the surface moves with the surface.
 place = lungs.vertices[7].astype(float)
 for basis in (lungs, made):
     inside = supine.embed(basis, {"on, the surface": place, "other": (-80, -120, -90)})

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Compute reference results for the Python package.
  *
- *     reference BASIS STATE OUT    write as float32 the positions and normals of supine_deform_lit,
- *                                  exact normals, and the positions of two poses: STATE, and supine
- *                                  at rest
+ *     reference BASIS STATE OUT    write as float32 the positions and the normals by
+ *                                  supine_deform_lit, the normals by supine_normals, the positions
+ *                                  by supine_deform_batch in STATE and in the state "supine"
  *     reference BASIS STATE        print the time of a call of supine_deform, s */
 #include <stdio.h>
 #include <stdlib.h>
