@@ -11,7 +11,7 @@
 #include "runtime/internal.h"
 #include "runtime/safetensors/platform.h"
 
-/* A file being checked, and its name in messages. */
+/* A file to check, and the name of the file in messages. */
 typedef struct check {
   const supine_safetensors *file;
   const char *name;
@@ -29,9 +29,8 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
                           c->name, detail, embedded ? "supine embed" : "supine precompute");
 }
 
-/* Return whether all numbers are finite and below 2^30 in magnitude. No lung needs larger numbers,
- * and sums over 256 modes of products of three such numbers stay finite. A comparison of exponent
- * bits also refuses infinity and NaN. It needs no branch and runs at the speed of memory. */
+/* Return whether all numbers are finite and below 2^30 in magnitude, as all numbers of a lung are.
+ * Infinity and NaN have the largest exponent bits, so that one comparison of bits suffices. */
 static bool finite_floats(const float *values, size_t count) {
   size_t bad = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -50,7 +49,7 @@ static bool finite_doubles(const double *values, size_t count) {
   return bad == 0;
 }
 
-/* Length of an axis that require() does not check. */
+/* Length to pass to require() for an axis that may have any length. */
 #define ANY SIZE_MAX
 
 /* Find a tensor and check its type, shape and numbers. Replace each ANY in `shape` by the length of
@@ -80,8 +79,8 @@ static const void *require(const check *c, const char *name, supine_dtype dtype,
   return tensor->data;
 }
 
-/* Check the metadata and the checksum, but not the older checksum of 16 digits in files of version
- * 1. */
+/* Check the metadata "format", "version" and "kind", and the checksum. Do not check the older
+ * checksum of 16 digits in files of version 1. */
 static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *format = supine_safetensors_metadata(c->file, "format");
   const char *version = supine_safetensors_metadata(c->file, "version");
@@ -93,7 +92,7 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
                             c->name);
   }
   if (version == NULL || strlen(version) != 1 || strchr("123", version[0]) == NULL) {
-    return refuse(c, "its format has version %.16s, but this program reads versions 1 to 3",
+    return refuse(c, "the file format has version %.16s, but this program reads versions 1 to 3",
                   version == NULL ? "unknown" : version);
   }
   info->volume_axes = version[0] == '3' ? 3 : 1;
@@ -166,7 +165,6 @@ static supine_status check_modes(const check *c, supine_basis *basis) {
                       shape[1], SUPINE_SH_BAND_MAX);
 }
 
-/* Compute the box around each lung of the reference surface; an empty lung has a box of zeros. */
 static void bound_lungs(supine_basis *basis) {
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     if (basis->lung_begin[lung] == basis->lung_begin[lung + 1]) {
@@ -186,8 +184,8 @@ static void bound_lungs(supine_basis *basis) {
   basis->info.bounds = basis->bounds[0][0];
 }
 
-/* Read the names of the lungs from the metadata "lungs", such as "left,right". The name of every
- * other lung is its index. Return the number of names in the metadata. */
+/* Read the names of the lungs from the metadata "lungs", such as "left,right". Name every other
+ * lung by its index. Return the number of names in the metadata. */
 static size_t name_lungs(const check *c, supine_basis *basis) {
   const char *at = supine_safetensors_metadata(c->file, "lungs");
   size_t named = 0;
@@ -207,7 +205,7 @@ static size_t name_lungs(const check *c, supine_basis *basis) {
 }
 
 /* Check that tensor 'lung' groups the vertices by lung (0 ... 0 1 ... 1 2 ...), and find where each
- * lung begins. A lung with a name may have no vertices, as embedded content may lie in one lung. */
+ * lung begins. A lung that the metadata name may have no vertices. */
 static supine_status check_lungs(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   size_t n = info->vertex_count;
@@ -243,8 +241,8 @@ static supine_status check_lungs(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Check the three volume tensors: all or none must exist. In version 3, `volume_linear` and
- * `volume_quadratic` have an additional axis for x, y and z. */
+/* Check the three tensors of the volumes. All or none of them must exist. In files of version 3,
+ * `volume_linear` and `volume_quadratic` have an additional axis for x, y and z. */
 static supine_status check_volume(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t g = info->lung_count;
@@ -285,7 +283,7 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
   return SUPINE_OK;
 }
 
-/* Add the volume that each lung of the reference surface encloses to reference_volume, mL. */
+/* Add the volume, mL, that the reference surface of each lung encloses to `reference_volume`. */
 static void measure_lungs(supine_basis *basis) {
   const supine_basis_info *info = &basis->info;
   for (size_t t = 0; t < info->triangle_count;) {
@@ -313,8 +311,8 @@ static void measure_lungs(supine_basis *basis) {
   }
 }
 
-/* Measure the volume of each lung of the reference surface, mL. Embedded content has no such
- * surface; its metadata state the volumes. */
+/* Set the volume of the reference surface of each lung, mL. For embedded content, whose file lacks
+ * these surfaces, read the volumes from the metadata. Otherwise, measure them. */
 static supine_status check_reference(const check *c, supine_basis *basis) {
   basis->info.reference_volume = basis->reference_volume;
   if (!basis->info.has_volume) {
@@ -328,8 +326,8 @@ static supine_status check_reference(const check *c, supine_basis *basis) {
   return read_numbers(c, "reference_volume_ml", basis->info.lung_count, basis->reference_volume);
 }
 
-/* Read the metadata of the scan's state and of full inflation. By default, the scan is the
- * reference surface in the posture supine. */
+/* Read the metadata on the state of the scan and on full inflation. Without these metadata, the
+ * scan shows the reference surface, in the posture supine. */
 static supine_status check_scan(const check *c, supine_basis *basis) {
   const char *volume = supine_safetensors_metadata(c->file, "scan_volume_ml");
   const char *scanned = supine_safetensors_metadata(c->file, "scanned");
@@ -354,7 +352,7 @@ static supine_status check_scan(const check *c, supine_basis *basis) {
                       "metadata 'bend' requires tensor 'resting_volume' with a row for each lung");
 }
 
-/* Check the optional volumes at rest: a row for each lung, or one row for all lungs together. */
+/* Check the optional tensor 'resting_volume': a row for each lung, or one row for all lungs. */
 static supine_status check_rest(const check *c, supine_basis *basis) {
   const supine_tensor *tensor = supine_safetensors_find(c->file, "resting_volume");
   if (tensor == NULL) {
@@ -368,7 +366,7 @@ static supine_status check_rest(const check *c, supine_basis *basis) {
   return basis->resting != NULL ? SUPINE_OK : SUPINE_ERROR_FORMAT;
 }
 
-/* Check the optional tensors of the normals. Both or neither must exist. */
+/* Check the optional tensors 'normals' and 'normal_weights'. Both or neither must exist. */
 static supine_status check_normals(const check *c, supine_basis *basis) {
   supine_basis_info *info = &basis->info;
   const size_t terms = supine_basis_normal_terms(basis);
@@ -405,7 +403,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
       simd >= SUPINE_SIMD_COUNT) {
     return supine_error_set(
         c->error, SUPINE_ERROR_ARGUMENT,
-        "storage %d or instruction set %d is unknown: use supine_storage, supine_simd",
+        "storage %d or instruction set %d is unknown: use values of supine_storage and supine_simd",
         (int)storage, (int)simd);
   }
   basis->kernels = supine_kernels_choose(&simd);
@@ -466,7 +464,7 @@ static supine_status take_options(const check *c, const supine_basis_options *op
   return SUPINE_OK;
 }
 
-/* Check the optional rigid parts: each row of the tensor is a range of vertices in one lung. */
+/* Check the optional tensor 'rigid'. Each row is a range of vertices of one lung. */
 static supine_status check_rigid(const check *c, supine_basis *basis) {
   const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
   if (rigid == NULL) {
@@ -482,14 +480,14 @@ static supine_status check_rigid(const check *c, supine_basis *basis) {
     }
   }
   if (!well) {
-    return refuse(c, "tensor 'rigid' must hold ranges of vertices [R, 2], each in one lung");
+    return refuse(c, "each row of tensor 'rigid' must be a U32 range of one lung's vertices");
   }
   basis->rigid = rigid->data;
   basis->rigid_count = rigid->shape[0];
   return SUPINE_OK;
 }
 
-/* Open a basis from an open file. The basis takes ownership of the file; on failure, close it. */
+/* Make a basis from an open file. The basis then owns the file. On failure, close the file. */
 static supine_status open_file(supine_safetensors *file, const char *name,
                                const supine_basis_options *options, supine_basis **result,
                                supine_error *error) {

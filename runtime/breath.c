@@ -5,15 +5,14 @@
 
 #include <supine/breath.h>
 
-/* Number of equal parts of a limb's range for integration. Allowed control parameters change the
- * compliance by a factor of at most e^500 over the range, and of at most e^16 over one part. In
- * such a part, a rule of 16 points is accurate to 1e-15. */
+/* Number of equal parts into which integration divides a limb's range of pressures. Over one part,
+ * the compliance changes by a factor of at most e^16, so that a Gauss-Legendre rule of 16 points is
+ * accurate to 1e-15. */
 enum { LIMB_PARTS = 32 };
 
-/* A limb and its integral, which is computed once for many pressures and volumes. */
 typedef struct integrated {
   supine_pv_curve curve;
-  double sum[LIMB_PARTS + 1]; /* sum[i] integrates slope() from x = -1 to the beginning of part i */
+  double sum[LIMB_PARTS + 1]; /* integral of slope() from x = -1 to the beginning of each part */
 } integrated;
 
 const char *supine_breath_limb_name(supine_pv_limb limb) {
@@ -43,14 +42,14 @@ supine_status supine_breath_curve_check(const supine_pv_curve *curve, supine_err
   return SUPINE_OK;
 }
 
-/* Compute exp(U(x)) of supine_breath_curve_evaluate. The recurrence of Legendre polynomials L_n
- * begins with before = L_0 and here = L_1. */
+/* Compute exp(U(x)) for the function U that supine_breath_curve_evaluate defines. In step n of the
+ * loop, `before`, `here` and `next` are the Legendre polynomials of degrees n - 1, n and n + 1. */
 static double slope(const supine_pv_curve *curve, double x) {
   double before = 1.0;
   double here = x;
   double sum = curve->control[0] * (x + 1.0);
   for (int n = 1; n < SUPINE_PV_CONTROLS; ++n) {
-    const double next = ((2 * n + 1) * x * here - n * before) / (n + 1); /* L_(n+1)(x) */
+    const double next = ((2 * n + 1) * x * here - n * before) / (n + 1);
     sum += curve->control[n] * (next - before) / (2 * n + 1);
     before = here;
     here = next;
@@ -58,7 +57,7 @@ static double slope(const supine_pv_curve *curve, double x) {
   return exp(sum);
 }
 
-/* Integrate slope() from `from` to `to` by the 16-point rule [Abramowitz and Stegun, 25.4]. */
+/* Integrate slope() by the Gauss-Legendre rule of 16 points [Abramowitz and Stegun, 25.4]. */
 static double integrate(const supine_pv_curve *curve, double from, double to) {
   static const double point[8] = {
       0.0950125098376374402, 0.2816035507792589132, 0.4580167776572273863, 0.6178762444026437484,
@@ -80,7 +79,6 @@ static double part_begin(int part) {
   return -1.0 + 2.0 * part / LIMB_PARTS;
 }
 
-/* Compute the integral of a limb that has passed supine_breath_curve_check. */
 static void limb_begin(const supine_pv_curve *curve, integrated *of) {
   of->curve = *curve;
   of->sum[0] = 0.0;
@@ -89,8 +87,8 @@ static void limb_begin(const supine_pv_curve *curve, integrated *of) {
   }
 }
 
-/* Return the volume at a pressure, mL, and write the compliance, mL/cmH2O, unless it is NULL.
- * Replace a pressure outside the range by the nearest end of the range. */
+/* Return the volume of a limb at a pressure, mL. Write the compliance, mL/cmH2O, unless it is NULL.
+ * Replace a pressure outside the range of the limb by the nearest end of the range. */
 static double limb_volume(const integrated *of, double pressure, double *compliance) {
   const supine_pv_curve *curve = &of->curve;
   const double low = curve->pressure[0];
@@ -109,8 +107,8 @@ static double limb_volume(const integrated *of, double pressure, double *complia
   return curve->volume[0] + gain * (of->sum[part] + within);
 }
 
-/* Find the pressure, cmH2O, at which a limb holds a volume, mL, that is within its range. The
- * volume at this pressure errs by at most 1e-11 of the range.
+/* Find the pressure, cmH2O, at which a limb has the volume `volume`, mL, which must be within the
+ * range of the limb. The volume at the result differs from `volume` by at most 1e-11 of this range.
  * @retval SUPINE_ERROR_NUMERICAL  no pressure was found */
 static supine_status limb_pressure(const integrated *of, double volume, double *pressure) {
   enum { STEPS_MAX = 200 };
@@ -134,10 +132,9 @@ static supine_status limb_pressure(const integrated *of, double volume, double *
     double next = at + (volume - held) / compliance;
     const bool inside = next >= low && next <= high;
     if (miss <= within || high - low <= 1e-15 * fabs(at)) {
-      *pressure = inside ? next : at; /* take the Newton step, which is already known */
+      *pressure = inside ? next : at;
       return SUPINE_OK;
     }
-    /* Bisect the bracket if the Newton step leaves it or the last step did not halve the error. */
     if (!inside || miss > 0.5 * last_miss) {
       next = low + 0.5 * (high - low);
     }
@@ -173,11 +170,11 @@ supine_status supine_breath_curve_evaluate(const supine_pv_curve *curve, size_t 
 
 const supine_pv *supine_breath_normal(void) {
   static const supine_pv normal = {
-      /* Inhale limb, fitted to a sigmoid from 0 to 6000 mL: a + b / (1 + exp(-(P - 10) / 6)). */
+      /* Inhale limb, fitted to a + b / (1 + exp(-(P - 10) / 6)) from 0 to 6000 mL, P in cmH2O. */
       {{{0.0, 30.0},
         {0.0, 6000.0},
         {-0.697448914, -2.22791741, 0.470886417, 0.269525392, -0.132010658}},
-       /* Exhale limb: c_1 = -k (P_high - P_low) / 2 with k = ln 2 / 7.58 cmH2O [Salazar1964]. */
+       /* Exhale limb: the first parameter is -15 cmH2O k, k = ln 2 / (7.58 cmH2O) [Salazar1964]. */
        {{0.0, 30.0}, {0.0, 6000.0}, {-1.3716632861, 0.0, 0.0, 0.0, 0.0}}}};
   return &normal;
 }
@@ -212,8 +209,8 @@ static supine_status breath_check(const supine_pv_breath *breath, supine_error *
   return SUPINE_OK;
 }
 
-/* Return how far a breath is on its limb at a time in s: 0 at rest, 1 at the peak, and linear in
- * time between them. Write the limb. */
+/* Write the limb that a breath follows at a time, s. Return 0 at rest, 1 at the peak of the breath,
+ * and a number that is linear in time on each limb. */
 static double breath_share(const supine_pv_breath *breath, double time, supine_pv_limb *limb) {
   const double turns = time * (breath->rate / 60.0);
   const double phase = turns - floor(turns);
@@ -225,15 +222,14 @@ static double breath_share(const supine_pv_breath *breath, double time, supine_p
   return (1.0 - phase) / (1.0 - breath->inhale_fraction);
 }
 
-/* The P-V loop of one breath. */
 typedef struct loop {
   double rest, peak; /* pressures at rest and at the peak, cmH2O */
   integrated limbs[SUPINE_PV_LIMB_COUNT];
-  double volume[SUPINE_PV_LIMB_COUNT]; /* volume at the rest pressure, mL */
-  double gain[SUPINE_PV_LIMB_COUNT];   /* volume gained up to the peak pressure, mL */
+  double volume[SUPINE_PV_LIMB_COUNT]; /* volume of each limb at the rest pressure, mL */
+  double gain[SUPINE_PV_LIMB_COUNT];   /* volume that each limb gains from rest to the peak, mL */
 } loop;
 
-/* Check both limbs, and check that a pressure is in the range of both. Messages name it `what`. */
+/* Check both limbs, and that a pressure, called `what` in messages, is in the range of each. */
 static supine_status limb_holds(const supine_pv *pv, const char *what, double pressure,
                                 supine_error *error) {
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
@@ -274,8 +270,8 @@ static supine_status loop_begin(const supine_pv *pv, const supine_pv_breath *bre
   }
   status = limb_pressure(&cycle->limbs[SUPINE_PV_INHALE], full, &cycle->peak);
   if (status != SUPINE_OK) {
-    return supine_error_set(error, status,
-                            "the inhale limb has no pressure for %g mL: check its curve", full);
+    return supine_error_set(
+        error, status, "no pressure of the inhale limb gives %g mL: check the inhale limb", full);
   }
   status = limb_holds(pv, "peak", cycle->peak, error);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT && status == SUPINE_OK; ++limb) {
@@ -294,8 +290,8 @@ static double between(double value, double low, double high) {
   return value < low ? low : value > high ? high : value;
 }
 
-/* Compute the volume, mL, and the pressure, cmH2O, at a time. If the flow is constant, find the
- * pressure from the volume; otherwise, find the volume from the pressure. */
+/* Compute the volume, mL, and the pressure, cmH2O, of a breath at a time, s. If the flow is
+ * constant, find the pressure from the volume. Otherwise, find the volume from the pressure. */
 static supine_status follow(const supine_pv_breath *breath, const loop *cycle, double time,
                             double *volume, double *pressure, supine_error *error) {
   static const double pi = 3.14159265358979323846;
@@ -312,7 +308,7 @@ static supine_status follow(const supine_pv_breath *breath, const loop *cycle, d
                ? status
                : supine_error_set(
                      error, status,
-                     "at %g s the limb has no pressure for this volume: check its curve", time);
+                     "at %g s, no pressure gives the volume of the breath: check the limbs", time);
   }
   if (breath->course == SUPINE_PV_COSINE) {
     share = 0.5 - 0.5 * cos(pi * share);
@@ -330,7 +326,7 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
   for (size_t j = 0; j < count && status == SUPINE_OK; ++j) {
     if (!isfinite(times[j])) {
       status = supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "time %zu is not finite: give a time in s", j);
+                                "times[%zu] is not finite: give a time in s", j);
     }
   }
   if (status != SUPINE_OK || count == 0) {

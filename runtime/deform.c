@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute deformed positions, in runs of whole tiles of one lung where possible. */
+/* Compute deformed positions, if possible for many whole tiles of a lung at once. */
 #include <string.h>
 
 #include "runtime/rigid.h"
 
-/* Compute the factors by which the kernels multiply: K weights times the units of the packed
- * coefficients, then the three gains of a lung.
- * @param folded  [K + 3], written */
+/* Write the factors that a kernel takes for one lung: the weight of each mode times the unit of the
+ * packed coefficients of this mode, then the three gains of the lung.
+ * @param folded  [modes + 3], written */
 static void fold(const supine_basis *basis, const supine_pose *pose, size_t lung, float *folded) {
   const size_t modes = basis->info.mode_count;
   for (size_t k = 0; k < modes; ++k) {
@@ -23,7 +23,7 @@ supine_target supine_target_after(const supine_target *target, size_t count) {
   return moved;
 }
 
-/* Evaluate vertices begin <= i < end of one tile, through a buffer that holds the whole tile. */
+/* Evaluate vertices begin <= i < end of one tile by way of a buffer for the whole tile. */
 static void deform_part(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target) {
   float aside[TILE_NUMBERS];
@@ -50,10 +50,9 @@ void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, 
   }
 }
 
-/* Number of vertices of a rigid part that are evaluated at once. */
 enum { RIGID_BLOCK = 256 };
 
-/* Move rigid parts among vertices begin <= i < end of a target by rigid motions (rigid.h). */
+/* Move vertices begin <= i < end of rigid parts by the rigid motions of the parts (rigid.h). */
 static void deform_rigid(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   for (size_t part = 0; part < basis->rigid_count; ++part) {
@@ -88,7 +87,7 @@ static void deform_rigid(const supine_basis *basis, const supine_pose *pose, siz
   }
 }
 
-/* Evaluate vertices begin <= i < end, of any lungs, without regard to rigid parts. */
+/* Evaluate vertices begin <= i < end of all lungs as if no part were rigid. */
 static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
                          size_t end, const supine_target *target) {
   float folded[SUPINE_MODES_MAX + 3];
@@ -123,7 +122,7 @@ void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xy
 
 void supine_deform_batch(const supine_basis *basis, size_t count, const supine_pose *poses,
                          size_t begin, size_t end, float *xyz) {
-  enum { BLOCK_BYTES = 1 << 18 }; /* size of a block that fits in the cache */
+  enum { BLOCK_BYTES = 1 << 18 }; /* size of tiles that stay in the cache for all poses */
   const size_t block = BLOCK_BYTES / basis->tiles.stride * TILE;
   const size_t apart = 3 * (end - begin);
   supine_target target = {.add_reference = true,

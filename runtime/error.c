@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bound the error of storage and rounding, in mm. */
+/* Bound the error that storage and rounding cause in positions, mm. */
 #include <math.h>
 
 #include "runtime/internal.h"
@@ -17,14 +17,13 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
     scale = fmax(scale, fabs(pose->gains[i / 3][i % 3]));
   }
-  /* The displacement is rounded K + 8 times: by packing, by the scaling of the weights and in the
-   * sum over K modes. The sum with the reference position rounds once more. */
+  /* A displacement is rounded modes + 8 times: by packing, by the scaling of the weights and in the
+   * sum over the modes. The addition of the reference position rounds once more. */
   const double rounding =
       ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
   return 1.001 * (scale * stored + basis->reference_error + rounding);
 }
 
-/* Find the length of the largest displacement in a pose, mm. */
 static double largest_displacement(const supine_basis *basis, const supine_pose *pose) {
   enum { BLOCK = 1024 };
   float xyz[3 * BLOCK];
@@ -43,7 +42,7 @@ static double largest_displacement(const supine_basis *basis, const supine_pose 
 }
 
 double supine_basis_storage_error(const supine_basis *basis) {
-  static const double volume = 500;  /* volume above the reference surface, mL */
+  static const double volume = 500;  /* volume added to that of the reference surface, mL */
   static const double distance = 20; /* largest displacement of an open surface, mm */
   double worst = 0;
   for (int number = 0; number < 27; ++number) {
@@ -51,7 +50,7 @@ double supine_basis_storage_error(const supine_basis *basis) {
     const int cell[3] = {number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1};
     const supine_state state = {.gravity = {cell[0], cell[1], cell[2]}};
     if (supine_basis_weights(basis, state.gravity, pose.weights) != SUPINE_OK) {
-      continue; /* gravity has no direction at the centre of the cube */
+      continue; /* the vector in the centre of the cube has no direction */
     }
     if (basis->info.has_volume) {
       if (supine_basis_add_volume(basis, volume, &pose) != SUPINE_OK) {

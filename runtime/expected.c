@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the expected errors of the law's positions. */
+/* Compute the expected errors of the positions that the displacement law predicts. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,7 +43,7 @@ double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
   return sqrt(sum / (double)n);
 }
 
-/* Return whether the volume at rest is assumed, not measured. */
+/* Return whether the basis has a volume at rest that was assumed instead of measured. */
 static bool rest_is_assumed(const supine_basis *basis) {
   const char *scanned = supine_basis_metadata(basis, "scanned");
   const char *state = supine_basis_metadata(basis, "scan_state");
@@ -53,7 +53,7 @@ static bool rest_is_assumed(const supine_basis *basis) {
          (state == NULL || strstr(state, "rest") == NULL);
 }
 
-/* Return whether the volume of a state, or of one of its lungs, counts from rest. */
+/* Return whether a state gives the volume of all lungs or of one lung relative to rest. */
 static bool counts_from_rest(const supine_state *state) {
   bool rest = state->lung_count == 0 && (state->volume.kind == SUPINE_VOLUME_REST ||
                                          state->volume.kind == SUPINE_VOLUME_DEFAULT);
@@ -77,11 +77,12 @@ supine_status supine_expected_shifted(const supine_basis *basis, const supine_st
   return supine_basis_pose(basis, &shifted, pose, error);
 }
 
-/* Poses of a state (`at`) and of the state from which displacements count (`from`). `fuller_at` and
- * `fuller_from` have 1 % of the reference volume more if the state counts from an assumed rest. */
+/* Poses of a state (`at`) and of the reference of displacements (`from`). `fuller_at` and
+ * `fuller_from` have 1 % of the reference volume more if their volume is relative to an assumed
+ * rest. */
 typedef struct poses {
   supine_pose at, from, fuller_at, fuller_from;
-  bool assumed; /* one state or both count from an assumed rest */
+  bool assumed; /* the volume of `at` or `from` is relative to an assumed rest */
 } poses;
 
 static supine_status find_poses(const supine_basis *basis, const supine_state *state,
@@ -103,7 +104,7 @@ static supine_status find_poses(const supine_basis *basis, const supine_state *s
   return status;
 }
 
-/* Compute the expected errors of vertices begin <= i < end, at most LOCATE_BLOCK of them, mm. */
+/* Compute the expected errors of at most LOCATE_BLOCK vertices, begin <= i < end, mm. */
 static void fill_block(const supine_basis *basis, const poses *p, double constant, size_t begin,
                        size_t end, float *sigma) {
   const supine_pose *const of[4] = {&p->at, &p->from, &p->fuller_at, &p->fuller_from};
@@ -132,7 +133,7 @@ supine_status supine_expected_error(const supine_basis *basis, const supine_stat
   poses p;
   if (info->is_fields) {
     return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
-                            "the basis holds another simulator's fields: their error is not known");
+                            "the error of another simulator's displacements is not known");
   }
   const supine_status status = find_poses(basis, state, from == NULL ? &scan : from, &p, error);
   if (status != SUPINE_OK) {

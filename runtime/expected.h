@@ -11,26 +11,26 @@
 /** Number of vertices evaluated at once. */
 enum { LOCATE_BLOCK = 256 };
 
-/** The fit of supine_locate, which is at the start of the caller's work space. */
+/** The result of kriging in supine_locate, at the start of the caller's work space. */
 typedef struct supine_locate_fit {
   supine_kriging kriging;
   supine_kriging_options options;
-  /** Translation from the rotated mean of the law's positions to the mean observed position, mm. */
+  /** Mean observed position minus the rotated mean of the predicted positions, mm. */
   double origin[3];
   double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
 } supine_locate_fit;
 
-/** Return the constant c of the expected error (supine/locate.h), mm: metadata "expected_error_mm"
- * of the file or, without it, the default. */
+/** Return the constant c of the expected error (supine/locate.h), mm. It is the metadata
+ * "expected_error_mm" of the file or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. */
 double supine_expected_constant(const supine_basis *basis);
 
-/** Compute the volume of all lungs of the reference surface, mL. */
+/** Return the sum of the volumes of all lungs of the reference surface, mL. */
 double supine_expected_reference(const supine_basis *basis);
 
-/** Volume that supine_expected_shifted adds, divided by the reference volume: 0.01. */
+/** Fraction of the reference volume that supine_expected_shifted adds: 0.01. */
 extern const double supine_expected_shift;
 
-/** Compute the RMS of the displacement between two poses over all vertices, mm. */
+/** Return the RMS over all vertices of the displacement between two poses, mm. */
 double supine_expected_rms(const supine_basis *basis, const supine_pose *pose,
                            const supine_pose *from);
 

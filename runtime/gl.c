@@ -52,7 +52,7 @@ supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, si
   }
   for (size_t i = begin; i < end; ++i) {
     const unsigned char *tile = basis->lit.bytes + i / TILE * basis->lit.stride;
-    for (size_t j = 0; j < 3 * count; ++j) { /* all axes of word 0, then of word 1, ... */
+    for (size_t j = 0; j < 3 * count; ++j) {
       const size_t row = j % 3 * count + j / 3;
       memcpy(words++, tile + (row * TILE + i % TILE) * sizeof *words, sizeof *words);
     }

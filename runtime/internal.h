@@ -11,10 +11,10 @@
 /** Number of harmonics that describe the volume at rest: bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
-/** Number of bytes above which positions are written with stores that bypass the caches.
- * STREAM_BYTES is for the tiles and positions of a frame, STREAM_BATCH_BYTES for the positions of a
- * batch. A range of at most STREAM_RANGE vertices is always stored in the caches, as its caller is
- * likely to read it. */
+/** Positions are written with stores that bypass the caches if the tiles and positions of a frame
+ * exceed STREAM_BYTES bytes, or if the positions of a batch exceed STREAM_BATCH_BYTES bytes. A
+ * range of at most STREAM_RANGE vertices of a frame is always stored in the caches, because its
+ * caller is likely to read it. */
 enum { STREAM_BYTES = 1 << 22, STREAM_BATCH_BYTES = 1 << 24, STREAM_RANGE = 1 << 13 };
 
 /** Largest size of a lung's name in bytes, with its NUL. */
@@ -33,16 +33,17 @@ struct supine_basis {
   const supine_kernels *kernels;
   bool stream; /**< write positions with stores that bypass the caches (STREAM_BYTES) */
   supine_prefetch prefetch;
-  /** Unit of mode k's packed coefficients times the unit of packed directions, mm. */
+  /** For each mode, the unit of the packed coefficients times the unit of packed directions, mm. */
   double mode_scale[SUPINE_MODES_MAX];
-  /** Bounds on the packing error and the displacement of mode k at weight 1 and gain 1, mm. */
+  /** For each mode at weight 1 and gain 1, bounds on the packing error and on the displacement,
+   * mm. */
   double mode_error[SUPINE_MODES_MAX], mode_size[SUPINE_MODES_MAX];
   double reference_volume[SUPINE_LUNGS_MAX]; /**< array that info.reference_volume points to, mL */
-  /** Coefficients of harmonics that describe the volume at rest minus the reference volume, mL:
-   * [G, 9] or, for all lungs together, [9]. NULL without rest. */
+  /** Coefficients of the volume at rest minus the reference volume, mL, in spherical harmonics of
+   * the direction of gravity. A row for each lung, or one row for all lungs; NULL without rest. */
   const double *resting;
   bool rest_by_lung;   /**< `resting` has a row for each lung */
-  double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
+  double upright_gain; /**< full volume upright minus supine, divided by the reference volume */
   double scan_volume;  /**< volume of all lungs in the scan minus the reference volume, mL */
   double scan_gravity[3];
   const uint32_t *rigid; /**< [rigid_count, 2] ranges of vertices (rigid.h) */
@@ -59,12 +60,13 @@ supine_status supine_basis_pack(supine_basis *basis, supine_storage storage);
  * @retval SUPINE_ERROR_MEMORY  an allocation failed */
 supine_status supine_basis_pack_normals(supine_basis *basis);
 
-/** Return the number of terms that each coordinate of a normal has,
+/** Return the number of elements of the vectors in the formula of supine_basis_normal_weights. For
+ * K modes, these are the elements
  *
- *     1,  a w_k,  b w_k,  a b w_k w_l (k <= l)
+ *     1,  a w_k,  b w_k,  a b w_k w_l    for all k and all l >= k
  *
- * for K weights w and the gains a and b of the other two axes. In files of versions 1 and 2, which
- * have one gain, a w_k and b w_k are one term. */
+ * of each axis. In files of versions 1 and 2, which have one gain, a w_k and b w_k are one
+ * element. */
 static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
   const size_t k = basis->info.mode_count;
   return 1 + (basis->info.volume_axes == 3 ? 2 : 1) * k + k * (k + 1) / 2;
@@ -75,13 +77,13 @@ static inline size_t supine_basis_normal_terms(const supine_basis *basis) {
 void supine_deform_lung(supine_deform_tiles *kernel, const supine_tiles *tiles, const float *folded,
                         size_t begin, size_t end, const supine_target *target);
 
-/** Return a target that begins `count` vertices after another. */
+/** Return a target that begins `count` vertices after `target`. */
 supine_target supine_target_after(const supine_target *target, size_t count);
 
 /** Compute supine_basis_info.storage_error, mm, for the current tiles. */
 double supine_basis_storage_error(const supine_basis *basis);
 
-/** Set all gains of a pose to the one number that adds `volume` mL to the reference volume.
+/** Set all gains of a pose to the one number that adds `volume` mL to the reference surface.
  * @param pose  its weights are read, its gains written
  * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot hold this volume */
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);

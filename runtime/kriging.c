@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fit the terms and the random field of kriging.h to residuals of observed points. */
+/* Fit the model of kriging.h to the residuals of observed points. */
 #include <math.h>
 #include <string.h>
 
@@ -56,8 +56,8 @@ size_t supine_kriging_space(size_t count) {
   return count * (count + SUPINE_KRIGING_COLUMNS + 3);
 }
 
-/* Return the column that a term multiplies on an axis, and write the sign: 1, -1, or 0 if the term
- * does not change this axis. A rotation changes axis x by r_y p_z - r_z p_y, and so on. */
+/* Return the column of supine_kriging.whitened that a term multiplies on an axis. Write the sign of
+ * this product, or 0 if the term does not change the axis. */
 static int column_of(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
@@ -72,7 +72,7 @@ static int column_of(size_t term, size_t axis, double *sign) {
   return PLACE + (int)((6 - about - axis) % 3);
 }
 
-/* Compute the centre of the points, fill in the columns, and multiply each column by L^-1. */
+/* Compute the centre of the points, and fill in supine_kriging.whitened. */
 static void whiten(supine_kriging *fit) {
   const size_t n = fit->count;
   memset(fit->centre, 0, sizeof fit->centre);
@@ -107,12 +107,13 @@ static bool is_known(const supine_kriging_options *options, size_t term) {
   return term == 3 ? !options->volume : term > 3 && !options->rotation;
 }
 
-/* Compute the matrix A and the right side of the normal equations of the terms:
+/* Compute A and the right side of the normal equations of the terms t, b and r (kriging.h):
  *
  *     A = X' K^-1 X + P        right = X' K^-1 y + P m
  *
- * X has the columns of the terms, K is the covariance of the points, and y are the residuals. The
- * prior has the inverse covariance P and the mean m. A known term has a row of the identity. */
+ * X has the columns that the terms multiply, K is the covariance of the points, and y are the
+ * residuals. The prior has the inverse covariance P and the mean m. A row of A for a known term is
+ * a row of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -134,8 +135,8 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
   }
 }
 
-/* Return whether the points determine all terms: all pivots of `factor` exceed rounding errors of
- * `a`. */
+/* Return whether the points determine all terms: whether each pivot of `factor`, the Cholesky
+ * factor of `a`, exceeds the rounding error of this pivot. */
 static bool determined(const double a[TERMS * TERMS], const double factor[TERMS * TERMS]) {
   for (size_t k = 0; k < TERMS; ++k) {
     const double pivot = factor[k * TERMS + k];
@@ -146,10 +147,10 @@ static bool determined(const double a[TERMS * TERMS], const double factor[TERMS 
   return true;
 }
 
-/* Compute the terms, their covariance A^-1, and supine_kriging.spread. */
+/* Compute the terms, their covariance and supine_kriging.spread from the normal equations. */
 static void solve_terms(supine_kriging *fit, const supine_kriging_options *options,
                         const double factor[TERMS * TERMS], const double right[TERMS]) {
-  double inverse[TERMS][TERMS]; /* row k is column k of the inverse of `factor` */
+  double inverse[TERMS][TERMS];
   for (size_t k = 0; k < TERMS; ++k) {
     memset(inverse[k], 0, sizeof inverse[k]);
     inverse[k][k] = 1;
@@ -237,12 +238,12 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   return SUPINE_OK;
 }
 
-/* Compute the inverse covariance [3, 3] of the residual of point j minus its prediction by all
- * other points: the block of point j in K^-1 - K^-1 X A^-1 X' K^-1 (normal_equations).
- * @param row  [n] column j of L^-1 */
+/* Compute the inverse covariance [3, 3] of the error of predicting one point from all others. It is
+ * the block of this point in K^-1 - K^-1 X A^-1 X' K^-1 with K, X and A of normal_equations().
+ * @param row  [count] column of L^-1 for this point, where L = fit->factor */
 static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
   const size_t n = fit->count;
-  double column[VALUE]; /* row j of K^-1 times the columns of X (normal_equations) */
+  double column[VALUE];
   for (size_t c = 0; c < VALUE; ++c) {
     column[c] = dot(n, row, fit->whitened + c * n);
   }
@@ -284,7 +285,7 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double 
   double trace = 0;
   double solved[3];
   forward(3, block, residual);
-  for (size_t k = 0; k < 3; ++k) { /* solve for column k of the inverse of `block` */
+  for (size_t k = 0; k < 3; ++k) {
     double unit[3] = {k == 0, k == 1, k == 2};
     forward(3, block, unit);
     trace += dot(3, unit, unit);

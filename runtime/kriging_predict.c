@@ -7,8 +7,7 @@
 
 enum { RUN = 32, COLUMNS = SUPINE_KRIGING_TERMS };
 
-/* RUN points of a target, stored by axis. The last run is filled up with copies of the last
- * point. */
+/* RUN points of a target, stored by axis. Copies of the last point fill the last run. */
 typedef struct run {
   float place[3][RUN];  /* position minus supine_kriging.centre, mm */
   float volume[3][RUN]; /* displacement if the volume grows by one prior standard deviation, mm */
@@ -30,9 +29,9 @@ static void fill(const supine_kriging *fit, const supine_kriging_target *target,
   }
 }
 
-/* Compute the covariances of the random field between a run and observed point j, mm^2. exp(-a) of
- * kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 5 approximates. The
- * relative error is 1e-6. */
+/* Compute the covariances, mm^2, of the random field between each point of a run and observed point
+ * j. exp(-a) of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 5
+ * approximates. The relative error is 1e-6. */
 static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *in, float *out) {
   const supine_kriging_point *p = &fit->points[j];
   const double size = p->size > fit->model.least ? p->size : fit->model.least;
@@ -57,7 +56,7 @@ static void covary(const supine_kriging *fit, size_t j, size_t lung, const run *
   }
 }
 
-/* Compute the sum of numbers[j] w[j] over `count` observed points j, for each point of a run. */
+/* For each point v of a run, compute the sum over j < count of numbers[j] w[j][v]. */
 static void project(size_t count, float (*w)[RUN], const double *numbers, float *sum) {
   memset(sum, 0, RUN * sizeof *sum);
   for (size_t j = 0; j < count; ++j) {
@@ -68,8 +67,8 @@ static void project(size_t count, float (*w)[RUN], const double *numbers, float 
   }
 }
 
-/* Solve L w = k for the lower triangle L in `fit`. k are the covariances of the random field
- * between the observed points and a run. */
+/* For each point of a run, solve L w = k with the lower triangle L = fit->factor. k are the
+ * covariances of the random field between this point and the observed points. */
 static void solve(const supine_kriging *fit, size_t lung, const run *in, float (*w)[RUN]) {
   const size_t n = fit->count;
   for (size_t j = 0; j < n; ++j) {
@@ -91,10 +90,11 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
 
 /* Compute the 3-D variance of the prediction at each point of a run, mm^2:
  *
- *     3 (k - w'w) + m' spread m
+ *     3 (k - w'w) + m' S m
  *
- * k is the variance of g on one axis, w is the result of solve(), and m is the row (1, v, p - c) of
- * the point (kriging.h) minus w' L^-1 times these rows of the observed points. */
+ * k is the variance of the random field on one axis, and w is the result of solve(). S is
+ * supine_kriging.spread. m is the vector that S multiplies, minus the sum over all observed points
+ * j of w[j] times column j of supine_kriging.whitened. */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {

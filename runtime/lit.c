@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute normals from a few modes. */
+/* Compute the normals of a deformed surface as weighted sums of modes. */
 #include <string.h>
 
 #include "runtime/internal.h"
@@ -7,7 +7,7 @@
 #include "runtime/safetensors/platform.h"
 #include "sh/base/clones.h"
 
-/* Pack the normals of 16 vertices into a tile. row[v] points to the modes [3, Q] of vertex v. */
+/* Pack the modes of the normals of 16 vertices into a tile. row[v] are the modes of vertex v. */
 SUPINE_CLONES static void pack_tile(const supine_tiles *tiles, const int16_t *const row[TILE],
                                     unsigned char *to) {
   const size_t words = supine_tiles_normal_words(tiles->modes);
@@ -47,7 +47,7 @@ supine_status supine_basis_pack_normals(supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Compute the sum of form_kl w_k w_l over k <= l. `form` holds the rows of an upper triangle. */
+/* Return the sum of F_kl w_k w_l over k <= l. `form` holds the rows of the upper triangle F. */
 static double triangle(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
@@ -93,7 +93,7 @@ void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *p
   }
 }
 
-/* Compute the weights of one lung's normals for the packed modes. */
+/* Compute the factors of one lung by which supine_kernels.light multiplies packed modes. */
 static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose, float *folded) {
   double v[SUPINE_NORMAL_MODES_MAX];
   lung_weights(basis, lung, pose, v);
@@ -102,13 +102,13 @@ static void fold(const supine_basis *basis, size_t lung, const supine_pose *pose
   }
 }
 
-/* Compute the normals of vertices begin <= i < end, of one or more lungs. */
+/* Compute the normals of vertices begin <= i < end, which may belong to several lungs. */
 static void light(const supine_basis *basis, const supine_pose *pose, size_t begin, size_t end,
                   bool stream, float *normals) {
   const supine_target target = {.xyz = normals,
                                 .stream = stream,
                                 .prefetch = stream ? basis->prefetch : SUPINE_PREFETCH_NONE};
-  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* the missing modes of the last word stay 0 */
+  float folded[SUPINE_NORMAL_MODES_MAX + 2] = {0}; /* 0 for modes that the last word lacks */
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
     const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;

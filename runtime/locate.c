@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Find a state, a rigid motion and a correction from observed points. */
+/* Find the state of the lungs, a rigid motion and a correction from observed points. */
 #include <math.h>
 #include <string.h>
 
@@ -7,31 +7,30 @@
 #include "runtime/rigid.h"
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
-               "the largest numbers of points differ");
+               "both headers have the same limit of points");
 
-/* Prior standard deviation of the volume, divided by the reference volume. It is 0.3 of the
- * difference between full inflation (1) and rest (0.43). */
+/* Prior standard deviation of an unknown volume, divided by the reference volume. It is 0.3 times
+ * the difference between the volumes at full inflation (1) and at rest (0.43). */
 static const double prior_spread = 0.17;
-static const double outlier_limit = 3.0; /* residual / sigma above which a point is an outlier */
-static const double outlier_noise = 300; /* noise that replaces the noise of an outlier, mm */
+static const double outlier_limit = 3.0; /* outliers exceed this number of standard deviations */
+static const double outlier_noise = 300; /* standard deviation given to an outlier, mm */
 static const double volume_step = 1;     /* change of the volume below which the search ends, mL */
 static const double angle_step = 1e-4;   /* rotation in a step below which the search ends, rad */
-/* Ratio of the sill to the constant of the expected error: 6 mm to 4.5 mm. The constant is smaller,
- * as it was measured after the best translation. */
+/* Ratio of supine_kriging_model.sill, 6 mm, to the constant of the expected error, 4.5 mm. The
+ * constant is smaller because it was measured after the best translation. */
 static const double sill_of_error = 4.0 / 3;
 
 /* Largest number of Gauss-Newton steps, and of halvings of one change of the volume. */
 enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
 
-/* Input, output and work space of one call, for n observed points. */
 typedef struct workspace {
   const supine_locate_task *task;
   supine_location *found;
   supine_locate_fit *fit;
-  supine_kriging_point *points; /* [n] */
-  double *law;                  /* [n, 3] the law's positions in the current state, mm */
-  double *kriging;              /* [supine_kriging_space(n)] */
-  double *scratch;              /* [n] */
+  supine_kriging_point *points; /* [task->count] */
+  double *law;     /* [task->count, 3] positions that the displacement law predicts, mm */
+  double *kriging; /* [supine_kriging_space(task->count)] */
+  double *scratch; /* [task->count] */
 } workspace;
 
 static size_t doubles_of(size_t bytes) {
@@ -69,9 +68,9 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
     if (o->vertex >= n || !isfinite(sum) || !(o->noise > 0) || !isfinite(o->noise)) {
       return supine_error_set(
           error, SUPINE_ERROR_ARGUMENT,
-          "observation %zu: give a vertex below %zu instead of %zu, a finite position "
-          "and a noise above 0",
-          j + 1, n, o->vertex);
+          "observation %zu has vertex %zu: give a vertex below %zu, a finite position and a noise "
+          "above 0",
+          j + 1, o->vertex, n);
     }
   }
   return SUPINE_OK;
@@ -86,7 +85,8 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
   }
 }
 
-/* Set everything that does not depend on the state: scan positions, lungs, noise and options. */
+/* Set all members that do not depend on the state: the position in the scan, the lung and the noise
+ * of each point, and the options of the fit. */
 static supine_status initialise(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
@@ -122,8 +122,8 @@ static void rotate(const double rotation[9], const double x[3], double rotated[3
   }
 }
 
-/* Compute the law's positions in the current state, their distances from the scan, and their change
- * if the volume grows by one prior standard deviation. */
+/* For each observed point, predict the position in the current state, and compute the distance from
+ * the scan and the displacement if the volume grows by one prior standard deviation. */
 static supine_status evaluate(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const double step = supine_expected_shift * supine_expected_reference(task->inside);
@@ -152,8 +152,8 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   return status;
 }
 
-/* Compute the translation from the mean of the law's rotated positions to the mean observed
- * position, and the residuals in the axes of the body. */
+/* Compute supine_locate_fit.origin for the current rotation, and the residual of each observed
+ * point in body axes. */
 static void find_residuals(workspace *s) {
   const size_t n = s->task->count;
   supine_location *found = s->found;
@@ -174,18 +174,18 @@ static void find_residuals(workspace *s) {
     for (size_t i = 0; i < 3; ++i) {
       d[i] = s->task->observed[j].position[i] - s->fit->origin[i];
     }
-    for (size_t i = 0; i < 3; ++i) { /* multiply d by the transposed rotation */
+    for (size_t i = 0; i < 3; ++i) {
       s->points[j].residual[i] = found->rotation[i] * d[0] + found->rotation[3 + i] * d[1] +
                                  found->rotation[6 + i] * d[2] - s->law[3 * j + i];
     }
   }
 }
 
-/* Start from the rotation that best turns the law's positions to the observed positions. */
+/* Set the rotation to the one that fits the predicted positions to the observed positions best. */
 static void rotate_roughly(workspace *s) {
   double h[3][3] = {{0}};
   find_residuals(s);
-  const double *c = s->fit->origin; /* difference of the means, as nothing is rotated yet */
+  const double *c = s->fit->origin; /* observed mean minus predicted mean without rotation */
   double mean[3] = {0};
   const size_t n = s->task->count;
   for (size_t j = 0; j < 3 * n; ++j) {
@@ -228,8 +228,8 @@ static void rotate_further(double rotation[9], const double r[3]) {
   memcpy(rotation, product, sizeof product);
 }
 
-/* Change the volume by `ml` mL, but by at most half its prior standard deviation. Halve the change
- * until the lungs can hold the new volume. */
+/* Change the volume by `ml` mL, but by at most half of the prior standard deviation of the volume.
+ * Halve the change until the lungs can hold the new volume. */
 static supine_status change_volume(workspace *s, double ml, supine_error *error) {
   const double most = 0.5 * s->fit->deviation;
   const double before = s->found->state.volume.ml;
@@ -274,8 +274,8 @@ static supine_status iterate(workspace *s, supine_error *error) {
   }
 }
 
-/* Compare each observed point with its prediction by all other points. Return the point with the
- * largest ratio of residual to sigma, or the number of points if no ratio exceeds outlier_limit. */
+/* Compare each observed point with the prediction by all other points. Return the worst new
+ * outlier, or the number of points if there is none. */
 static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   const size_t n = s->task->count;
   size_t worst = n;

@@ -9,7 +9,7 @@
  * reference volume added (`fuller`). */
 typedef struct poses {
   supine_pose at, scan, fuller;
-  double constant; /* c of supine/locate.h, mm, at most max(RMS displacement, 2 mm) */
+  double constant; /* min(c, max(2 mm, RMS displacement)) with the constant c of supine/locate.h */
   double per_step; /* prior standard deviation of the volume / volume added in `fuller` */
 } poses;
 
@@ -34,7 +34,6 @@ static supine_status find_poses(const supine_location *found, const supine_basis
   return status;
 }
 
-/* Input and output of the prediction at a block of vertices. */
 typedef struct block {
   float law[3 * LOCATE_BLOCK], scan[3 * LOCATE_BLOCK], volume[3 * LOCATE_BLOCK];
   float size[LOCATE_BLOCK];
@@ -66,10 +65,10 @@ static void predict(const supine_location *found, const supine_basis *basis, con
   supine_kriging_predict(&fit->kriging, &target, b->shift, b->variance);
 }
 
-/* Convert positions to the frame of the observations. If at least three points determine the
- * translation and no rotation is fitted, limit the expected errors to those without observations.
- * This limit does not include the error of a rotation. For two points, it would be too small by a
- * factor of 0.85. */
+/* Convert the corrected positions to the frame of the observations, and write the expected errors.
+ * If at least three points were observed and no rotation was fitted, limit each expected error to
+ * the error without observations. With two points, this limit would be 0.85 of the true error; with
+ * a rotation, it would lack the error of the rotation. */
 static void finish(const supine_location *found, const poses *p, const block *b, size_t count,
                    float *xyz, float *sigma) {
   const supine_locate_fit *fit = found->fit;

@@ -9,11 +9,11 @@
 #include "sh/base/clones.h"
 
 enum {
-  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of 1, which fixed_narrow can hold */
+  FIXED_TOP = INT32_MAX / 4096 * 4096, /* packed value of 1, in the range of fixed_narrow */
   FLOAT_FRACTION_BITS = 23
 };
 
-/* One tile before packing: coefficients [axes, K, 16], directions and reference positions [48]. */
+/* One tile before packing: coefficients [axes, modes, 16], directions, reference positions. */
 typedef struct source {
   float coefficients[3 * SUPINE_MODES_MAX * TILE];
   float direction[TILE_NUMBERS];
@@ -23,10 +23,10 @@ typedef struct source {
 /* Units of packed numbers, and the largest squared packing errors. */
 typedef struct work {
   double mode[SUPINE_MODES_MAX]; /* unit of the coefficients of each mode, mm */
-  double direction;              /* unit of a coordinate of a direction */
-  double reference;       /* unit of a coordinate of a reference position, mm, a power of two */
-  float direction_square; /* largest squared error of a direction */
-  float reference_square; /* largest squared error of a reference position, mm^2 */
+  double direction;              /* unit of packed directions */
+  double reference;              /* unit of packed reference positions, mm, a power of two */
+  float direction_square;        /* largest squared error of a direction */
+  float reference_square;        /* largest squared error of a reference position, mm^2 */
   source source;
 } work;
 
@@ -35,9 +35,9 @@ static float flush(float value) {
   return fabsf(value) < 1e-30F ? 0 : value;
 }
 
-/* Compute the length of a vertex's direction, mm; 1 if the direction is 0 or the field is a vector
- * field. Compact storages divide the direction by this length and multiply the coefficients by it,
- * so that one unit suits all vertices. */
+/* Return the length of the direction of vertex i, mm. Return 1 if the direction is 0 or the field
+ * is a vector field. Compact storages divide the direction by this length and multiply the
+ * coefficients by it, so that one unit suits all vertices. */
 static double direction_length(const supine_basis *basis, size_t i) {
   double square = 0;
   for (size_t axis = 0; axis < 3 && basis->info.direction != NULL; ++axis) {
@@ -73,8 +73,7 @@ static void source_load(const supine_basis *basis, size_t tile, source *from) {
   }
 }
 
-/* Find the largest magnitude of a coefficient of each mode times the length of its direction,
- * mm. */
+/* For each mode, find the largest product of |coefficient| and direction_length(), mm. */
 static void largest_coefficients(const supine_basis *basis, float *top) {
   const size_t modes = basis->info.mode_count;
   const size_t rows = basis->tiles.axes;
@@ -98,18 +97,17 @@ static double reference_unit(float top) {
   return ldexp(1, exponent < 96 ? exponent : 96);
 }
 
-/* Return the number of bits of a coefficient of mode k in a shared word (compact.h). */
+/* Return the number of bits of a packed coefficient of mode k (compact.h). */
 static int word_bits(const supine_tiles *tiles, size_t k) {
   const size_t paired = supine_tiles_paired(tiles->storage, tiles->modes);
   return k < paired ? 16 : (k - paired) % 3 == 2 ? 10 : 11;
 }
 
-/* Choose the units, and bound the displacement and the packing error of each mode. A packed
- * coefficient errs by half its lowest bit and by the rounding of its word to a float. */
+/* Choose the units of packed numbers. Bound the displacement and the packing error of each mode. A
+ * packed coefficient errs by half of its lowest bit and by the rounding of its word to a float. */
 static void choose_units(supine_basis *basis, work *w) {
   const bool compact = supine_tiles_compact(basis->tiles.storage);
-  /* The largest length of a vector whose coordinates are at most 1. */
-  const double axes = sqrt((double)basis->tiles.axes);
+  const double axes = sqrt((double)basis->tiles.axes); /* length if all coordinates are 1 */
   float top[SUPINE_MODES_MAX];
   float farthest = 0;
   for (size_t i = 0; i < 6 * basis->info.lung_count; ++i) {
@@ -161,7 +159,8 @@ static void pack_coefficients(const supine_tiles *tiles, const double *unit, con
   }
 }
 
-/* Pack 48 coordinates, and raise *square to the largest squared packing error of a vertex. */
+/* Pack the 48 coordinates of a tile. If a vertex has a squared packing error above *square, write
+ * the error to *square. */
 static void pack_numbers(const supine_tiles *tiles, double unit, const float *numbers,
                          unsigned char *at, float *square) {
   float error[TILE_NUMBERS];

@@ -8,7 +8,7 @@
 
 #include "runtime/internal.h"
 
-static const double default_above_scan = 500; /* default volume above the scan, mL */
+static const double default_above_scan = 500; /* default volume minus the volume in the scan, mL */
 
 supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                    double *weights) {
@@ -38,8 +38,8 @@ static void contract(const supine_basis *basis, size_t lung, const double *weigh
                          basis->info.volume_cubic + lung * k * k * k, weights, form);
 }
 
-/* Compute the volume at rest minus the reference volume, mL, from the harmonics y of gravity. `row`
- * is a lung, or 0 for all lungs together if the file has only one row. */
+/* Return the volume at rest minus the reference volume, mL, from the spherical harmonics y of
+ * gravity. `row` is a lung, or 0 if the file has only one row for all lungs together. */
 static double resting(const supine_basis *basis, size_t row, const double *y) {
   double volume = 0;
   for (size_t t = 0; t < RESTING_TERMS; ++t) {
@@ -56,11 +56,11 @@ static double sum_of(const double *values, size_t count) {
   return sum;
 }
 
-/* Volumes in a posture minus the reference volume, mL. */
+/* Volumes in one posture, mL, each minus the volume of the reference surface. */
 typedef struct volumes {
   size_t lung_count;
   supine_volume_form form[SUPINE_LUNGS_MAX];
-  double rest[SUPINE_LUNGS_MAX]; /* volume of a lung at rest; 0 if the file does not state it */
+  double rest[SUPINE_LUNGS_MAX]; /* volumes at rest; 0 if the file has only the sum of all lungs */
   double full[SUPINE_LUNGS_MAX];
   double rest_total;
 } volumes;
@@ -101,7 +101,7 @@ static supine_status refuse(const char *what, supine_error *error) {
                           what);
 }
 
-/* Find the volume of all lungs together minus the reference volume, mL. */
+/* Convert any volume to the volume of all lungs together minus the reference volume, mL. */
 static supine_status total_of(const supine_basis *basis, const volumes *v,
                               const supine_volume *volume, double *total, supine_error *error) {
   switch (volume->kind) {
@@ -178,8 +178,9 @@ static supine_status total_gains(const supine_basis *basis, const volumes *v, do
   return status;
 }
 
-/* Find the gains of each lung from its own volume. If this volume counts from rest, full inflation
- * or the scan, it counts from the volume that the lung holds when all lungs are in that state. */
+/* Find the gains of each lung from the lung's own volume. If this is relative to rest, full
+ * inflation or the scan, add it to the volume that the lung holds if all lungs are at this
+ * reference. */
 static supine_status named_gains(const supine_basis *basis, const volumes *v,
                                  const supine_state *state, supine_pose *pose,
                                  supine_error *error) {
@@ -224,7 +225,7 @@ static supine_status named_gains(const supine_basis *basis, const volumes *v,
   return SUPINE_OK;
 }
 
-/* Set the gains for the reference surface. A basis without volumes has no other state. */
+/* Set all gains to 0 for the reference surface. Refuse other states, which need volumes. */
 static supine_status open_gains(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   const supine_volume *volume = &state->volume;

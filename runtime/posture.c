@@ -68,7 +68,7 @@ supine_status supine_posture_quaternion(const double quaternion[4], double gravi
   const double y = quaternion[2] / largest;
   const double z = quaternion[3] / largest;
   const double square = w * w + x * x + y * y + z * z;
-  /* In body axes, the world's gravity (0, 0, -1) is minus the third row of the rotation. */
+  /* In body axes, (0, 0, -1) of world axes is minus the third row of the rotation matrix. */
   gravity[0] = 2 * (w * y - x * z) / square;
   gravity[1] = (0 - 2 * (y * z + w * x)) / square;
   gravity[2] = (x * x + y * y - w * w - z * z) / square;

@@ -11,14 +11,14 @@ void supine_rigid_rotation(const double h[3][3], double rotation[9]) {
       {h[1][2] - h[2][1], h[0][0] - h[1][1] - h[2][2], h[0][1] + h[1][0], h[2][0] + h[0][2]},
       {h[2][0] - h[0][2], h[0][1] + h[1][0], h[1][1] - h[0][0] - h[2][2], h[1][2] + h[2][1]},
       {h[0][1] - h[1][0], h[2][0] + h[0][2], h[1][2] + h[2][1], h[2][2] - h[0][0] - h[1][1]}};
-  double shift = 0; /* added to every eigenvalue, so that all are positive */
+  double shift = 0; /* added to every eigenvalue of m, so that all eigenvalues are positive */
   for (size_t k = 0; k < 16; ++k) {
     shift += m[k / 4][k % 4] * m[k / 4][k % 4];
   }
   shift = sqrt(shift);
   /* Begin near the identity: points on a line do not determine the rotation about that line. */
   double q[4] = {1, 0.03, 0.02, 0.01};
-  for (int step = 0; step < 200; ++step) { /* find the eigenvector by power iteration */
+  for (int step = 0; step < 200; ++step) { /* power iteration for the largest eigenvalue */
     double next[4];
     double square = 0;
     for (size_t a = 0; a < 4; ++a) {

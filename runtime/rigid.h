@@ -8,16 +8,16 @@
 
 /** Find the rotation that best maps points p to points x, by least squares [Horn 1987, J Opt Soc Am
  * A 4(4)]. The means of p and of x must be 0.
- * @param h         [3, 3] sum over the points of p_a x_b
+ * @param h         h[a][b] is the sum over all points of coordinate a of p times coordinate b of x
  * @param rotation  [3, 3] by rows, written */
 void supine_rigid_rotation(const double h[3][3], double rotation[9]);
 
-/** The rigid motion x = R (p - mean of p) + mean of x of a rigid part. p are its reference
- * positions, and x are its positions deformed as if it were not rigid. Zero-initialise. */
+/** The rigid motion R (p - mean of p) + mean of x of a rigid part. p are the reference positions of
+ * the part, x the positions that it would have if it were not rigid. Zero-initialise. */
 typedef struct supine_rigid_motion {
   double count;          /**< number of vertices added */
-  double from[3], to[3]; /**< sums of p and x, mm; supine_rigid_finish turns them into means */
-  double cross[3][3];    /**< sum of p_a x_b; supine_rigid_finish subtracts the means of p and x */
+  double from[3], to[3]; /**< sums, later means, of reference and deformed positions, mm */
+  double cross[3][3];    /**< sum of reference coordinate [a] times deformed coordinate [b], mm^2 */
   double rotation[9];    /**< rotation R by rows, set by supine_rigid_finish */
 } supine_rigid_motion;
 
@@ -28,8 +28,8 @@ void supine_rigid_finish(supine_rigid_motion *motion);
 /** Move one point p rigidly, and return coordinate `axis` of the result, mm. */
 double supine_rigid_move(const supine_rigid_motion *motion, const float *p, size_t axis);
 
-/** Replace the positions of each rigid part in `xyz` [N, 3], mm, by its reference positions, moved
- * rigidly so that they fit the replaced positions best. */
+/** In `xyz` [N, 3], mm, replace the positions of each rigid part by a rigid motion of its reference
+ * positions, the one that fits the replaced positions best. */
 void supine_rigid_restore(const supine_basis *basis, float *xyz);
 
 #endif

@@ -18,9 +18,9 @@ static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                     [SUPINE_VOLUME_SCAN] = "scan",
                                     [SUPINE_VOLUME_ABSOLUTE] = ""};
 _Static_assert(sizeof kinds / sizeof *kinds == SUPINE_VOLUME_KIND_COUNT,
-               "one name for each kind of volume");
+               "each kind of volume has a name");
 
-enum { PIECE = 64 }; /* size of the text of a posture or volume in bytes, with its NUL */
+enum { PIECE = 64 }; /* largest size of a posture or volume as text, in bytes, with its NUL */
 
 /* Read a number, with or without the unit "mL". */
 static bool read_number(const char *text, double *value, bool *has_unit) {

@@ -13,7 +13,7 @@ static double dot(size_t count, const double *a, const double *b) {
   return sum;
 }
 
-/* Compute w^T F w for the matrix `form` F [count, count]. */
+/* Return w^T F w for the matrix F = `form` [count, count]. */
 static double square(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t i = 0; i < count; ++i) {
@@ -43,8 +43,8 @@ static double cubic_slope(const double c[3], double s) {
   return c[0] + s * (2 * c[1] + s * 3 * c[2]);
 }
 
-/* Find the s nearest to 0, with the sign of `side` (1 or -1), at which the slope of the cubic is 0;
- * return an infinite s if there is none. */
+/* Find the s nearest to 0, with the sign of `side` (1 or -1), at which the slope of cubic_at() is
+ * 0. Return an infinite s if there is none. */
 static double cubic_turn(const double c[3], double side) {
   double roots[2] = {INFINITY, INFINITY};
   const double discriminant = c[1] * c[1] - 3 * c[0] * c[2];
@@ -64,8 +64,8 @@ static double cubic_turn(const double c[3], double side) {
   return nearest * side;
 }
 
-/* Find the s between `low` and `high` at which the cubic is `volume`, by Newton's method; bisect if
- * a step leaves the bracket. The cubic must be monotone in this range. */
+/* Find the s between `low` and `high` at which cubic_at() is `volume`, by Newton's method. Bisect
+ * if a step leaves the bracket. cubic_at() must be monotone in this range. */
 static double cubic_solve(const double c[3], double volume, double low, double high) {
   const bool rising = cubic_at(c, high) > cubic_at(c, low);
   double s = volume / c[0];
@@ -93,14 +93,14 @@ static double cubic_solve(const double c[3], double volume, double low, double h
 
 static supine_status refuse_constant(double volume, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "a change of the reference surface's volume by %g mL is out of reach: "
+                          "a change of the reference volume by %g mL is out of reach: "
                           "no gain changes the volume in this posture; choose another posture",
                           volume);
 }
 
 static supine_status refuse_folded(double volume, double limit, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "a change of the reference surface's volume by %g mL is out of reach: "
+                          "a change of the reference volume by %g mL is out of reach: "
                           "the surface folds at a change of %g mL; choose a smaller change",
                           volume, limit);
 }

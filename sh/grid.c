@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the Gauss-Legendre x equispaced quadrature rule on the sphere. */
+/* Compute a quadrature rule on the sphere with Gauss-Legendre nodes in latitude. */
 #include <math.h>
 #include <stdlib.h>
 

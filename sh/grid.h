@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file
- * Compute the Gauss-Legendre x equispaced quadrature rule on the sphere. */
+/** @file A quadrature rule on the sphere with Gauss-Legendre nodes in latitude. */
 #ifndef SUPINE_GRID_H
 #define SUPINE_GRID_H
 
@@ -11,8 +10,8 @@
 /** Largest number of latitudes, and of longitudes, of a rule. */
 #define SUPINE_SH_GRID_MAX 16384
 
-/** A quadrature rule of latitudes x longitudes directions. Direction (j, k) has cos(colatitude) =
- * z[j] and longitude 2 pi k / longitudes; its weight is weight[j] * 2 pi / longitudes. */
+/** A quadrature rule with latitudes x longitudes directions. Direction (j, k) has cos(colatitude) =
+ * z[j] and longitude 2 pi k / longitudes. Its weight is weight[j] * 2 pi / longitudes. */
 typedef struct supine_sh_grid {
   size_t latitudes;
   size_t longitudes;
@@ -21,7 +20,8 @@ typedef struct supine_sh_grid {
 } supine_sh_grid;
 
 /** Create the rule with given numbers of latitudes and longitudes, 1 to SUPINE_SH_GRID_MAX each. It
- * integrates products of two functions of band L exactly if latitudes > L and longitudes > 2 L.
+ * integrates products of two functions of bands up to L exactly if latitudes > L and longitudes > 2
+ * L.
  * @param grid  written, NULL on failure; free it with supine_sh_grid_destroy
  * @retval SUPINE_ERROR_ARGUMENT  a number is out of range
  * @retval SUPINE_ERROR_MEMORY    an allocation failed (GSL first calls its error handler) */

@@ -71,8 +71,8 @@ void supine_sh_transform_destroy(supine_sh_transform *plan) {
   }
 }
 
-/* GSL normalises its SPHARM functions for exp(i m phi). Real harmonics with m != 0 have cos or sin
- * (m phi) instead, and therefore an additional factor sqrt(2). */
+/* GSL normalises its SPHARM functions for exp(i m phi). Real harmonics with m != 0 have cos(m phi)
+ * or sin(m phi) instead, and therefore an additional factor sqrt(2). */
 void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double *ring,
                               double *coefficients) {
   const size_t count = supine_sh_count(plan->band);
@@ -82,7 +82,7 @@ void supine_sh_transform_ring(supine_sh_transform *plan, size_t j, const double 
   fftw_execute_dft_r2c(plan->fft, (double *)(uintptr_t)ring, plan->spectrum);
   for (size_t m = 0; m <= plan->band; ++m) {
     for (size_t f = 0; f < plan->fields; ++f) {
-      const double *s = plan->spectrum[m * plan->fields + f]; /* sum of value times exp(-i m phi) */
+      const double *s = plan->spectrum[m * plan->fields + f]; /* FFT of field f at order m */
       double *c = coefficients + f * count;
       for (size_t l = m; l <= plan->band; ++l) {
         const double y = weight * plan->legendre[gsl_sf_legendre_array_index(l, m)];

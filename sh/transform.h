@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file Compute the spherical-harmonic transform of several real fields at once,
  *
- *     coefficient(l, m) = integral over the sphere of value(g) Y(l, m)(g)
+ *     coefficient(l, m) = integral over all directions g of value(g) Y(l, m)(g)
  *
- * by the quadrature rule of a grid. It is exact to rounding for fields without bands above the
- * plan's band; higher bands of a field alias into its coefficients. */
+ * by the quadrature rule of a grid. The transform is exact to rounding for fields without bands
+ * above the plan's band. Higher bands of a field alias into the coefficients of this field. */
 #ifndef SUPINE_TRANSFORM_H
 #define SUPINE_TRANSFORM_H
 

@@ -190,7 +190,7 @@ TEST(test_breath_out_of_range_refused) {
     }
   }
   supine_pv_breath breath = breath_of(SUPINE_PV_COSINE);
-  expect_argument(normal, &breath, NAN, "time 0 is not finite");
+  expect_argument(normal, &breath, NAN, "times[0] is not finite");
   expect_argument(NULL, &breath, 1.0, "needs a pressure-volume relation");
   breath.rest_pressure = -0.1;
   expect_argument(normal, &breath, 1.0, "rest pressure -0.1");

@@ -102,7 +102,7 @@ void supine_patient_motion(const supine_patient_power *power, const supine_patie
   }
 }
 
-/* The factor exp(-a) of kriging.h is the 64th power of exp(-a / 64), which a polynomial of degree 8
+/* Compute exp(-a) of kriging.h as the 64th power of exp(-a / 64), which a polynomial of degree 8
  * approximates; the error is below 1e-13 of the covariance at a = 0. */
 SUPINE_CLONES void supine_patient_covariances(const supine_patient_centre *here, size_t count,
                                               const supine_patient_centre *centre,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Compute the Gram matrices of a basis, and from them RMS distances and energies. Compute the
- * distance of every vertex, and statistics of distances. */
+/* Compare poses of a basis by the distances of vertices, and compute the energy of each band of
+ * harmonics. Gram matrices avoid a pass over the vertices. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -15,9 +15,9 @@
 struct supine_compare {
   const supine_basis *basis;
   double area;  /* area of the reference surface, mm^2 */
-  float *share; /* [N] fraction a_i of the area that belongs to vertex i */
-  double *gram; /* [G, 3, K, K] Gram matrix of each lung and axis, mm^2 */
-  double *sum;  /* [K, K] sum of all Gram matrices, mm^2 */
+  float *share; /* [N] fraction of the area that belongs to each vertex */
+  double *gram; /* [lungs, 3, modes, modes] Gram matrix of each lung and axis, mm^2 */
+  double *sum;  /* [modes, modes] sum of all Gram matrices, mm^2 */
 };
 
 static const double four_pi = 12.566370614359172954;
@@ -37,7 +37,6 @@ static double twice_area(const supine_basis *basis, const uint32_t *corner) {
   return supine_length(product);
 }
 
-/* Compute the fraction a_i of the area for each vertex i (supine/compare.h). */
 static supine_status share_area(supine_compare *compare, supine_error *error) {
   const supine_basis *basis = compare->basis;
   const size_t n = basis->info.vertex_count;
@@ -148,7 +147,7 @@ double supine_compare_area(const supine_compare *compare) {
   return compare->area;
 }
 
-/* Compute q^T G p for the matrix `gram` G [count, count]. */
+/* Return q^T G p for the matrix G = `gram` [count, count]. */
 static double product(const double *gram, const double *q, const double *p, size_t count) {
   double sum = 0;
   for (size_t k = 0; k < count; ++k) {
@@ -161,8 +160,8 @@ static double product(const double *gram, const double *q, const double *p, size
   return sum;
 }
 
-/* Compute q [G, 3, K], the products of gains and weights of a pose. Unless `from` is NULL, subtract
- * the products of the pose `from`. */
+/* For each lung, axis and mode, write the product of the gain and the weight in a pose to `q`.
+ * Unless `from` is NULL, subtract the product in the pose `from`. */
 static void products_of(const supine_compare *compare, const supine_pose *pose,
                         const supine_pose *from, double *q) {
   for (size_t i = 0; i < 3 * compare->basis->info.lung_count; ++i) {
@@ -209,7 +208,8 @@ static double dot(const double *weights, const float *coefficients, size_t count
   return sum;
 }
 
-/* Compute the length of vertex i's displacement, mm, from the products q [3, K] of its lung. */
+/* Return the length of the displacement of vertex i, mm. `q` points to the products of gain and
+ * weight [3, modes] for one lung (products_of). */
 static double displacement(const supine_basis *basis, const double *q, size_t i) {
   const size_t count = basis->info.mode_count;
   double u[3];

@@ -11,8 +11,8 @@
 
 enum { BEFORE, AFTER, TIMES };
 
-/* A point of the surface. Its level is its coordinate along gravity before the breath, mm, so that
- * lower points have larger levels. */
+/* A point of the surface. `level` is the coordinate of the point along gravity before the breath,
+ * mm. Lower points therefore have larger levels. */
 typedef struct corner {
   double at[TIMES][3]; /* positions before and after the breath, mm */
   double level;
@@ -24,24 +24,24 @@ typedef struct polygon {
   corner corner[6];
 } polygon;
 
-/* Sums over the edges from p to q of the outline of a cut. Edges have the direction that they have
- * in the polygons above the cut. */
+/* Sums over the edges of the outline that a horizontal plane cuts from the surface. Edges have the
+ * direction that they have in the polygons above the plane. */
 typedef struct outline {
   double length;           /* total length of the edges before the breath, mm */
   double middle[TIMES][3]; /* sum of edge midpoints times edge lengths, mm^2 */
-  double area[TIMES][3];   /* sum of the cross products p x q, mm^2 */
+  double area[TIMES][3];   /* sum over the edges of the cross product of start and end, mm^2 */
 } outline;
 
-/* The slabs, and the cuts of one lung between them. */
+/* The slabs, and the outlines of one lung at the planes between the slabs. */
 typedef struct cutter {
   const float *from;                  /* [N, 3] positions before the breath, mm */
   double down[3];                     /* unit vector along gravity */
   size_t count;                       /* number of slabs */
-  double level[SUPINE_SLABS_MAX + 1]; /* tops of the slabs, then bottom of the lowest slab, mm */
+  double level[SUPINE_SLABS_MAX + 1]; /* levels of the slabs' tops and of the lowest bottom, mm */
   outline cut[SUPINE_SLABS_MAX + 1];
 } cutter;
 
-/* Read a vertex. For precision, subtract the position of the first vertex. */
+/* Read a vertex. For precision, positions are relative to the first vertex before the breath. */
 static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   corner out;
   for (size_t i = 0; i < 3; ++i) {
@@ -52,7 +52,8 @@ static corner read_corner(const cutter *c, const float *xyz, size_t vertex) {
   return out;
 }
 
-/* Add the volume of the cone from the origin to a polygon, mL, and its gain, to a slab. */
+/* Add the volume of a cone to the volume of `slab`, mL, and the change of this volume in the breath
+ * to the gain of `slab`. The apex of the cone is the origin, and the polygon is the base. */
 static void add_polygon(const polygon *p, supine_slab *slab) {
   double volume[TIMES] = {0};
   for (size_t i = 1; i + 1 < p->count; ++i) {
@@ -66,7 +67,6 @@ static void add_polygon(const polygon *p, supine_slab *slab) {
   slab->gain += volume[AFTER] - volume[BEFORE];
 }
 
-/* Interpolate the point at a level on the edge from a to b. */
 static corner cross_level(const corner *a, const corner *b, double level) {
   corner out = {.level = level};
   const double share = (level - a->level) / (b->level - a->level);
@@ -90,10 +90,9 @@ static void add_edge(const corner *p, const corner *q, outline *cut) {
   }
 }
 
-/* Split a polygon at a level between its corners, and add the new edge to `cut`.
+/* Split a polygon at a level within its height, and add the new edge to `cut`.
  * @param above, below  written; must not be `p` */
 static void split(const polygon *p, double level, polygon *above, polygon *below, outline *cut) {
-  /* The points where the outline of the polygon crosses the level downwards and upwards. */
   corner end[2] = {{.level = level}, {.level = level}};
   above->count = below->count = 0;
   for (size_t i = 0; i < p->count; ++i) {
@@ -134,7 +133,8 @@ static void add_triangle(cutter *c, const polygon *triangle, supine_slab *slabs)
   add_polygon(&rest, &slabs[last]);
 }
 
-/* Close the slabs above and below a cut by triangles from the mean of its outline to each edge. */
+/* Close the slabs above and below an outline by triangles. Each triangle joins one edge of the
+ * outline to the mean point of the outline. */
 static void close_cut(const outline *cut, supine_slab *above, supine_slab *below) {
   double volume[TIMES]; /* volume between the origin and the closing triangles, mL */
   for (int time = 0; time < TIMES && cut->length > 0; ++time) {

@@ -3,8 +3,8 @@
  * Compact numbers: two or three numbers in a word of 32 bits, or three numbers in two words.
  *
  * To read a number, shift its word left until the number has the uppermost bits, and convert the
- * whole word as a signed integer. The lower bits of this integer come from other numbers, which
- * were packed before. Packing therefore chooses the bits of a number so that the whole word is as
+ * whole word as a signed integer. The lower bits of this integer belong to numbers that were
+ * packed before. Packing therefore chooses the bits of a number so that the whole word is as
  * near as possible to the number. */
 #ifndef SUPINE_COMPACT_H
 #define SUPINE_COMPACT_H
@@ -25,8 +25,8 @@ static inline double nearest_integer(double value) {
   return (value + 0x1.8p52) - 0x1.8p52;
 }
 
-/** Return the word that is nearest to `value` and ends in the lowest `bits` bits of `low`. For NaN,
- * return the smallest such word. */
+/** Among the words that end in the lowest `bits` bits of `low`, return the word that is nearest to
+ * `value` as a signed integer. For NaN, return the smallest of these words. */
 static inline uint32_t word_nearest(double value, uint32_t low, int bits) {
   const double step = (double)(UINT32_C(1) << bits);
   const double top = 0x1p31 / step - 1;
@@ -56,21 +56,21 @@ static inline uint32_t normal_narrow(double first, double second, double third) 
   return word_nearest(first, lower, 19);
 }
 
-/** Return the unit of numbers for normal_narrow, in units of the 16-bit numbers of a file. The
- * largest 16-bit number, 32767, becomes 255 x 2^23, the largest number that 9 bits can hold. */
+/** Return the factor that converts numbers of normal_narrow to the 16-bit numbers of a file. It
+ * takes 255 x 2^23, the largest number that 9 bits can hold, to 32767. */
 static inline double normal_unit(void) {
   return INT16_MAX / (255 * 0x1p23);
 }
 
-/** Unpack number 0, 1 or 2 of a word of normal_narrow. */
+/** Return number 0, 1 or 2 of the three numbers that normal_narrow packed into `word`. */
 static inline float normal_number(uint32_t word, size_t number) {
   return (float)word_integer(word << (number == 0 ? 0 : number == 1 ? 13 : 23));
 }
 
 /** Pack three numbers between -2^31 and 2^31 into two words. The first two numbers get the upper 21
- * bits of a word each, the third number the remaining 22 bits. A number that would become 0 becomes
- * the smallest positive number instead: the kernels multiply by a power of two by adding to the
- * exponent bits of a float (reference_unit), which is wrong for 0. */
+ * bits of a word each, the third number gets the remaining 22 bits. A number that would become 0
+ * becomes the smallest positive number, because the kernels scale floats by adding to the exponent
+ * bits, which changes 0 to another number. */
 static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   uint32_t third = word_nearest(numbers[2], 0, 10);
   third = third == 0 ? UINT32_C(1) << 10 : third;
@@ -81,7 +81,7 @@ static inline void fixed_narrow(const double *numbers, uint32_t *words) {
   }
 }
 
-/** Unpack the three numbers of two words of fixed_narrow. */
+/** Unpack the three numbers that fixed_narrow packed into two words. */
 static inline void fixed_widen(const uint32_t *words, float *numbers) {
   numbers[0] = (float)word_integer(words[0]);
   numbers[1] = (float)word_integer(words[1]);

@@ -3,12 +3,12 @@
  * The loops that evaluate tiles, for vectors of LANES floats. Each kernel_*.c includes this file
  * once, after definitions of
  *
- *     KERNELS          the name of its supine_kernels
+ *     KERNELS          the name of the supine_kernels that this file defines
  *     LANES            4, 8 or 16
  *     FMA(a, b, c)     a * b + c
  *     RSQRT(x)         an estimate of 1 / sqrt(x), accurate to 12 bits at least
  *     STREAM(to, v)    store a vector and bypass the caches
- *     OWN_WRITER       instead of STREAM, if the file defines its own `writer` */
+ *     OWN_WRITER       instead of STREAM, if the including file defines the struct `writer` */
 #include "runtime/kernels/tiles.h"
 #include <string.h>
 
@@ -21,7 +21,7 @@ typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 enum {
   GROUPS = TILE / LANES,         /* number of vectors that hold a `row` */
   PIECES = TILE_NUMBERS / LANES, /* number of vectors that hold `triples` */
-  CHAINS = GROUPS == 1 ? 2 : 1,  /* number of partial sums over the modes; two hide latency */
+  CHAINS = GROUPS == 1 ? 2 : 1,  /* number of partial sums over modes; two hide FMA's latency */
   KNOWN_MODES = 16               /* largest number of modes whose weights stay in registers */
 };
 
@@ -55,7 +55,7 @@ INLINE vf load(const unsigned char *at) {
   return v;
 }
 
-/* Convert signed integers that begin `shift` bits below the top of their words to floats. */
+/* Shift each word left by `shift` bits, and convert the words from signed integers to floats. */
 INLINE vf integers(vu words, int shift) {
   return __builtin_convertvector((vi)(words << shift), vf);
 }
@@ -73,23 +73,23 @@ INLINE vf weight(const weights *w, size_t k, bool known) {
   return known ? w->v[k] : splat(w->at[k]);
 }
 
-/* Constants for which the compiler specialises a loop. Loops with modes > 0 write only
- * positions. */
+/* Constants for which the compiler specialises a loop. A loop for a fixed number of modes writes
+ * only positions, not displacements. */
 typedef struct form {
   supine_storage storage;
-  size_t modes; /* 0 for any number of modes */
+  size_t modes; /* 0 if the number of modes is not fixed */
   bool vector;
 } form;
 
-/* Add w times one mode of 16 vertices: floats or, if `compact`, numbers that begin `shift` bits
- * below the top of their words. */
+/* Add w times the coefficients of one mode to `sum`, for the vertices of a tile. The coefficients
+ * are floats or, if `compact`, words that integers() converts. */
 INLINE void add_mode(row *sum, vf w, const unsigned char *at, int shift, bool compact) {
   for (size_t q = 0; q < GROUPS; ++q, at += sizeof(vf)) {
     sum->v[q] = FMA(w, compact ? integers((vu)load(at), shift) : load(at), sum->v[q]);
   }
 }
 
-/* Sum weight times coefficient over the modes, for each of 16 vertices. */
+/* Return the sum of weight times coefficient over all modes, for each vertex of a tile. */
 INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights *w, form f) {
   const bool compact = supine_tiles_compact(f.storage);
   const bool known = f.modes > 0;
@@ -119,7 +119,7 @@ INLINE row dot(const supine_tiles *tiles, const unsigned char *at, const weights
   return *even;
 }
 
-/* Load 48 coordinates of directions or reference positions. Do not scale compact numbers to mm. */
+/* Load the 48 coordinates of directions or reference positions in their stored unit. */
 INLINE triples numbers(const unsigned char *at, bool compact) {
   triples n;
   for (size_t j = 0; j < PIECES && !compact; ++j) {
@@ -173,7 +173,7 @@ INLINE triples spread(const row *a) {
 }
 
 #ifndef OWN_WRITER
-/* An array that is written in order. If `stream`, its stores bypass the caches. */
+/* An array that is written from beginning to end. If `stream` is true, stores bypass the caches. */
 typedef struct writer {
   float *to;
   bool stream;
@@ -260,7 +260,7 @@ INLINE void deform_kind(const supine_tiles *tiles, const float *folded, size_t f
   }
 }
 
-/* Choose the loop for the storage. The loop for INT16 with any number of modes also evaluates
+/* Call the loop for the storage of the tiles. If `modes` is 0, the loop for INT16 also serves
  * MIXED, because it reads the layout from `tiles`. */
 INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_t first,
                            size_t count, const supine_target *target, size_t modes) {
@@ -276,7 +276,7 @@ INLINE void deform_storage(const supine_tiles *tiles, const float *folded, size_
 static void deform(const supine_tiles *tiles, const float *folded, size_t first, size_t count,
                    const supine_target *target) {
   const bool registers = LANES == 16 && target->add_reference;
-  if (registers && tiles->modes == 4) { /* the default law has 4 modes */
+  if (registers && tiles->modes == 4) { /* a basis has 4 modes by default */
     deform_storage(tiles, folded, first, count, target, 4);
   } else if (registers && tiles->modes == KNOWN_MODES) {
     deform_storage(tiles, folded, first, count, target, KNOWN_MODES);
@@ -285,7 +285,7 @@ static void deform(const supine_tiles *tiles, const float *folded, size_t first,
   }
 }
 
-/* Compute one coordinate of unnormalised normals. Sum the three modes of a word separately. */
+/* Compute one coordinate of the normals of LANES vertices before normalisation. */
 INLINE vf dot_normal(const unsigned char *at, const float *w, size_t words) {
   vf sum[3] = {{0}, {0}, {0}};
   for (size_t j = 0; j < words; ++j, at += 64) {

@@ -5,16 +5,16 @@
 #if defined(__AVX512F__) && defined(__AVX512BW__)
 #include <immintrin.h>
 
-/* An array that is written in order. If `stream`, its stores bypass the caches. Such a store must
- * fill an aligned cache line. In an array that is not aligned, a line consists of the end of one
- * vector and the beginning of the next vector. */
+/* An array that is written from beginning to end. If `stream` is true, stores bypass the caches;
+ * each must then fill an aligned cache line. If the array is not aligned, a line consists of the
+ * end of one vector and the beginning of the next vector. */
 typedef struct writer {
   __m512 last;  /* vector of the last writer_put() */
-  __m512i join; /* permutation that selects a line from `last` and the next vector */
+  __m512i join; /* permutation that selects a cache line from `last` and the next vector */
   float *to;
   size_t offset; /* number of floats from the start of a cache line to `to` */
   bool stream;
-  bool shared; /* the first cache line also holds data that precedes the array */
+  bool shared; /* the next store fills only a part of the first cache line */
 } writer;
 
 static inline __attribute__((always_inline)) writer writer_open(const supine_target *target) {
@@ -42,7 +42,7 @@ static inline __attribute__((always_inline)) void writer_put(writer *w, __m512 n
   w->to += 16;
 }
 
-/* Store the end of the last vector, which fills only part of a line. */
+/* Store the end of the last vector, which fills only part of a cache line. */
 static inline __attribute__((always_inline)) void writer_close(const writer *w) {
   if (w->stream && w->offset != 0) {
     _mm512_mask_storeu_ps(w->to - 16, (__mmask16)(0xFFFFU << (16 - w->offset)), w->last);

@@ -11,9 +11,9 @@
  *
  * Tile t holds vertices 16 t to 16 t + 15; the last tile repeats the last vertex. Directions and
  * reference positions are floats (EXACT), or fixed-point numbers of which three share two words
- * (compact.h). Their unit suits the largest number: within half a metre of the origin, a position
- * errs by at most 0.0005 mm in each coordinate. Once a frame, the weights are multiplied by the
- * units of coefficients and directions. */
+ * (compact.h). The largest number determines their unit: within half a metre of the origin, a
+ * position errs by at most 0.0005 mm in each coordinate. Once a frame, the weights are multiplied
+ * by the units of coefficients and directions. */
 #ifndef SUPINE_TILES_H
 #define SUPINE_TILES_H
 
@@ -33,18 +33,18 @@ typedef struct supine_tiles {
   size_t reference_begin; /**< byte offset of the reference positions in a tile */
   size_t stride;          /**< size of a tile in bytes */
   size_t count;
-  /** Unit of compact reference positions, a power of two, as the exponent bits of a float. */
+  /** Addend to the bits of a float that multiplies the float by the unit of reference positions. */
   uint32_t reference_unit;
   unsigned char *bytes; /**< [count, stride] */
 } supine_tiles;
 
-/** Return whether a storage is compact: two or three coefficients share a word, and directions and
- * positions are fixed-point numbers. */
+/** Return whether a storage is compact. In a compact storage, two or three coefficients share a
+ * word, and directions and positions are fixed-point numbers. */
 static inline bool supine_tiles_compact(supine_storage storage) {
   return storage != SUPINE_STORAGE_EXACT;
 }
 
-/** Return the number of words per vertex that each hold three of the last modes. */
+/** Return the number of words per vertex in which three coefficients share one word. */
 static inline size_t supine_tiles_thirds(supine_storage storage, size_t modes) {
   return storage == SUPINE_STORAGE_MIXED ? modes / 8 : 0;
 }
@@ -88,14 +88,13 @@ static inline void supine_tiles_layout_lit(supine_tiles *tiles, size_t modes, si
   tiles->stride = 3 * tiles->axis_bytes;
 }
 
-/** What to prefetch. */
 typedef enum supine_prefetch {
-  SUPINE_PREFETCH_NONE, /**< nothing, as the tiles are in the cache */
+  SUPINE_PREFETCH_NONE, /**< none, because the tiles are in the cache */
   SUPINE_PREFETCH_NEAR, /**< every other line, 640 bytes ahead, to the second-level cache */
   SUPINE_PREFETCH_FAR,  /**< every line, 8192 bytes ahead, without filling the outer caches */
 } supine_prefetch;
 
-/** Prefetch `stride` bytes, at the distance ahead of `tile` that `how` states. */
+/** Prefetch `stride` bytes at a distance after `tile`. `how` determines the distance. */
 static inline __attribute__((always_inline)) void
 supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch how) {
   enum { PAST_CACHES = 0, SECOND_LEVEL = 2 }; /* locality arguments of __builtin_prefetch */
@@ -110,7 +109,6 @@ supine_prefetch_tile(const unsigned char *tile, size_t stride, supine_prefetch h
   }
 }
 
-/** Where and how a kernel writes. */
 typedef struct supine_target {
   float *xyz;         /**< positions, displacements or normals of all vertices of the tiles */
   bool add_reference; /**< write positions, not displacements */
@@ -119,7 +117,7 @@ typedef struct supine_target {
 } supine_target;
 
 /** Evaluate tiles first <= t < first + count of one lung, and write their vertices to the target.
- * @param weights  [K + 3] weights times units (top of this file), then the gains of the lung
+ * @param weights  [modes + 3] weights times units (top of this file), then the gains of the lung
  * @param count    at least 1 */
 typedef void supine_deform_tiles(const supine_tiles *tiles, const float *weights, size_t first,
                                  size_t count, const supine_target *target);
@@ -138,7 +136,7 @@ static inline void supine_stream_fence(bool stream) {
 typedef struct supine_kernels {
   supine_deform_tiles *deform;
   /** Evaluate unit normals from tiles of supine_tiles_layout_lit. `weights` holds the weights of
-   * the modes, padded with 0 to 3 supine_tiles_normal_words numbers. */
+   * the modes, followed by zeros up to a length of 3 times supine_tiles_normal_words. */
   supine_deform_tiles *light;
 } supine_kernels;
 
@@ -150,7 +148,6 @@ extern const supine_kernels supine_kernels_avx512; /**< members are NULL without
  * Replace AUTO in *simd by the widest set of this processor. */
 const supine_kernels *supine_kernels_choose(supine_simd *simd);
 
-/** Return the fastest way to prefetch on this processor. */
 supine_prefetch supine_kernels_prefetch_choose(void);
 
 #endif

@@ -2,7 +2,7 @@
 // Run the C library as WebAssembly, one instance for each basis. Nothing allocates after a basis is open, so that the
 // memory never grows and the arrays never move.
 
-// Bytes reserved for each C struct, and byte offsets in supine_basis_info, which only grows at its end.
+// Bytes reserved for C structs and buffers, and byte offsets of members of supine_basis_info, which never change.
 const STATE = 128, POSE = 8 * (256 + 3 * 16), VOLUMES = 8 * 16, TEXT = 512, ERROR = 4 + 512;
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array]; // in the order of supine_dtype
@@ -23,7 +23,7 @@ class Basis {
     this.#c = instance.exports;
     this.#c._initialize();
     const size = 2 * (STATE + POSE) + VOLUMES + TEXT + ERROR;
-    this.#state = this.#allocate(size); // the sizes of all parts before the text are multiples of 8, for doubles
+    this.#state = this.#allocate(size); // all sizes before TEXT are multiples of 8, to align doubles
     this.#pose = this.#state + STATE;
     this.#nextState = this.#pose + POSE;
     this.#nextPose = this.#nextState + STATE;
@@ -41,7 +41,7 @@ class Basis {
     this.#normals = this.#allocate(12 * this.vertexCount);
     this.#expected = this.#allocate(4 * this.vertexCount);
 
-    // From here on nothing allocates.
+    // The memory does not grow any more, so that these views stay valid.
     this.positions = this.#view(Float32Array, this.#positions, 3 * this.vertexCount);
     this.normals = this.#view(Float32Array, this.#normals, 3 * this.vertexCount);
     this.vertices = this.tensor('vertices').data;
@@ -63,7 +63,7 @@ class Basis {
   }
 
   tensor(name) {
-    const at = this.#c.supine_basis_tensor(this.#basis, this.#write(name)); // name, dtype, rank, shape[4], data
+    const at = this.#c.supine_basis_tensor(this.#basis, this.#write(name)); // a supine_tensor: name, dtype, rank, shape[4], data
     if (at === 0) return undefined;
     const [, type, rank, a, b, c, d, data] = this.#view(Uint32Array, at, 8);
     const shape = [a, b, c, d].slice(0, rank);
@@ -164,7 +164,7 @@ async function load() {
 export async function open(source, { wasm } = {}) {
   const bytes = ArrayBuffer.isView(source) ? new Uint8Array(source.buffer, source.byteOffset, source.byteLength) : new Uint8Array(source);
   const module = wasm === undefined ? await (beside ??= load()) : wasm instanceof WebAssembly.Module ? wasm : await WebAssembly.compile(wasm);
-  // printf of the C runtime imports functions that write to files: refuse them.
+  // The C library imports functions that write to files, for printf. Refuse every call.
   const none = () => 52; // ENOSYS
   const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: { fd_close: none, fd_seek: none, fd_write: none } });
   return new Basis(instance, bytes);

@@ -36,8 +36,8 @@ class Build(build_py):
 
 
 class Wheel(bdist_wheel):
-    """Build one wheel for every version of Python, as nothing in it is compiled against Python. On Linux, its tag
-    states the oldest glibc that has every symbol that the library needs."""
+    """Build one wheel for every version of Python, as nothing in it is compiled against Python. On Linux, the tag of
+    the wheel states the oldest glibc that has every symbol that the library needs."""
     def get_tag(self):
         platform = super().get_tag()[2]
         with open(os.path.join(self.get_finalized_command("build_py").build_lib, "supine/libsupine_runtime.so"), "rb") as library:

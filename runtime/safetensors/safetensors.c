@@ -46,7 +46,7 @@ uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor
   return sum;
 }
 
-/* Open the bytes of a file. The open file takes ownership of `mapping`; on failure, unmap it. */
+/* Open the bytes of a file. The open file then owns `mapping`. On failure, unmap `mapping`. */
 static supine_status open_bytes(const void *bytes, size_t size, supine_platform_file mapping,
                                 const char *name, supine_safetensors **result,
                                 supine_error *error) {

@@ -21,7 +21,7 @@ struct supine_safetensors {
   supine_platform_file mapping; /**< mapping that contains `bytes`; zero if the caller owns them */
   char *header;                 /**< a copy of the header, in which strings are decoded */
   supine_tensor *tensors;       /**< sorted by the position of their data */
-  void **copies; /**< [tensor_count] aligned copy of each misaligned tensor; else NULL */
+  void **copies;                /**< [tensor_count] aligned copies of misaligned data, or NULL */
   size_t tensor_count;
   supine_metadata *metadata;
   size_t metadata_count;
@@ -34,7 +34,7 @@ const char *supine_safetensors_dtype_name(supine_dtype dtype);
 /** Return the size of one element in bytes. */
 size_t supine_safetensors_dtype_size(supine_dtype dtype);
 
-/** Compute the size of a tensor in bytes; return false if it overflows. */
+/** Compute the size of a tensor in bytes; return false if the size overflows. */
 bool supine_safetensors_tensor_size(const supine_tensor *tensor, size_t *size);
 
 /** Parse and check the header of file->bytes, and point the tensors to their data.

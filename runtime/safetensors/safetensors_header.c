@@ -130,7 +130,8 @@ static char *take_escape(parser *p, char *to) {
 static const char *take_string(parser *p) {
   expect(p, '"');
   char *const begin = p->at;
-  char *to = begin; /* never overtakes p->at, because an escape is longer than its decoded text */
+  /* `to` never overtakes p->at, because an escape is longer than its decoded text */
+  char *to = begin;
   while (p->status == SUPINE_OK && *p->at != '"') {
     const size_t length = supine_utf8_length(p->at, (size_t)(p->end - p->at));
     if (*p->at == '\\') {
@@ -152,7 +153,7 @@ static const char *take_string(parser *p) {
 }
 
 /* Take an array of at most `capacity` integers without sign, fraction, exponent or leading zeros.
- * Return how many there are. Refuse ULLONG_MAX, which strtoull also returns after an overflow. */
+ * Return the number of integers. Refuse ULLONG_MAX, the result of strtoull after an overflow. */
 static size_t take_counts(parser *p, size_t *values, size_t capacity) {
   size_t count = 0;
   expect(p, '[');
@@ -210,7 +211,7 @@ static supine_dtype take_dtype(parser *p, const char *tensor) {
 }
 
 /* Parse a tensor such as {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}, with members
- * in any order. Its member `data` holds the first offset until place_tensors() is called. */
+ * in any order. Until place_tensors() is called, supine_tensor.data holds the first offset. */
 static void parse_tensor(parser *p, const char *name) {
   static const char *const members[] = {"dtype", "shape", "data_offsets"};
   supine_safetensors *file = p->file;
@@ -297,7 +298,8 @@ static int compare_places(const void *left, const void *right) {
   return (places[0][key] > places[1][key]) - (places[0][key] < places[1][key]);
 }
 
-/* Check that the tensors fill the data exactly. Point each to its data or to an aligned copy. */
+/* Check that the tensors fill the data of the file without gaps or overlaps. Point each tensor to
+ * its data or to an aligned copy of its data. */
 static supine_status place_tensors(parser *p, size_t data_begin) {
   supine_safetensors *file = p->file;
   const size_t data_size = file->size - data_begin;

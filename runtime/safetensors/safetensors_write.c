@@ -8,7 +8,6 @@
 #include "runtime/safetensors/safetensors_file.h"
 #include "sh/base/utf8.h"
 
-/* The content of a file to write. */
 typedef struct content {
   const supine_tensor *tensors;
   size_t tensor_count;

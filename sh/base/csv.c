@@ -53,9 +53,9 @@ static char *csv_line(supine_csv *csv, supine_status *status, supine_error *erro
   }
 }
 
-/* Return the field at *rest, ended by a NUL, and move *rest to the next field; NULL after the last
- * field. A quoted field may contain the separator; "" in it is one quote. Return NULL if a quote is
- * not closed. */
+/* Return the field at *rest, ended by a NUL. Move *rest to the next field, or set it to NULL after
+ * the last field. A quoted field may contain the separator, and "" in it is one quote. Return NULL
+ * if a quote is not closed. */
 static char *csv_field(char **rest, char separator) {
   char *field = *rest + strspn(*rest, " ");
   char *end = field;
@@ -104,7 +104,6 @@ static supine_status csv_split(supine_csv *csv, char *text, supine_error *error)
   return SUPINE_OK;
 }
 
-/* Find the index of the field for each expected column. */
 static supine_status csv_header(supine_csv *csv, const char *const *names, size_t count,
                                 size_t required, supine_error *error) {
   for (size_t c = 0; c < SUPINE_CSV_FIELDS_MAX; ++c) {

@@ -22,12 +22,12 @@ size_t supine_sh_index(size_t l, int m) {
   return (size_t)((ptrdiff_t)(l * l + l) + m);
 }
 
-/* Evaluate Y(l, m) and Y(l, -m) for l = m to band. `top` is q(m, m); `re` and `im` are the real and
- * the imaginary part of (x + i y)^m. */
+/* Compute Y(l, m) and Y(l, -m) for l = m to band. `top` is q(m, m) of the recurrence above, `re`
+ * and `im` are the real and the imaginary part of (x + i y)^m. */
 static void evaluate_order(size_t band, size_t m, double z, double top, double re, double im,
                            double *y) {
-  double before = 0; /* q(l - 2, m) / a(l - 1, m) */
-  double q = top;    /* q(l - 1, m), then q(l, m) */
+  double before = 0; /* second term in the parentheses of the recurrence above */
+  double q = top;
   for (size_t l = m;; ++l) {
     double *centre = y + l * l + l;
     centre[-(ptrdiff_t)m] = q * im;
@@ -53,7 +53,8 @@ supine_status supine_sh_evaluate(size_t band, const double direction[3], double 
   double re = 1;
   double im = 0;
   evaluate_order(band, 0, unit[2], top, re, im, y);
-  top *= 1.41421356237309504880; /* sqrt(2), for cos and sin in place of exp(+-i m phi) */
+  /* sqrt(2), because real harmonics have cos and sin instead of exp(i m phi) */
+  top *= 1.41421356237309504880;
   for (size_t m = 1; m <= band; ++m) {
     const double turned = re * unit[0] - im * unit[1];
     im = re * unit[1] + im * unit[0];

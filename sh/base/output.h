@@ -2,8 +2,8 @@
 /** @file Write output files whole or not at all.
  *
  * A file is written in its folder without a name (O_TMPFILE), so that it vanishes if the program
- * ends early; if the file system does not support that, it is written under a temporary name. It
- * gets its own name when it is complete and on the disk. */
+ * ends early; if the file system does not support that, it is written under a temporary name. The
+ * file gets its final name when it is complete and on the disk. */
 #ifndef SUPINE_OUTPUT_H
 #define SUPINE_OUTPUT_H
 

@@ -8,7 +8,7 @@
 
 #include <supine/status.h>
 
-/** Append to `text` [size] by a printf format. Longer text is cut off. */
+/** Append text by a printf format to `text`, which has `size` bytes. Cut off what does not fit. */
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 

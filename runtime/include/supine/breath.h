@@ -52,7 +52,7 @@ extern "C" {
 
 enum {
   SUPINE_PV_CONTROLS = 5,
-  SUPINE_PV_CONTROL_MAX = 50 /**< largest |c_i|, more than any lung needs */
+  SUPINE_PV_CONTROL_MAX = 50 /**< largest magnitude of a control parameter */
 };
 
 typedef enum supine_pv_limb {
@@ -79,21 +79,23 @@ SUPINE_API const char *supine_breath_limb_name(supine_pv_limb limb);
 /** Return the P-V loop of a normal adult lung, for use if no loop was measured. Both limbs run from
  * 0 mL at 0 cmH2O to 6000 mL, an adult's total lung capacity, at 30 cmH2O.
  *
- * The exhale limb is the exponential of [Salazar1964] with k = ln 2 / 7.58 cmH2O, where 7.58 cmH2O
- * is the mean half-inflation pressure of 20 normal subjects. The inhale limb is the sigmoid of
- * [Venegas1998] with c = 10 and d = 6 cmH2O, and stays below the exhale limb. Its product b d,
- * 44,600 mL cmH2O, lies between the 10^4 and 10^5 that Narusawa (J. Appl. Physiol. 91, 2001,
- * 201-210) found in published curves. c and d are round numbers, not means of measured lungs. */
+ * The exhale limb is the exponential 1 - exp(-k P) of [Salazar1964], scaled to this range, with
+ * k = ln 2 / (7.58 cmH2O); 7.58 cmH2O is the mean half-inflation pressure of 20 normal subjects.
+ * The inhale limb is the sigmoid a + b / (1 + exp(-(P - c) / d)) of [Venegas1998] with c = 10 cmH2O
+ * and d = 6 cmH2O, and stays below the exhale limb. The product b d is 44,600 mL cmH2O; Narusawa
+ * (J. Appl. Physiol. 91, 2001, 201-210) found 10^4 to 10^5 in published curves. c and d are round
+ * numbers, not means of measured lungs. */
 SUPINE_API const supine_pv *supine_breath_normal(void);
 
-/** Check that the numbers of a limb are finite, that P_low < P_high and V_low < V_high, and that
- * |c_i| <= SUPINE_PV_CONTROL_MAX.
+/** Check that the numbers of a limb are finite, that its pressures and its volumes rise from the
+ * lower to the upper end, and that no control parameter exceeds SUPINE_PV_CONTROL_MAX in magnitude.
  * @retval SUPINE_ERROR_ARGUMENT  a check failed */
 SUPINE_API supine_status supine_breath_curve_check(const supine_pv_curve *curve,
                                                    supine_error *error);
 
-/** Compute the volume V(P) and the compliance dV/dP of a limb. The solution of the limb's equation
- * is
+/** Compute the volume V(P) and the compliance dV/dP of a limb at pressures P. With the normalised
+ * pressure x, the control parameters c_1 to c_5 and the Legendre polynomials L_n of the top of this
+ * file, the volume is
  *
  *     V(x) = V_low + (V_high - V_low) I(x) / I(1)        I(x) = integral from -1 to x of exp(U)
  *     U(x) = integral from -1 to x of u
@@ -110,11 +112,11 @@ SUPINE_API supine_status supine_breath_curve_evaluate(const supine_pv_curve *cur
                                                       const double *pressures, double *volumes,
                                                       double *compliances, supine_error *error);
 
-/** How pressure or volume changes in each half of a breath, between rest and the peak. */
+/** How the pressure or the volume changes with time during inhalation and during exhalation. */
 typedef enum supine_pv_course {
   SUPINE_PV_COSINE = 0,    /**< pressure follows half a cosine, as in quiet breathing */
   SUPINE_PV_RAMP,          /**< pressure is linear in time, like the ramp of a ventilator */
-  SUPINE_PV_CONSTANT_FLOW, /**< volume is linear in time, as in [Santhanam2008] V */
+  SUPINE_PV_CONSTANT_FLOW, /**< volume is linear in time, as in section V of [Santhanam2008] */
   SUPINE_PV_COURSE_COUNT
 } supine_pv_course;
 
@@ -140,7 +142,8 @@ SUPINE_API supine_pv_breath supine_breath_default(void);
  *
  *     V(t) = tidal (V_limb(P(t)) - V_limb(P_rest)) / (V_limb(P_peak) - V_limb(P_rest))
  *
- * V is 0 at rest and the tidal volume at the peak, to rounding.
+ * V_limb is the volume of the limb at a pressure. V is 0 at rest and the tidal volume at the peak,
+ * to rounding.
  * @param pv         P-V loop; may be NULL for constant flow if `pressures` is NULL
  * @param times      [count] s, finite
  * @param volumes    [count] mL above rest, written; may be NULL

@@ -16,19 +16,20 @@
 extern "C" {
 #endif
 
-/** Areas and Gram matrices of a basis, which never change. Any number of threads may share them. */
+/** Constants of one basis for comparing poses. Any number of threads may share them. */
 typedef struct supine_compare supine_compare;
 
-/** Compute the Gram matrix G_j [K, K] of each lung and each axis j:
+/** Compute the weight a_i of each vertex i, and the Gram matrix G_j of each lung and each axis j:
  *
  *     G_j[k, l] = sum over the vertices i of the lung of a_i d_ij^2 c_ik c_il
  *
- * For a vector field, the terms are a_i c_ijk c_ijl. supine/runtime.h explains K, N, c and d.
+ * c_ik is the coefficient of mode k at vertex i, and d_ij is coordinate j of the direction of this
+ * vertex. A vector field has the coefficients c_ijk in place of d_ij c_ik.
  * @param basis    must outlive the comparison
  * @param compare  written; free it with supine_compare_destroy
  * @retval SUPINE_ERROR_MESH    the area of the surface is 0 or not finite
  * @retval SUPINE_ERROR_MEMORY  an allocation failed
- * Cost: 3 N K^2 / 2 multiplications, in one pass over the vertices. */
+ * Cost: 3 N K^2 / 2 multiplications for N vertices and K modes, in one pass over the vertices. */
 SUPINE_API supine_status supine_compare_create(const supine_basis *basis, supine_compare **compare,
                                                supine_error *error);
 /** Free a comparison; NULL is legal. */
@@ -41,16 +42,17 @@ SUPINE_API double supine_compare_area(const supine_compare *compare);
  *
  *     D^2 = sum over all lungs and axes of q^T G q,     q = A w - A' w'
  *
- * `pose` has the gains A and weights w, and `from` has A' and w'.
+ * G is the Gram matrix of a lung and an axis. A is the gain of `pose` for this lung and axis, and w
+ * are the weights of `pose`. A' and w' are the gain and the weights of `from`.
  * @param from  NULL for the reference surface
- * Cost: 3 K^2 multiplications for each lung, without a pass over the vertices. */
+ * Cost: 3 K^2 multiplications for each lung and K modes, without a pass over the vertices. */
 SUPINE_API double supine_compare_rms(const supine_compare *compare, const supine_pose *pose,
                                      const supine_pose *from);
 
-/** Compute the distance of every vertex between two poses.
+/** Compute the distance between the positions of every vertex in two poses.
  * @param from      NULL for the reference surface
  * @param distance  [N] mm, written
- * Cost: one pass over the vertices, with 3 K + 6 multiplications per vertex. */
+ * Cost: one pass over the vertices, with 3 K + 6 multiplications per vertex for K modes. */
 SUPINE_API void supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
                                          const supine_pose *from, float *distance);
 
@@ -68,14 +70,14 @@ typedef struct supine_distance_statistics {
 SUPINE_API void supine_compare_statistics(const supine_compare *compare, const float *distance,
                                           supine_distance_statistics *statistics);
 
-/** Compute the energy of each band l of harmonics. It is the band's part of the squared
+/** Compute the energy of each band l of harmonics. It is the part of band l in the squared
  * displacement at gain 1, averaged over the area and over all directions of gravity:
  *
  *     energy[l] = 1 / (4 pi) * sum over m of  M_lm^T G M_lm
  *
  * M_lm is the column of supine_basis_info.modes for Y_lm, and G is the sum of all Gram matrices.
  * Reversed gravity reverses the displacements of odd bands, but not those of even bands.
- * @param energy  [L + 1] mm^2, written */
+ * @param energy  [supine_basis_info.band + 1] mm^2, written */
 SUPINE_API void supine_compare_energy(const supine_compare *compare, double *energy);
 
 /** The part of one lung between two heights. */
@@ -86,23 +88,22 @@ typedef struct supine_slab {
 
 enum { SUPINE_SLABS_MAX = 64 };
 
-/** Compute ventilation by height. Horizontal planes cut the lungs before a breath into slabs of
- * equal thickness, from the highest to the lowest point of all lungs. The gain of a slab is the
- * volume that the breath adds to its tissue:
+/** Compute the ventilation of the lungs by height. Horizontal planes cut the lungs before a breath
+ * into slabs of equal thickness, from the highest to the lowest point of all lungs. The gain of a
+ * slab is the volume that the breath adds to the tissue of the slab:
  *
  *     gain = volume after the breath - volume before the breath
  *
- * A slab is bounded by its part of the surface and by its cuts along two planes. The parts of the
- * surface are exact, so that the gains of a lung's slabs sum to the gain of the lung. A cut has no
- * vertices inside the lung. Both before and after the breath, it consists of triangles from the
- * mean of its outline to each edge of the outline. The gains are exact if displacements are linear
- * in position: they are 0 for a rotation, and gain / volume is the same in all slabs for a uniform
- * expansion.
+ * A slab is bounded by a part of the lung's surface and by cuts along two planes. The basis has no
+ * vertices inside the lung. Both before and after the breath, each cut therefore consists of
+ * triangles, from the mean point of the outline of the cut to each edge of this outline. The gains
+ * of a lung's slabs sum to the gain of the lung. They are exact if displacements are linear in
+ * position: 0 for a rotation, and a constant gain / volume for a uniform expansion.
  * @param gravity  [3], any length but 0
  * @param from     [N, 3] positions before the breath, mm; NULL for the reference surface
  * @param xyz      [N, 3] positions after the breath (supine_deform), mm
  * @param count    number of slabs, 1 to SUPINE_SLABS_MAX
- * @param slabs    [G, count], uppermost first, written
+ * @param slabs    [number of lungs, count], uppermost first, written
  * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, or the count is out of range
  * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes
  * Cost: one pass over the triangles for each lung. */

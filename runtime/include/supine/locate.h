@@ -8,10 +8,10 @@
  *
  * where u_i is the displacement of the vertex from another state, x_i its position, V the volume of
  * all lungs, and V_full the volume of the reference surface. The second term applies only if the
- * volume of a state counts from rest and the volume at rest was assumed. The constant c is 4.5 mm
- * (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one posture; for a change of
- * posture it is an extrapolation. Half of all points lie within 0.9 sigma of the truth, 95 % within
- * 1.8 sigma.
+ * volume of a state is given relative to rest and the volume at rest was assumed. The constant c
+ * is 4.5 mm (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one posture; for a
+ * change of posture it is an extrapolation. Half of all points lie within 0.9 sigma of the truth,
+ * 95 % within 1.8 sigma.
  *
  * Observed points correct the positions by kriging, and reduce the expected errors near the points.
  * If there are at least three points and no rotation is fitted, the sigma above is an upper bound
@@ -31,13 +31,14 @@
 extern "C" {
 #endif
 
-/** The constant c for files without metadata "expected_error_mm", mm. */
+/** Default of the constant c in the expected error (top of this file), mm. */
 #define SUPINE_EXPECTED_ERROR_MM 4.5
 
 /** Compute the expected error of every vertex in a state, if the positions in state `from` are
  * exact.
  *
- * Metadata "expected_error_mm" of the file replaces c. The volume at rest counts as measured if the
+ * The constant c (top of this file) is the metadata "expected_error_mm" of the file or, if the file
+ * lacks it, SUPINE_EXPECTED_ERROR_MM. The volume at rest counts as measured if the
  * file has metadata "resting_known" or was scanned at rest.
  * @param from   NULL for the state of the scan
  * @param sigma  [N] mm, written
@@ -50,11 +51,12 @@ SUPINE_API supine_status supine_expected_error(const supine_basis *basis, const 
 
 enum { SUPINE_LOCATE_POINTS_MAX = 300 };
 
-/** One observed point: a vertex of a basis, usually one that 'supine embed' made. */
+/** One observed point, a vertex of a basis. The frame of all observed positions may be translated
+ * from the frame of the basis and, if supine_locate_task.rigid is true, rotated. */
 typedef struct supine_observation {
   size_t vertex;      /**< vertex of the basis supine_locate_task.inside */
-  double position[3]; /**< mm; the frame may be translated and, if the task is rigid, rotated */
-  double noise;       /**< standard deviation on each axis, mm, above 0; give 2 if it is unknown */
+  double position[3]; /**< observed position, mm */
+  double noise; /**< standard deviation of `position` on each axis, mm, above 0; 2 if unknown */
 } supine_observation;
 
 /** The input of supine_locate. */
@@ -62,7 +64,7 @@ typedef struct supine_locate_task {
   const supine_basis *inside; /**< basis whose vertices were observed */
   size_t count; /**< number of points, 1 to SUPINE_LOCATE_POINTS_MAX; at least 3 if `rigid` */
   const supine_observation *observed; /**< [count] */
-  supine_state state; /**< posture and volume; the volume is found if it is SUPINE_VOLUME_DEFAULT */
+  supine_state state; /**< posture and volume; SUPINE_VOLUME_DEFAULT if the volume is unknown */
   bool rigid;         /**< find a rotation in addition to the translation */
 } supine_locate_task;
 
@@ -72,19 +74,19 @@ typedef struct supine_location {
   double volume;      /**< volume of all lungs, gas and tissue, mL; 0 if the basis has no volumes */
   double volume_error;       /**< standard deviation of `volume`, mL; 0 if the volume was given */
   double volume_prior_error; /**< prior standard deviation of the volume, mL; 0 if it was given */
-  double rotation[9];    /**< R, by rows: observed position = R (law's position + correction) + t */
-  double translation[3]; /**< translation t in the equation of `rotation`, mm */
-  double residual_rms;   /**< RMS of residuals[].distance of points that are not outliers, mm */
-  double log_evidence;   /**< log likelihood, for comparing tasks that differ only in the posture */
-  size_t outlier_count;  /**< number of points that were left out as outliers */
-  const void *fit;       /**< result of kriging, in the `space` given to supine_locate */
+  double rotation[9];        /**< R, by rows: observed = R (predicted + correction) + translation */
+  double translation[3];     /**< translation in the equation of `rotation`, mm */
+  double residual_rms;  /**< RMS distance of all points but outliers from their predictions, mm */
+  double log_evidence;  /**< log likelihood, for comparing tasks that differ only in the posture */
+  size_t outlier_count; /**< number of points that were left out as outliers */
+  const void *fit; /**< data for supine_locate_positions, in the `space` given to supine_locate */
 } supine_location;
 
 /** Comparison of an observed point with its prediction by all other points. */
 typedef struct supine_locate_residual {
   double distance; /**< distance from the prediction, mm; 0 if there is no prediction */
   double sigma;    /**< expected 3-D standard deviation of `distance`, mm */
-  bool outlier;    /**< the point was left out, as it does not fit */
+  bool outlier;    /**< the point was left out because it is too far from the prediction */
 } supine_locate_residual;
 
 /** Return the number of doubles that supine_locate needs for `count` points. */
@@ -92,10 +94,11 @@ SUPINE_API size_t supine_locate_space(size_t count);
 
 /** Find the state, the rigid motion and the correction from observed points.
  *
- * An unknown volume has a prior with the mean at rest (in the scan if the basis has no rest) and a
- * standard deviation of 0.17 of the reference volume. Points farther than 3 sigma from their
- * prediction by all other points are outliers. They are left out, the worst first, as long as at
- * least four fifths of the points remain.
+ * An unknown volume has a prior. The mean of the prior is the volume at rest or, if the basis has
+ * none, the volume in the scan. The standard deviation is 0.17 of the volume of the reference
+ * surface. Points whose distance from the prediction by all other points exceeds 3
+ * times its standard deviation are outliers. They
+ * are left out, the worst first, as long as at least four fifths of the points remain.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)]; keep it as long as `found` is used
  * @param found      written

@@ -30,16 +30,16 @@ SUPINE_API supine_status supine_posture_gravity(const char *name, double gravity
 /** Return the number of names that supine_posture_gravity knows. */
 SUPINE_API size_t supine_posture_count(void);
 
-/** Return the posture name with an index, or NULL if there is none. Only names of DICOM have
- * capitals. */
+/** Return the name at `index` among those that supine_posture_gravity knows, or NULL if `index` is
+ * too large. Only DICOM's names are in capitals. */
 SUPINE_API const char *supine_posture_name(size_t index);
 
 /** Return the posture name most similar to `name`, for a suggestion; never NULL. The most similar
  * name needs the fewest insertions, deletions and replacements of characters. */
 SUPINE_API const char *supine_posture_nearest(const char *name);
 
-/** Compute gravity in a body that is rotated by R from body axes to world axes, v_world = R v_body.
- * The world's z axis points up:
+/** Compute gravity in body axes for a body with the orientation R, a rotation that takes a vector
+ * from body axes to world axes: v_world = R v_body. The world's z axis points up:
  *
  *     gravity = R^T (0, 0, -1)
  *

@@ -5,15 +5,14 @@
  *     x_ij   = p_ij + A_j (sum over k of w_k(g) c_ik) d_ij
  *     w_k(g) = sum over l, m of modes[k, lm] Y_lm(g)
  *
- * x_ij is coordinate j (x, y, z) of vertex i in mm, p_ij its reference position, d_ij its direction
- * and c_ik its coefficient of mode k. A vector field has c_ijk in place of c_ik d_ij. The weights
- * w_k depend on gravity g, and the gains A_j of each lung on its volume. A program parses or fills
- * in a supine_state (posture and volume), calls supine_basis_pose for the weights and gains, and
- * then supine_deform for the positions.
+ * x_ij is coordinate j (x, y, z) of vertex i in mm. p_ij is the reference position of this vertex,
+ * d_ij its direction, and c_ik its coefficient of mode k. A vector field has c_ijk in place of
+ * c_ik d_ij. The weights w_k depend on gravity g by the spherical harmonics Y_lm (supine/sh.h), and
+ * the gains A_j of each lung on the volume of this lung. A program parses or fills in a
+ * supine_state (posture and volume), calls supine_basis_pose for the weights and gains, and then
+ * supine_deform for the positions.
  *
- * In the shapes of arrays, N is the number of vertices, M the number of triangles, G the number of
- * lungs, K the number of modes, Q the number of modes of the normals, and L the highest band of the
- * harmonics.
+ * In the shapes of arrays, N is the number of vertices, and M the number of triangles.
  *
  * After opening, no function allocates, reads files or locks; any number of threads may use one
  * basis. Gravity is a direction in body axes (DICOM LPS) that points where things fall: supine
@@ -49,11 +48,11 @@ typedef enum supine_storage {
   SUPINE_STORAGE_AUTO = 0, /**< the smallest storage with an error of at most 0.005 mm */
   SUPINE_STORAGE_EXACT,    /**< float32, as in the file */
   SUPINE_STORAGE_INT16,    /**< coefficients of 16 bits, coordinates of 21 or 22 bits */
-  SUPINE_STORAGE_MIXED,    /**< like INT16, but the last 3 floor(K / 8) modes have 10 or 11 bits */
+  SUPINE_STORAGE_MIXED,    /**< like INT16, but only 10 or 11 bits for the last modes */
   SUPINE_STORAGE_COUNT
 } supine_storage;
 
-/** The instruction set. Positions from different sets differ by at most twice
+/** The instruction set of the evaluation. Positions from different sets differ by at most twice
  * supine_basis_error. */
 typedef enum supine_simd {
   SUPINE_SIMD_AUTO = 0, /**< the widest instruction set that this processor has */
@@ -68,56 +67,57 @@ typedef struct supine_basis_options {
   size_t size; /**< sizeof(supine_basis_options) */
   supine_storage storage;
   supine_simd simd;
-  bool without_normals; /**< do not load normals, which saves 4 Q bytes per vertex */
+  bool without_normals; /**< do not load normals, which saves memory */
 } supine_basis_options;
 
 /** The content of an open basis. The basis owns the struct and all arrays. */
 typedef struct supine_basis_info {
   size_t vertex_count;
   size_t triangle_count;
-  size_t mode_count;        /**< number K of modes */
-  size_t band;              /**< highest band L of the harmonics */
-  size_t lung_count;        /**< number G of lungs */
-  const size_t *lung_begin; /**< [G + 1] index of the first vertex of each lung; N at the end */
-  bool vector;     /**< each vertex has 3 coefficients per mode, instead of 1 and a direction */
+  size_t mode_count;
+  size_t band; /**< highest band of the spherical harmonics */
+  size_t lung_count;
+  const size_t *lung_begin; /**< [lung_count + 1] first vertex of each lung, then vertex_count */
+  bool vector;     /**< vector field: each vertex has 3 coefficients per mode, and no direction */
   bool has_volume; /**< the surface is closed, so that lungs have volumes */
   supine_storage storage;  /**< the storage in use, never AUTO */
   supine_simd simd;        /**< the instruction set in use, never AUTO */
   double bytes_per_vertex; /**< bytes that an evaluation reads for each vertex */
-  /** Bound on the error of storage and rounding, mm: the largest supine_basis_error of 26 poses,
-   * with gravity towards the faces, edges and corners of a cube. The poses have 500 mL more than
-   * the reference surface or, on an open surface, a largest displacement of 20 mm. */
+  /** Largest supine_basis_error of 26 poses, mm. The directions of gravity of these poses point to
+   * the faces, edges and corners of a cube. In each pose, the lungs have 500 mL more than the
+   * reference surface or, if the surface is open, the largest displacement is 20 mm. */
   double storage_error;
-  const char *const *lung_names; /**< [G] such as "left"; lungs without a name are "0", "1", ... */
-  const float *bounds;           /**< [G, 2, 3] lowest and highest corner of each lung's box, mm */
-  const float *vertices;         /**< [N, 3] reference positions p, mm, LPS */
-  const uint32_t *triangles;     /**< [M, 3] vertices of each triangle */
-  const float *direction;        /**< [N, 3] directions d, mm; NULL if `vector` */
-  const float *coefficients;     /**< [N, K] coefficients c; [N, 3, K], mm, if `vector` */
-  const double *modes; /**< [K, (L + 1)^2] coefficients of the weights in spherical harmonics */
-  const double *volume_linear;    /**< [G, A, K] linear volume forms, mL; NULL without volumes */
-  const double *volume_quadratic; /**< [G, A, K, K] quadratic volume forms, mL; or NULL */
-  const double *volume_cubic;     /**< [G, K, K, K] cubic volume forms, mL; or NULL */
+  const char *const *lung_names; /**< [lung_count] such as "left"; the index if there is no name */
+  const float *bounds;   /**< [lung_count, 2, 3] lowest and highest corner of each lung's box, mm */
+  const float *vertices; /**< [vertex_count, 3] reference positions, mm, LPS */
+  const uint32_t *triangles; /**< [triangle_count, 3] vertices of each triangle */
+  const float *direction;    /**< [vertex_count, 3] directions, mm; NULL if `vector` */
+  /** [vertex_count, mode_count] coefficients; [vertex_count, 3, mode_count], mm, if `vector` */
+  const float *coefficients;
+  const double *modes; /**< [mode_count, (band + 1)^2] harmonic coefficients of the weights */
+  /** Arrays L, Q and T of supine_volume_contract for each lung, mL. The first axis is the lung, the
+   * others are those of supine_volume_contract. NULL if the surface is open. */
+  const double *volume_linear, *volume_quadratic, *volume_cubic;
   /** The memory that an evaluation reads, in tiles of 16 vertices. Use it only to measure memory
    * traffic, as the layout changes between versions. */
   const void *packed;
-  size_t normal_count;    /**< number Q of modes of the normals; 0 without normals */
-  const int16_t *normals; /**< [N, 3, Q] modes of the normals (supine_deform_lit) */
-  /** The matrix V of supine_basis_normal_weights: [G, Q, 3, 1 + 2 K + K (K + 1) / 2], or [G, Q,
-   * (K + 1) (K + 2) / 2] in files of versions 1 and 2. */
+  size_t normal_count;    /**< number of modes of the normals; 0 without normals */
+  const int16_t *normals; /**< [vertex_count, 3, normal_count] modes of the normals */
+  /** Coefficients V of supine_basis_normal_weights. With K = mode_count, the shape is [lung_count,
+   * normal_count, 3, 1 + 2 K + K (K + 1) / 2], or [lung_count, normal_count, (K + 1) (K + 2) / 2]
+   * in files of versions 1 and 2. */
   const double *normal_weights;
-  const double
-      *reference_volume; /**< [G] volume of each lung at gain 0, mL; 0 if the surface is open */
-  bool has_rest;         /**< the file has the volume at rest for every posture */
-  bool has_full;         /**< the reference surface is at full inflation */
+  const double *reference_volume; /**< [lung_count] volume at gain 0, mL; 0 for open surfaces */
+  bool has_rest;                  /**< the file has the volume at rest for every posture */
+  bool has_full;                  /**< the reference surface is at full inflation */
   bool is_fields; /**< the file was made from another simulator's fields; gain 1 reproduces them */
-  size_t volume_axes; /**< number A of gains of a lung: 3, or 1 in files of versions 1 and 2 */
-  double bend[3];     /**< bend of the path of gains on each axis (supine_volume_bend) */
+  size_t volume_axes; /**< number of gains of a lung: 3, or 1 in files of versions 1 and 2 */
+  double bend[3];     /**< parameter `bend` of supine_volume_bend */
 } supine_basis_info;
 
 typedef struct supine_pose {
-  double weights[SUPINE_MODES_MAX];  /**< weight w_k of each mode */
-  double gains[SUPINE_LUNGS_MAX][3]; /**< gains A_j of each lung; 0 for the reference surface */
+  double weights[SUPINE_MODES_MAX];  /**< weight of each mode */
+  double gains[SUPINE_LUNGS_MAX][3]; /**< gain of each lung and axis; 0 in the reference surface */
 } supine_pose;
 
 /** Open a basis from a file, or from `size` bytes in memory. Check all of it, and pack it for
@@ -162,9 +162,9 @@ SUPINE_API const uint32_t *supine_basis_triangles(const supine_basis *basis);
 
 /** Compute the weights of the modes for a direction of gravity.
  * @param gravity  [3], any length but 0
- * @param weights  [K] w, written
+ * @param weights  [mode_count] written
  * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite
- * Cost: K (L + 1)^2 multiplications, once a frame. */
+ * Cost: mode_count (band + 1)^2 multiplications, once a frame. */
 SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const double gravity[3],
                                               double *weights);
 
@@ -181,13 +181,13 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * simulator's fields, and 500 mL above the scan for any other basis.
  * @param state  its gravity has any length but 0
  * @param pose   written
- * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis lacks the volume that
- *                                    the state counts from, or the state does not name every lung
- *                                    of the basis once
+ * @retval SUPINE_ERROR_ARGUMENT      gravity is zero or not finite, the basis lacks the reference
+ *                                    of the volume, or named lungs are not those of the basis
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface is open and has no volumes
  * @retval SUPINE_ERROR_NUMERICAL     the surface folds before it holds that volume; single
  *                                    triangles that turn over earlier are not detected
- * Cost: K (L + 1)^2 multiplications for the weights and G K^3 for the gains, once a frame.
+ * Cost: mode_count (band + 1)^2 multiplications for the weights and mode_count^3 for the gains of
+ * each lung, once a frame.
  *
  * [MilicEmili1966]  Milic-Emili, Henderson, Dolovich, Trop, Kaneko, J. Appl. Physiol. 21, 1966,
  *                   749-759 */
@@ -199,11 +199,11 @@ SUPINE_API supine_status supine_basis_pose(const supine_basis *basis, const supi
 SUPINE_API supine_status supine_basis_gains(const supine_basis *basis, const supine_state *state,
                                             supine_pose *pose, supine_error *error);
 
-/** Return the volume that SUPINE_VOLUME_DEFAULT means for this basis (supine_basis_pose). If it
- * means gain 1, return SUPINE_VOLUME_DEFAULT. */
+/** Return the volume that replaces SUPINE_VOLUME_DEFAULT in a state (supine_basis_pose). If gain 1
+ * replaces it, return SUPINE_VOLUME_DEFAULT. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
-/** Set every gain of a pose to one number, regardless of volumes, for open surfaces and fields. */
+/** Set all gains of a pose to `gain`, for open surfaces or another simulator's fields. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
 /** Return the state of the scan. Its volume is SUPINE_VOLUME_SCAN. */
@@ -211,7 +211,7 @@ SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
 /** Compute the volume of each lung in a pose. The basis must have volumes
  * (supine_basis_info.has_volume).
- * @param volumes  [G] gas and tissue, mL, written */
+ * @param volumes  [lung_count] volumes of gas and tissue, mL, written */
 SUPINE_API void supine_basis_volumes(const supine_basis *basis, const supine_pose *pose,
                                      double *volumes);
 
@@ -221,15 +221,15 @@ SUPINE_API double supine_basis_error(const supine_basis *basis, const supine_pos
 
 /** Compute the deformed position of every vertex, in the caller's thread.
  *
- *     x_ij = p_ij + A_j (w . c_i) d_ij        A: the gains of the lung of vertex i
+ *     x_ij = p_ij + A_j (w . c_i) d_ij
  *
- * In this and all functions below for positions and displacements, each rigid part moves by the
- * rigid motion that fits these positions best. Rigid parts are ranges of vertices in the tensor
- * "rigid", U32 [R, 2].
+ * p are the reference positions, A the gains, w the weights, c the coefficients, d the directions.
+ * Each row of the optional tensor "rigid" is the range of vertices of a rigid part. In this and all
+ * following functions, such a part moves by the rigid motion that fits the positions x_ij best.
  * @param xyz  [N, 3] mm, LPS, written; aligned like a float
- * Cost per vertex: K + 6 multiplications and K + 2 additions (16 modes: 22 and 18). If the
- * positions and the basis exceed 4 MiB, positions are written with stores that bypass the caches.
- * These are fastest if `xyz` is aligned to 64 bytes. */
+ * Cost per vertex: K + 6 multiplications and K + 2 additions for K modes. If the positions and the
+ * basis exceed 4 MiB, positions are written with stores that bypass the caches. These are fastest
+ * if `xyz` is aligned to 64 bytes. */
 SUPINE_API void supine_deform(const supine_basis *basis, const supine_pose *pose, float *xyz);
 
 /** Compute supine_deform for vertices begin <= i < end, so that several threads can share the work.
@@ -244,16 +244,16 @@ SUPINE_API void supine_deform_range(const supine_basis *basis, const supine_pose
 SUPINE_API void supine_deform_batch(const supine_basis *basis, size_t count,
                                     const supine_pose *poses, size_t begin, size_t end, float *xyz);
 
-/** Compute the displacements A_j (w . c_i) d_ij of vertices begin <= i < end from the reference
- * surface. Except in rigid parts, displacements are linear in the gains. The difference between the
- * gains of two poses with the same weights gives the displacements from one pose to the other
- * (supine_step).
+/** Compute the displacements of vertices begin <= i < end from the reference surface. Except in
+ * rigid parts, displacements are linear in the gains. A pose whose gains are the differences
+ * between two poses of the same weights therefore gives the displacements from one pose to the
+ * other (supine_step).
  * @param xyz  [end - begin, 3] mm, written */
 SUPINE_API void supine_displace_range(const supine_basis *basis, const supine_pose *pose,
                                       size_t begin, size_t end, float *xyz);
 
-/** Add one step of a breath in a fixed posture [Santhanam2008, supine/breath.h] (III-B), with three
- * additions per vertex:
+/** Add one step of a breath in a fixed posture, with three additions per vertex ([Santhanam2008]
+ * III-B, see supine/breath.h):
  *
  *     xyz += step
  * @param count  number of vertices
@@ -269,10 +269,12 @@ SUPINE_API void supine_step(size_t count, const float *step, float *xyz);
  *
  *     v_j = sum over axes c of V_jc . (1, a w_k, b w_k, a b w_k w_l (k <= l))
  *
- * Here a and b are the gains of the two axes after c, cyclically. In files of versions 1 and 2,
- * which have one gain a, v_j = V_j . (1, a w_k, a^2 w_k w_l (k <= l)).
- * @param normal_weights  [G, Q] v, written
- * Cost: 1.5 G Q K^2 multiplications, once a frame. */
+ * V is supine_basis_info.normal_weights of the lung, and w_k are the weights of the pose. a and b
+ * are the gains on the two axes after c, cyclically. In files of versions 1 and 2, which have one
+ * gain a, v_j = V_j . (1, a w_k, a^2 w_k w_l (k <= l)).
+ * @param normal_weights  [lung_count, normal_count] v, written
+ * Cost: 1.5 Q K^2 multiplications for each lung, once a frame, for K modes of the displacement and
+ * Q modes of the normals. */
 SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const supine_pose *pose,
                                             double *normal_weights);
 
@@ -280,14 +282,17 @@ SUPINE_API void supine_basis_normal_weights(const supine_basis *basis, const sup
  *
  *     n_i = sum over j of v_j n_ij, normalised
  *
+ * n_ij is mode j of the normal of vertex i, and v_j is the weight of this mode
+ * (supine_basis_normal_weights).
+ *
  * The angles between these normals and those of supine_normals were measured on held-out states.
  * Their mean and 99.9th percentile are metadata "normals_mean_degrees" and "normals_p999_degrees"
- * of the file. They hold for volumes in "normals_range_ml" or, without rest, for largest
- * displacements in "normals_range_mm". Outside these ranges, angles are larger.
+ * of the file. They hold for volumes in the range "normals_range_ml". In a basis without rest, they
+ * hold if the largest displacement is in the range "normals_range_mm". Outside, angles are larger.
  * @param xyz      [N, 3] mm, written; NULL to compute only normals
  * @param normals  [N, 3], written; 0 for a vertex without triangles
  * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals
- * Cost of a normal: 3 Q + 8 multiplications, and as many additions. */
+ * Cost of a normal: 3 Q + 8 multiplications for Q modes of the normals, and as many additions. */
 SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose,
                                            float *xyz, float *normals);
 
@@ -308,34 +313,35 @@ SUPINE_API void supine_normals(const supine_basis *basis, const float *xyz, floa
  * coefficients in the attributes of a vertex. */
 enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7 };
 
-/** Fill a vertex buffer for supine.glsl with vertices begin <= i < end. Each vertex has
+/** Fill a vertex buffer for supine.glsl with vertices begin <= i < end. With K modes, a vertex has
  *
  *     reference     vec4 at byte 0: reference position, mm, and the index of the lung as w
  *     direction     vec3 at byte 16, mm
- *     coefficients  (K + 3) / 4 vec4s from byte 28; the last may have fewer than four numbers
+ *     coefficients  ceil(K / 4) vec4s from byte 28; the last may have fewer than four numbers
  * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], written; 44 bytes per vertex if K is 4
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes or is a vector
  *                                   field */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
-/** Compute the uniforms supine_weights [V] and supine_gains of supine.glsl, with V = (K + 3) / 4.
- * @param weights  [4 V], written
- * @param gains    [G, 3], written
+/** Compute the uniforms supine_weights and supine_gains of supine.glsl.
+ * @param weights  [4 ceil(mode_count / 4)], written
+ * @param gains    [lung_count, 3], written
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 
 /** Pack the modes of the normals of vertices begin <= i < end for supine.glsl. Three modes share a
- * word; W = (Q + 2) / 3 attributes of type uvec3 hold a vertex. W is SUPINE_WORDS of supine.glsl.
+ * word, so that a vertex with Q modes of the normals needs W = ceil(Q / 3) attributes of type
+ * uvec3. W is SUPINE_WORDS of supine.glsl.
  * @param words  [end - begin, W, 3], written, for glVertexAttribIPointer; 24 bytes per vertex if Q
  *               is 6
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis has no normals, or was opened without_normals */
 SUPINE_API supine_status supine_gl_pack_normals(const supine_basis *basis, size_t begin, size_t end,
                                                 uint32_t *words);
 
-/** Compute the uniform supine_normal_weights of supine.glsl. W is that of supine_gl_pack_normals.
- * @param uniforms  [G, W, 3], written, for glUniform3fv(location, G * W, uniforms)
+/** Compute the uniform supine_normal_weights of supine.glsl. W is SUPINE_WORDS of supine.glsl.
+ * @param uniforms  [lung_count, W, 3], written, for glUniform3fv with a count of lung_count * W
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_normals */
 SUPINE_API supine_status supine_gl_normal_weights(const supine_basis *basis,
                                                   const supine_pose *pose, float *uniforms);

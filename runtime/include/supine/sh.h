@@ -20,7 +20,7 @@
 extern "C" {
 #endif
 
-/** The highest band. The recurrences are accurate up to this band (tested). */
+/** The highest band. Tests confirm that the recurrences are accurate up to this band. */
 #define SUPINE_SH_BAND_MAX 64
 
 /** Return the number of harmonics with l <= band: (band + 1)^2. */

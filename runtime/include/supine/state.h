@@ -26,7 +26,7 @@
 extern "C" {
 #endif
 
-/** The reference from which a volume counts. */
+/** The reference relative to which a volume is given. */
 typedef enum supine_volume_kind {
   SUPINE_VOLUME_DEFAULT = 0, /**< the default volume of a basis (supine_basis_pose) */
   SUPINE_VOLUME_REST,        /**< the end of a quiet expiration in the posture */
@@ -36,7 +36,7 @@ typedef enum supine_volume_kind {
   SUPINE_VOLUME_KIND_COUNT
 } supine_volume_kind;
 
-/** A volume, counted from a reference. */
+/** A volume relative to a reference. */
 typedef struct supine_volume {
   supine_volume_kind kind;
   double ml; /**< volume above the reference, mL; negative if below it */
@@ -76,8 +76,8 @@ SUPINE_API supine_status supine_state_parse_volume(const char *text, supine_stat
  * @return the length of the whole text, without its NUL */
 SUPINE_API size_t supine_state_print(const supine_state *state, char *text, size_t size);
 
-/** Print a state in words, such as "left side at rest + 500 mL", without a default volume.
- * Parameters and result: as supine_state_print. */
+/** Print a state in words, such as "left side at rest + 500 mL". Omit a default volume. Parameters
+ * and result: as supine_state_print. */
 SUPINE_API size_t supine_state_describe(const supine_state *state, char *text, size_t size);
 
 #ifdef __cplusplus

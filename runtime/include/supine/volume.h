@@ -39,11 +39,11 @@ SUPINE_API void supine_volume_contract(size_t count, size_t axes, const double *
                                        const double *quadratic, const double *third,
                                        const double *weights, supine_volume_form *form);
 
-/** Return the change V - F of the volume at the gains x, y and z, mL. */
+/** Return the volume of a lung at given gains minus that of the reference surface, mL. */
 SUPINE_API double supine_volume_form_at(const supine_volume_form *form, const double gains[3]);
 
-/** Compute the coefficients of V - F = cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL, for the gains
- * s ratio[0], s ratio[1] and s ratio[2]. */
+/** Compute the coefficients with which V - F of supine_volume_form, mL, at the gains s ratio[0],
+ * s ratio[1] and s ratio[2] is cubic[0] s + cubic[1] s^2 + cubic[2] s^3. */
 SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const double ratio[3],
                                          double cubic[3]);
 
@@ -54,8 +54,9 @@ SUPINE_API void supine_volume_form_along(const supine_volume_form *form, const d
 SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volume, double *scale,
                                              supine_error *error);
 
-/** Compute the gains at a point of a path, as multiples of the gain at rest. The path leads from
- * full inflation (sigma = 0) to rest (sigma = 1), and continues beyond both:
+/** Compute the three gains at point sigma of a path, as multiples of the gain at rest.
+ * The path leads from full inflation (sigma = 0) to rest (sigma = 1), and continues beyond
+ * both:
  *
  *     ratio_j = sigma + 2 bend_j e(sigma)
  *     e = (sigma^3 - sigma) / 2  for sigma <= 1,   (sigma - 1) / sigma^6  for sigma > 1
@@ -67,7 +68,8 @@ SUPINE_API supine_status supine_volume_scale(const double cubic[3], double volum
  * @param ratio  [3], written */
 SUPINE_API void supine_volume_bend(const double bend[3], double sigma, double ratio[3]);
 
-/** Find the gains on the path of supine_volume_bend at which a lung holds a volume.
+/** Find the gains on the path of supine_volume_bend at which a lung holds a volume V. F is the
+ * volume of the reference surface of this lung.
  * @param bend    [3] bend of the path
  * @param rest    V - F at rest, mL; unused if the bend is 0
  * @param volume  V - F to hold, mL

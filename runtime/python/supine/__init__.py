@@ -105,8 +105,8 @@ def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale
     inhale         fraction of the breath's time that is inhalation
     rest_pressure  pressure at the end of an exhalation, cmH2O
     course         course of the pressure, "cosine" or "ramp", or "flow" for a constant flow
-    pv             [2, 9], for inhalation and exhalation: P_low, P_high (cmH2O), V_low, V_high (mL) and c1 to c5, as
-                   `supine pv fit` finds them; by default the limbs of a normal adult
+    pv             [2, 9], for inhalation and exhalation: P_low, P_high (cmH2O), V_low, V_high (mL) and the control
+                   parameters c1 to c5, as `supine pv fit` finds them; by default the limbs of a normal adult
     """
     times = np.asarray(times, np.float64)
     flat = np.ascontiguousarray(times).ravel()
@@ -121,7 +121,7 @@ class Pose(_c.CPose):
     """The weights and gains of one state of a basis, made by `Basis.pose`."""
 
     def fill(self, gain: float) -> Pose:
-        """Set every gain to one number, regardless of volumes, for open surfaces and fields."""
+        """Set every gain to one number, for open surfaces and displacements of another simulator."""
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
 
@@ -178,13 +178,13 @@ class Basis:
 
     vertices      float32 [N, 3], reference positions, mm
     triangles     uint32 [M, 3]
-    coefficients  float32 [N, K], or [N, 3, K] if `vector`
+    coefficients  float32 [N, K] for K modes, or [N, 3, K] if `vector`
     direction     float32 [N, 3], mm; None if `vector`
     modes         float64 [K, (band + 1)^2], coefficients of the weights in spherical harmonics
-    bounds        float32 [G, 2, 3], lowest and highest corner of the box around each lung, mm
+    bounds        float32 [lungs, 2, 3], lowest and highest corner of the box around each lung, mm
     lungs         the vertices of each lung: name -> slice
     metadata      the metadata of the file: key -> text
-    storage_error bound on the error of storage and rounding 500 mL above the reference surface, mm
+    storage_error bound on the error of storage and rounding with 500 mL more than the reference surface, mm
     report        what the program printed when `precompute` or `embed` made the basis
     """
     report: str = ""
@@ -235,7 +235,7 @@ class Basis:
 
     @property
     def faces(self) -> NDArray[np.int64]:
-        """The triangles as a new array for pyvista.PolyData and vtkCellArray.ImportLegacyFormat: 3, a, b, c, 3, ..."""
+        """The triangles as a new array for pyvista.PolyData and vtkCellArray.ImportLegacyFormat: 3 and 3 vertices for each."""
         faces = np.empty((self.triangle_count, 4), np.int64)
         faces[:, 0] = 3
         faces[:, 1:] = self.triangles
@@ -327,11 +327,11 @@ class Basis:
         return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
 
     def gains(self, pose: Pose) -> Doubles:
-        """Return a view of the gains [G, 3] of a pose: for each lung the gains along x, y and z."""
+        """Return a view of the gains [lungs, 3] of a pose: for each lung the gains along x, y and z."""
         return np.ctypeslib.as_array(pose.gains)[:len(self.lungs)]
 
     def volumes(self, pose: Pose) -> Doubles:
-        """Compute the volume [G] of each lung in a pose, gas and tissue, mL."""
+        """Compute the volume of each lung in a pose, gas and tissue, mL."""
         if not self.has_volume:
             raise OpenSurfaceError("the surface is open and encloses no volume")
         volumes = np.empty(len(self.lungs))
@@ -394,10 +394,10 @@ class Location:
     """The result of `Basis.locate`: lungs found from observed points.
 
     volume, volume_error   volume of all lungs and its standard deviation, mL (0 if the volume was given)
-    rotation, translation  observed = rotation @ (law's position + correction) + translation
+    rotation, translation  observed = rotation @ (predicted position + correction) + translation
     distances, sigmas      [n] distance of each point from its prediction by all other points, and the standard deviation of
                            this distance, mm
-    outliers               [n] True for observations that do not fit; the result ignores them
+    outliers               [n] True for outliers, which the result ignores
     log_evidence           log likelihood, to compare results that differ only in the posture
     """
 
