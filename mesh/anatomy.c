@@ -1,19 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Find which of the 48 possible axes fit the shape of lungs best.
+/* Find which of the 48 possible assignments of coordinates to axes fits the shape of lungs best.
  *
- * The score of axes is the sum of four terms in the third moments of volume about a lung's centre,
+ * The score of an assignment is the sum of four terms; for a single lung, of the first three. They
+ * contain the third moments of a lung of volume V about the lung's centre,
  *
  *     m_abc = integral of a b c dV / (V sd_a sd_b sd_c)
  *
- * with volume V, standard deviation sd_a along a, and x outwards from the midline. The last column
- * is the range of each term in nine lungs of five people and two synthetic lungs:
+ * where a, b and c are coordinates x (outwards from the midline), y (to the back) or z (to the
+ * head), and sd_a is the standard deviation of a. The last column is the range of each term in nine
+ * lungs of five people and two synthetic lungs:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
  *     deepest at the back        m_yzz - m_yyy             0.49 to 0.89
  *     narrow at the head        -m_xxz - m_yyz             0.27 to 0.45
  *     left and right differ      ln(V_right / V_left) + m_xyz(left) - m_xyz(right)   0.25 to 0.40
  *
- * The score was largest for the true axes in every case. */
+ * The score of the true axes was the highest in every case. */
 #include <math.h>
 #include <string.h>
 
@@ -21,28 +23,29 @@
 
 #include "mesh/anatomy.h"
 
-/* Lead in score that makes axes clearly better; the true axes led by 0.35 to 0.7. */
+/* Axes fit clearly better than others if their score is higher by more than this. The score of the
+ * true axes was higher by 0.35 to 0.7. */
 static const double least_lead = 0.2;
-/* Limit of |ln(V_right / V_left)| in the score, so that a collapsed lung does not decide alone. */
+/* Limit of |ln(V_right / V_left)| in the score, with the volumes V of the lungs, so that a
+ * collapsed lung does not decide alone. */
 static const double most_ratio = 0.25;
-/* Largest standard deviation of a single lung along x (side to side), divided by that along y or z.
- * Measured quotients by that along y are 0.6 to 0.7. */
+/* Largest ratio of a single lung's standard deviation along x (side to side) to that along y, and
+ * to that along z. Measured ratios to that along y are 0.6 to 0.7. */
 static const double thin = 0.85;
 /* A surface holds two lungs if, along one axis, its standard deviation exceeds `wide` times each of
  * the others and its kurtosis is less than `most_kurtosis`, that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-/* Smallest |m_xxx - m_xyy - m_xzz| that determines the side of a single lung. */
+/* The side of a single lung is unknown if the magnitude of hollow() is below this. */
 static const double least_side = 0.12;
 
 typedef struct shape {
   double volume;                  /* mm^3 */
   double centre[3], deviation[3]; /* centre and standard deviation, mm */
   double kurtosis[3];
-  double moments[3][3][3]; /* third moments m_abc */
+  double moments[3][3][3]; /* third moments, normalised by volume and deviations */
 } shape;
 
-/* Add w p_a to sum[a], w p_a^2 to square[a], and w p_a p_b p_c to third[a][b][c]. */
 static void add_point(const double p[3], double w, double sum[3], double square[3],
                       double third[3][3][3]) {
   for (int a = 0; a < 3; ++a) {
@@ -59,8 +62,8 @@ static void add_point(const double p[3], double w, double sum[3], double square[
 /* Return the mean of x^4 over a tetrahedron whose corners have x = 0, a, b and c: the sum of all
  * monomials of degree 4 in a, b and c, divided by 35. */
 static double mean_fourth(double a, double b, double c) {
-  double ab = 1.0;  /* sum of all monomials of degree n in a and b, when step n starts */
-  double abc = 1.0; /* sum of all monomials of degree n in a, b and c, when step n starts */
+  double ab = 1.0;  /* sum of all a^i b^j with i + j = n at the start of step n */
+  double abc = 1.0; /* sum of all a^i b^j c^k with i + j + k = n at the start of step n */
   double power = 1.0;
   for (int n = 0; n < 4; ++n) {
     power *= a;
@@ -70,8 +73,9 @@ static double mean_fourth(double a, double b, double c) {
   return abc / 35.0;
 }
 
-/* Integrate moments over the tetrahedra between `origin` and each triangle, by Keast's rule of five
- * points, which is exact for cubic polynomials. Return the sum of their signed volumes. */
+/* Integrate moments over the tetrahedra between `origin` and each triangle, the first three by
+ * Keast's rule of five points, which is exact for cubic polynomials. Return the sum of their signed
+ * volumes. */
 static double integrate(const supine_mesh *mesh, const double origin[3], double sum[3],
                         double square[3], double third[3][3][3], double fourth[3]) {
   static const double rule[5][4] = {{-0.8, 0.25, 0.25, 0.25},
@@ -108,7 +112,6 @@ static double integrate(const supine_mesh *mesh, const double origin[3], double 
   return volume;
 }
 
-/* Find the box of the triangles' corners; other vertices are ignored. */
 static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
   for (int k = 0; k < 3; ++k) {
     low[k] = INFINITY;
@@ -134,7 +137,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the centroid */
+  for (int pass = 0; pass < 2; ++pass) { /* first about the box's centre, then the centroid */
     s->volume = integrate(mesh, s->centre, sum, square, s->moments, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {
@@ -188,7 +191,7 @@ static double upright(const shape *s, const view *v) {
          moment(s, v, 1, 1, 2);
 }
 
-/* Score axes for a pair of lungs; -INFINITY unless their centres lie farthest apart along x. */
+/* Score axes for a pair of lungs; return -INFINITY unless the lungs' centres differ most in x. */
 static double fit_pair(const shape s[2], const view *v) {
   double apart[3];
   for (int k = 0; k < 3; ++k) {

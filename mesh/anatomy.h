@@ -6,7 +6,7 @@
 #include "mesh/mesh.h"
 
 typedef struct supine_mesh_anatomy {
-  supine_axes axes; /**< axes that the shape fits best; LPS unless other axes are clearly better */
+  supine_axes axes; /**< best axes if they fit clearly better than LPS, otherwise LPS */
   bool certain;     /**< whether `axes` fit clearly better than all other axes */
   int side;         /**< +1 left, -1 right; 0 if unknown, for two lungs, or if `axes` are not LPS */
   bool joined;      /**< whether a single surface seems to hold both lungs */

@@ -9,7 +9,7 @@
 
 enum { CODES = 48, SIGNS = 8 };
 
-/* Axis of the patient (0 left-right, 1 front-back, 2 feet-head) of each coordinate of a file. */
+/* The six orders of the axes (0 left-right, 1 front-back, 2 feet-head) in a file's coordinates. */
 static const unsigned char orders[CODES / SIGNS][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
                                                        {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
 
@@ -25,7 +25,8 @@ void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]) {
   double matrix[3][3];
   const double from[3] = {point[0], point[1], point[2]};
   supine_mesh_axes_matrix(axes, matrix);
-  for (int k = 0; k < 3; ++k) { /* exact, as entries are 0, 1 and -1; adding 0 turns -0 into 0 */
+  for (int k = 0; k < 3;
+       ++k) { /* exact, because entries are 0, 1 and -1; adding 0 turns -0 into 0 */
     point[k] =
         scale * (matrix[k][0] * from[0] + matrix[k][1] * from[1] + matrix[k][2] * from[2]) + 0.0;
   }

@@ -59,7 +59,7 @@ void supine_mesh_reverse(const supine_mesh *mesh) {
   }
 }
 
-/* Compute the normal of a triangle, whose length is twice the area. */
+/* Compute the normal of a triangle, with twice the triangle's area as length. */
 static void triangle_normal(const double *vertices, const uint32_t *corner, double normal[3]) {
   supine_normal(vertices + 3 * (size_t)corner[0], vertices + 3 * (size_t)corner[1],
                 vertices + 3 * (size_t)corner[2], normal);

@@ -44,7 +44,7 @@ typedef struct supine_mesh {
   uint32_t *triangles; /**< [triangle_count, 3] counter-clockwise seen from outside */
 } supine_mesh;
 
-/** How to read a file. Zeros stand for the axes that the file names and units of 1 mm. */
+/** How to read a file. If all fields are 0, the file names the axes, and the unit is 1 mm. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
   double millimetres_per_unit; /**< 0 stands for 1 */
@@ -100,8 +100,8 @@ typedef struct supine_topology {
   size_t component_count;    /**< sets of vertices connected by edges */
   uint32_t *component;       /**< [vertex_count] number of the component of each vertex */
   long euler_characteristic; /**< vertices - edges + triangles */
-  long genus;  /**< of a closed surface, (2 component_count - euler_characteristic) / 2; -1 if the
-                  surface is open or this is no whole number >= 0 */
+  long genus;  /**< (2 component_count - euler_characteristic) / 2 if the surface is closed and this
+                  is a whole number >= 0; otherwise -1 */
   bool closed; /**< whether every edge joins exactly two triangles of the same orientation */
 } supine_topology;
 
@@ -113,12 +113,12 @@ typedef struct supine_topology {
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);
 void supine_mesh_topology_free(supine_topology *topology);
 
-/** Compute the volume that a closed surface encloses, mm^3, as the sum of p0 . (p1 x p2) / 6 with
- * corners p relative to the box's centre: negative if triangles face inwards, 0 if there are
- * none. */
+/** Compute the volume that a closed surface encloses, mm^3, as the sum of p0 . (p1 x p2) / 6
+ * over all triangles, with corners p0, p1 and p2 relative to the box's centre. It is negative if
+ * the triangles face inwards, and 0 if there are none. */
 double supine_mesh_volume(const supine_mesh *mesh);
 
-/** Find the axis-aligned box, mm, and return its longest side; all are 0 without vertices. */
+/** Find the axis-aligned box, mm, and return its longest side, mm. All are 0 without vertices. */
 double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);
 
 /** Reverse the triangles, so that they face the other way. */
@@ -137,7 +137,7 @@ double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices);
 
 /** Numbers that describe a whole surface, for the field data of VTP. */
 typedef struct supine_mesh_field {
-  const char *name; /**< name with a unit: "volume_mL" */
+  const char *name; /**< name with a unit, such as "volume_mL" */
   size_t count;
   const double *values; /**< [frames, count]; one frame except in a series */
 } supine_mesh_field;
@@ -156,8 +156,8 @@ typedef struct supine_mesh_save_options {
   const unsigned char *lung;       /**< [vertex_count] index of the lung, point data "lung" */
   const supine_mesh_field *fields; /**< [field_count] numbers for the field data */
   size_t field_count;
-  double rounding; /**< mm; lengths are rounded to a power of two in the file's unit, the largest up
-                      to this, and normals to 1/256; 0 for no rounding */
+  double rounding; /**< mm, 0 for no rounding: lengths are rounded to multiples of the largest power
+                      of two, in the file's unit, that does not exceed this, and normals to 1/256 */
   /** @} */
 } supine_mesh_save_options;
 
@@ -178,16 +178,18 @@ typedef struct supine_mesh_series supine_mesh_series;
 /** Begin a series. All arguments must outlive it; before each frame the caller updates the arrays
  * `mesh->vertices` and `options->normals`.
  * @param times  [frames] in s
- * @retval SUPINE_ERROR_WRITE  also if the path is a pipe or device: offsets are written last
- * @retval the statuses of supine_mesh_save
+ * @retval SUPINE_ERROR_ARGUMENT  the mesh is too large to write
+ * @retval SUPINE_ERROR_MESH      a coordinate is not finite
+ * @retval SUPINE_ERROR_WRITE     the file cannot be written, or is a pipe or device
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_series_open(const char *path, const supine_mesh *mesh,
                                       const supine_mesh_save_options *options, size_t frames,
                                       const double *times, supine_mesh_series **series,
                                       supine_error *error);
-/** Add the next frame. Return the statuses of supine_mesh_save. */
+/** Add the next frame. Return SUPINE_ERROR_MESH if a coordinate is not finite, or
+ * SUPINE_ERROR_MEMORY. */
 supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *error);
-/** Complete the file, give it its name, and return the statuses of supine_mesh_save. */
+/** Complete the file, which then appears at its path. Return SUPINE_ERROR_WRITE on failure. */
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error);
 /** Free a series; if it was not committed, no file appears. NULL is legal. */
 void supine_mesh_series_close(supine_mesh_series *series);

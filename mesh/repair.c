@@ -9,7 +9,7 @@
 
 #include "mesh/repair.h"
 
-/* Largest share of loose triangles that are dropped; a mesh with more of them is no surface. */
+/* Loose triangles are dropped up to this share of all; a mesh with more of them is no surface. */
 static const double most_loose = 0.01;
 
 typedef struct links {
@@ -17,7 +17,7 @@ typedef struct links {
   uint8_t *turned;  /* [triangles] 1 if a triangle faces the other way than its parent, else 0 */
 } links;
 
-/* Return the corner opposite a side. */
+/* Return the vertex of a triangle that is opposite one side. */
 static uint32_t opposite(const supine_mesh *mesh, const supine_mesh_side *s) {
   return mesh->triangles[s->at % 3 == 0 ? s->at + 2 : s->at - 1];
 }
@@ -38,7 +38,8 @@ static void mark_duplicates(const supine_mesh *mesh, const supine_mesh_side *sid
   }
 }
 
-/* Mark triangles with no edge that exactly two triangles share; none if they exceed most_loose. */
+/* Mark loose triangles, none of whose edges belongs to exactly two triangles. Mark none if their
+ * share exceeds most_loose. */
 static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, uint8_t *drop) {
   const size_t count = 3 * mesh->triangle_count;
   size_t loose = mesh->triangle_count;
@@ -55,7 +56,6 @@ static void mark_loose(const supine_mesh *mesh, const supine_mesh_side *sides, u
   }
 }
 
-/* Drop marked triangles; return how many. */
 static size_t drop_marked(supine_mesh *mesh, const uint8_t *drop) {
   size_t kept = 0;
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
@@ -122,8 +122,7 @@ static bool link_triangles(const supine_mesh *mesh, const supine_mesh_side *side
   return sound;
 }
 
-/* Reverse the triangles of each surface that face the less frequent way; return how many.
- * @param count  [triangles, 2] zeros, used as work space */
+/* In each surface, reverse the triangles that face the less frequent way; return their number. */
 static size_t turn_minority(supine_mesh *mesh, const links *l, uint32_t (*count)[2]) {
   size_t reversed = 0;
   uint8_t turned;
@@ -258,7 +257,6 @@ typedef struct piece {
   uint32_t first_vertex;
 } piece;
 
-/* Find the first vertex and the volume of each component. */
 static void find_volumes(const supine_mesh *mesh, const supine_topology *topology, piece *pieces) {
   for (size_t i = mesh->vertex_count; i-- > 0;) {
     pieces[topology->component[i]].first_vertex = (uint32_t)i;

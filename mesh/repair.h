@@ -16,7 +16,8 @@ typedef struct supine_mesh_repair_report {
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *report);
 
-/** Drop vertices that are in no triangle, keeping the order of the others; return how many.
+/** Drop vertices that are in no triangle, keeping the order of the others; return the number
+ * dropped.
  * @param space  [vertex_count] work space */
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space);
 
@@ -30,13 +31,14 @@ supine_status supine_mesh_drop_specks(supine_mesh *mesh, double share, size_t *p
 /** One side of a triangle, between vertices low < high. */
 typedef struct supine_mesh_side {
   uint32_t low, high;
-  uint32_t at; /**< 3 * (index of the triangle) + corner, 0 to 2, where the side starts */
+  uint32_t at; /**< 3 * (index of the triangle) + (corner where the side starts, 0 to 2) */
 } supine_mesh_side;
 
-/** Sort all triangles' sides by low, high, at; NULL if out of memory. The caller frees them. */
+/** Return the sides of all triangles, sorted by `low`, then `high`, then `at`; NULL if out of
+ * memory. The caller frees them. */
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh);
 
-/** Return how many of `count` sorted sides belong to the edge whose first side is i. */
+/** Return how many of `count` sorted sides are on the edge whose first side is sides[i]. */
 size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t count);
 
 #endif

@@ -31,7 +31,8 @@ static void sort_sides(supine_mesh_side *sides, size_t count) {
 
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
   const size_t count = 3 * mesh->triangle_count;
-  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next); /* index of a vertex's next side */
+  uint32_t *next =
+      calloc(mesh->vertex_count + 2, sizeof *next); /* where to store each vertex's next side */
   supine_mesh_side *sides = malloc((count + 1) * sizeof *sides);
   if (next == NULL || sides == NULL) {
     free(next);
@@ -69,7 +70,6 @@ size_t supine_mesh_sides_of_edge(const supine_mesh_side *sides, size_t i, size_t
   return size;
 }
 
-/* Count the edges, and classify them by the number and direction of their sides. */
 static void edges_count(const supine_mesh *mesh, const supine_mesh_side *sides,
                         supine_topology *topology) {
   const size_t count = 3 * mesh->triangle_count;

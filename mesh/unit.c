@@ -33,7 +33,7 @@ void supine_mesh_unit_name(double millimetres, char *text) {
 }
 
 bool supine_mesh_unit_is_likely(double side, const char **other) {
-  static const double least = 80.0; /* longest sides of lungs, mm, from infants to adults */
+  static const double least = 80.0; /* least, most and typical longest side of lungs, mm */
   static const double most = 700.0;
   static const double typical = 280.0;
   double nearest = INFINITY;

@@ -17,8 +17,8 @@ enum { RUN = 128 };
 
 typedef struct resampling {
   const supine_field *inverse;
-  const supine_image *depth; /* NULL if densities are not scaled; `inside` is then empty */
-  supine_image inside;       /* 1 for each voxel of `from` inside the lungs, else 0 */
+  const supine_image *depth; /* mm below the lungs' surface; NULL if densities are not scaled */
+  supine_image inside; /* 1 for voxels of `from` inside the lungs, else 0; unused without `depth` */
   const supine_image *from;
   supine_image *to;
   bool labels;

@@ -69,24 +69,24 @@ TEST(test_expandability_load_bad_file_message_names_line_or_vertex) {
   static const struct {
     const char *text, *line, *detail;
   } bad[] = {
-      {"expandability\n1\n-2\n3\n", ":3:", "-2 of vertex 1 is not positive"},
-      {"expandability\n1\n0\n3\n", ":3:", "0 of vertex 1 is not positive"},
+      {"expandability\n1\n-2\n3\n", ":3:", "-2 of vertex 1: it must be positive"},
+      {"expandability\n1\n0\n3\n", ":3:", "0 of vertex 1: it must be positive"},
       {"expandability\n1\nnan\n3\n", ":3:", "\"nan\" is not a finite number"},
       {"expandability\n1\n1e999\n3\n", ":3:", "\"1e999\" is not a finite number"},
       {"expandability\n1\n1e-320\n3\n", ":3:", "vertex 1"},
       {"expandability\n1\n2\n", "", "vertex 2 of 3 has no expandability"},
-      {"expandability\n1\n2\n3\n4\n", ":5:", "vertex 3 is not in the model"},
+      {"expandability\n1\n2\n3\n4\n", ":5:", "vertex 3: there is no such vertex"},
       {"expandability\n1\ntwo\n3\n", ":3:", "\"two\" is not a finite number"},
       {"expandability\n1\n2 2\n3\n", ":3:", "\"2 2\" is not"},
       {"1\n2\n3\n", ":1:", "no column \"expandability\""},
       {"", "", "empty"},
       {"vertex,expandability\n0,1\n2,1\n", "", "vertex 1 of 3 has no"},
-      {"vertex,expandability\n0,1\n1,1\n0,2\n", ":4:", "vertex 0 was given before"},
-      {"vertex,expandability\n0,1\n7,1\n", ":3:", "vertex 7 is not in"},
+      {"vertex,expandability\n0,1\n1,1\n0,2\n", ":4:", "vertex 0: the vertex was given before"},
+      {"vertex,expandability\n0,1\n7,1\n", ":3:", "vertex 7: there is no"},
       {"vertex,expandability\n0,1\n-1,1\n", ":3:", "'-1'"},
       {"vertex,expandability\n0,1\n1;1\n", ":3:", "1 field, but the header has 2"},
       {"vertex,expandability\n0,1\n99999999999999999999,1\n", ":3:", "not the number"},
-      {"vertex,expandability\n0,1\n1,-4\n", ":3:", "-4 of vertex 1 is not positive"},
+      {"vertex,expandability\n0,1\n1,-4\n", ":3:", "-4 of vertex 1: it must be positive"},
   };
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     double a[3];

@@ -233,7 +233,7 @@ TEST(test_gate_many_pieces_reported) {
     append(&mesh, 4, at[0], 4, tetrahedron[0], true);
   }
   outcome out = pass(&mesh, NULL);
-  assert_says(out.findings.text, "warning: 8 pieces; remove the pieces that are not lung");
+  assert_says(out.findings.text, "warning: 8 pieces; remove those that are not lung");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }
@@ -297,12 +297,12 @@ TEST(test_gate_impossible_size_refused_unless_units_given) {
   }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_ERROR_MESH);
-  assert_says(out.error.message, "impossible for lungs: add --units m.");
+  assert_says(out.error.message, "impossible: add --units m.");
   const supine_lungs_source given = {
       .name = "small.ply", .axes = SUPINE_AXES_LPS, .units_given = true};
   out = pass(&mesh, &given);
   assert_int_equal(out.status, SUPINE_OK);
-  assert_says(out.findings.text, "warning: 0.");
+  assert_says(out.findings.text, "warning: the lungs are 0.");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }

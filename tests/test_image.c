@@ -144,7 +144,7 @@ TEST(test_nrrd_bad_files_refused) {
   } bad[] = {
       {"dimension: 3\nspace: LPS\nsizes: 10000 10000 10000\nspace directions: (1,0,0) (0,1,0) "
        "(0,0,1)\nspace origin: (0,0,0)\n",
-       "more than"},
+       "do not fit in"},
       {"dimension: 4\nspace: LPS\nsizes: 1 1 1 4\nspace directions: none (1,0,0) (0,1,0) "
        "(0,0,1)\nspace origin: (0,0,0)\n",
        "dimension 4"},
@@ -154,7 +154,7 @@ TEST(test_nrrd_bad_files_refused) {
        "neither"},
       {"dimension: 3\nspace: LPS\nsizes: 1 2 2\nspace directions: (1,0,0) (1,0,0) (0,0,1)\nspace "
        "origin: (0,0,0)\n",
-       "axes"},
+       "linearly dependent"},
       {"dimension: 3\nspace: LPS\nsizes: 1 2 2\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace "
        "origin: (0,0,0)\ndata file: /etc/passwd\n",
        "another file"},
@@ -184,11 +184,14 @@ TEST(test_nifti_bad_files_refused) {
     int16_t value[8];
     size_t count;
     const char *said;
-  } bad[] = {{40, {3, 32767, 32767, 32767, 1}, 5, "more than"},
+  } bad[] = {{40, {3, 32767, 32767, 32767, 1}, 5, "do not fit in"},
              {40, {4, 5, 4, 1, 3}, 5, "ndim is 4"},
              {254, {0}, 1, "orientation"},
              {70, {32}, 1, "COMPLEX"},
-             {280, {0, 0, 0, 0, 0, 0, 0, 0}, 8, "axes"}}; /* sets an axis to 0 */
+             {280,
+              {0, 0, 0, 0, 0, 0, 0, 0},
+              8,
+              "linearly dependent"}}; /* the first row of the matrix is 0 */
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     memcpy(changed, bytes, sizeof bytes);
     memcpy(changed + bad[i].at, bad[i].value, bad[i].count * sizeof(int16_t));

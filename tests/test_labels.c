@@ -724,7 +724,7 @@ TEST(test_labels_damaged_files_refused) {
               "directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nencoding: gzip\n\n",
               file);
   (void)fclose(file);
-  refused("huge.nrrd", &plain, SUPINE_ERROR_FORMAT, "more than");
+  refused("huge.nrrd", &plain, SUPINE_ERROR_FORMAT, "do not fit in");
   supine_image_free(&image);
 }
 

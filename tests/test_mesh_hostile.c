@@ -259,8 +259,8 @@ TEST(test_load_ply_list_of_impossible_length_refused) {
             "element face 1\nproperty list int int vertex_indices\nend_header\n1 2 3\n" length
   static const char below[] = LIST("-3 0 0 0\n");
   static const char above[] = LIST("1000 0 0 0\n"); /* more numbers than the file has bytes */
-  refuse_bytes(state, below, sizeof below - 1, "a list has the length -3");
-  refuse_bytes(state, above, sizeof above - 1, "a list has the length 1000");
+  refuse_bytes(state, below, sizeof below - 1, "a list has the impossible length -3");
+  refuse_bytes(state, above, sizeof above - 1, "a list has the impossible length 1000");
   unsigned char bytes[512] = {0};
   static const char *const types[] = {"char", "short", "int"};
   for (int k = 0; k < 3; ++k) {
@@ -272,7 +272,7 @@ TEST(test_load_ply_list_of_impossible_length_refused) {
     memset(bytes + head, 0, sizeof bytes - head);
     memset(bytes + head + 12, 0xFF, (size_t)1 << k);
     bytes[head + 12 + ((size_t)1 << k) - 1] = 0xFD;
-    refuse_bytes(state, bytes, sizeof bytes, "a list has the length -3");
+    refuse_bytes(state, bytes, sizeof bytes, "a list has the impossible length -3");
   }
 }
 

@@ -121,7 +121,7 @@ TEST(test_solve_bad_tissue_options_usage_error) {
 TEST(test_solve_bad_expandability_file_message_names_vertex) {
   test_write(csv, "expandability\n1\n1\n-3\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
-  assert_says(text, "a.csv:4: expandability -3 of vertex 2 is not positive");
+  assert_says(text, "a.csv:4: expandability -3 of vertex 2: it must be positive");
   test_write(csv, "expandability\n1\n1\n");
   assert_int_equal(solve("--expandability", csv, out), SUPINE_EXIT_INPUT);
   assert_says(text, "vertex 2 of");

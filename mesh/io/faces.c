@@ -7,8 +7,8 @@
 
 #include "mesh/io/read.h"
 
-/* Compute a face's normal, scaled to twice the face's area: the sum of the normals of the triangles
- * of the fan from corner 0. */
+/* Compute a face's normal, whose length is twice the face's area, as the sum of the normals of all
+ * triangles of the fan around corner 0. */
 static void find_normal(const double *vertices, const uint32_t *corner, size_t count,
                         double normal[3]) {
   memset(normal, 0, 3 * sizeof *normal);
@@ -22,7 +22,7 @@ static void find_normal(const double *vertices, const uint32_t *corner, size_t c
   }
 }
 
-/* Return whether all triangles of the fan from corner `start` face along `normal`. */
+/* Return whether all triangles of the fan around corner `start` face to the side of `normal`. */
 static bool is_fan(const double *vertices, const uint32_t *corner, size_t count, size_t start,
                    const double normal[3]) {
   bool fan = true;
@@ -36,8 +36,8 @@ static bool is_fan(const double *vertices, const uint32_t *corner, size_t count,
   return fan;
 }
 
-/* Cut a face into a fan of triangles, from the first corner whose fan lies inside the face, or from
- * corner 0 if no fan does. Write 3 (count - 2) vertex indices to `out`. */
+/* Cut a face into a fan of triangles around the first corner whose fan lies inside the face, or
+ * around corner 0 if there is none. Write 3 (count - 2) vertex indices to `out`. */
 static void cut(const double *vertices, const uint32_t *corner, size_t count, uint32_t *out) {
   double normal[3];
   size_t start = 0;
@@ -82,12 +82,13 @@ supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, si
   for (size_t k = 0; k < count; ++k) {
     if (!(corners[k] >= 0.0 && corners[k] < (double)mesh->vertex_count)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "%s: face %zu names vertex %.0f of only %zu; save it again",
+                              "%s: face %zu names vertex %.0f, but the number of vertices is %zu; "
+                              "save the mesh again",
                               faces->path, number, corners[k], mesh->vertex_count);
     }
     corner[k] = (uint32_t)corners[k];
   }
-  if (count < 3) { /* a point or a line */
+  if (count < 3) {
     ++faces->dropped;
     return SUPINE_OK;
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Access an image in memory: voxels as numbers, and positions in voxels and mm. */
+/* Access an image in memory: get and set voxels, and convert positions between voxels and mm. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>

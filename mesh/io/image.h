@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Read and write three-dimensional images and label maps (NRRD, NIfTI and MetaImage), in
- * millimetres and LPS whatever the file's axes. */
+/** @file Read and write three-dimensional images and label maps (NRRD, NIfTI and MetaImage). In
+ * memory, positions are in mm and LPS, whatever axes the file has. */
 #ifndef SUPINE_IMAGE_H
 #define SUPINE_IMAGE_H
 
@@ -37,13 +37,13 @@ typedef struct supine_image {
   supine_axes axes;         /**< axes assumed for the header's coordinates */
   const char *frame_source; /**< header field that gives origin and steps, a string literal:
                                "sform", "qform", "space directions" or "TransformMatrix" */
-  bool frames_differ;       /**< whether qform and sform differ by half a voxel or more */
+  bool frames_differ; /**< whether a NIfTI file's qform and sform differ by half a voxel or more */
 } supine_image;
 
 /** Return whether the name ends in .nrrd, .nii, .nii.gz or .mha. */
 bool supine_image_supports(const char *path);
 
-/** Return whether the name ends like an image, even one that cannot be read (.mhd, .dcm, ...). */
+/** Return whether the name's ending is that of any image format, even one that cannot be read. */
 bool supine_image_is_named(const char *path);
 
 /** Read an image of one number per voxel. If a NIfTI header gives a slope and an intercept, the
@@ -59,8 +59,8 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
 void supine_image_free(supine_image *image);
 
 /** Write an image in the format of its name's ending; .nrrd, .nii.gz and .mha are compressed. The
- * file appears completely or not at all. An image of three channels is a displacement; in every
- * format it is in mm and LPS, as ITK and ANTs expect.
+ * file appears completely or not at all. An image of three channels is a field of
+ * displacements, which every format stores in mm and LPS, as ITK and ANTs expect.
  * @param note  optional: one line for the header
  * @retval SUPINE_ERROR_ARGUMENT  the ending is not supported, or the image is too large or has too
  *             many channels for NIfTI-1
@@ -75,10 +75,12 @@ double supine_image_get(const supine_image *image, size_t index);
 /** Set values[k] to supine_image_get(image, from + index[k]) for 0 <= k < count. */
 void supine_image_gather(const supine_image *image, size_t from, const size_t *index, size_t count,
                          double *values);
-/** Set number begin + i of the image to values[i]; integer types are rounded and clipped. */
+/** Set value begin + i of the image to values[i], 0 <= i < count; integers are rounded and
+ * clipped. */
 void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
-/** Interpret the coordinates of the header in `axes`; do nothing if `axes` is AUTO. */
+/** Change the axes assumed for the header's coordinates to `axes`, unless AUTO, and recompute the
+ * origin and the steps. */
 void supine_image_set_axes(supine_image *image, supine_axes axes);
 
 /** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Choose an image's format by its name, and check what all formats share. */
+/* Choose an image's format by its name's ending, and check what all formats have in common. */
 #include <errno.h>
 #include <math.h>
 #include <string.h>
@@ -22,7 +22,6 @@ static const struct {
 
 enum { FORMATS = sizeof formats / sizeof *formats };
 
-/* Return the index of the format with the path's ending, or FORMATS if there is none. */
 static size_t format_of(const char *path) {
   size_t f = 0;
   while (f < FORMATS && !supine_text_ends_in(path, formats[f].ending)) {
@@ -77,7 +76,7 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   if (status == SUPINE_OK && !is_frame(&read)) {
     status = supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s: the header's directions are not three independent axes: write the image again", path);
+        "%s: the header's axis directions are linearly dependent: write the image again", path);
   }
   if (status == SUPINE_OK) {
     status = supine_image_read_voxels(path, (size_t)file.st_size, &storage, &read, error);

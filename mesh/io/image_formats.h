@@ -10,12 +10,12 @@
 
 /* How a file stores its voxels. */
 typedef struct image_storage {
-  int64_t offset; /* bytes before the voxels, or before their compressed stream */
-  int64_t skip;   /* bytes before the voxels in the stream after unpacking */
-  bool packed;    /* compressed by zlib or gzip */
-  bool text;      /* voxels are decimal numbers */
+  int64_t offset; /* bytes of the file that precede the voxels, packed or not */
+  int64_t skip;   /* bytes of the unpacked stream that precede the voxels */
+  bool packed;    /* whether the voxels are compressed by zlib or gzip */
+  bool text;      /* whether the voxels are decimal numbers */
   bool big_endian;
-  int integer; /* 1 for signed and -1 for unsigned 64-bit integers, which are read as F64; else 0 */
+  int integer; /* 1 for signed, -1 for unsigned 64-bit integers, read as F64; 0 for others */
   double slope, intercept; /* voxel = slope x number + intercept; not scaled if slope is 0 */
 } image_storage;
 
@@ -41,8 +41,8 @@ supine_status supine_image_read_voxels(const char *path, size_t file_size,
                                        const image_storage *storage, supine_image *image,
                                        supine_error *error);
 
-/* Compress `head` and the voxels `values` into the file, as IMAGE_ZLIB or IMAGE_GZIP. Return
- * SUPINE_ERROR_MEMORY on failure. */
+/* Compress `head` and the voxels `values` into the file, in the format IMAGE_ZLIB or IMAGE_GZIP.
+ * Return SUPINE_ERROR_MEMORY on failure. */
 supine_status supine_image_pack(int format, const void *head, size_t head_size,
                                 const supine_image *image, const void *values, FILE *file);
 

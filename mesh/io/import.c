@@ -32,7 +32,7 @@ typedef struct assimp {
   FUNCTIONS(SUPINE_LIBRARY_MEMBER)
 } assimp;
 
-/* Limits of an importer, far above what importers need for a lung. */
+/* Limits of one import, far above what a lung needs; the time grows with the file's size. */
 enum { SECONDS_LEAST = 8, SECONDS_PER_MEGABYTE = 1, GIGABYTES_MOST = 4 };
 
 /* Result of the child process; the vertices and triangles follow it in the stream. */
@@ -41,7 +41,6 @@ typedef struct outcome {
   size_t dropped, vertex_count, triangle_count;
 } outcome;
 
-/* The surface of a scene, collected node by node. */
 typedef struct gathering {
   assimp ai;
   const struct aiScene *scene;
@@ -50,7 +49,6 @@ typedef struct gathering {
   supine_error *error;
 } gathering;
 
-/* Report a failure in the importer's words, on one line. */
 static supine_status import_fail(const char *path, const char *words, supine_error *error) {
   char line[256];
   size_t length = 0;
@@ -65,7 +63,7 @@ static supine_status import_fail(const char *path, const char *words, supine_err
                           length == 0 ? "the importer failed" : line);
 }
 
-/* Import a file: from its path if `kind` is NULL, else its bytes, in the format `kind`. */
+/* Import the file at file->path or, unless `kind` is NULL, file->bytes in the format `kind`. */
 static const struct aiScene *import(const assimp *ai, const mesh_file *file, const char *kind) {
   struct aiPropertyStore *properties = ai->CreatePropertyStore();
   /* Without this, importers add a surface to files that hold only a skeleton. */
@@ -132,7 +130,6 @@ static bool take_node(const struct aiNode *node, const struct aiMatrix4x4 *above
   return good;
 }
 
-/* Limit time and memory of the child process for a file of this size. */
 static void confine(size_t bytes) {
   const rlim_t seconds = SECONDS_LEAST + SECONDS_PER_MEGABYTE * (bytes >> 20);
   const struct rlimit time = {seconds, seconds};
@@ -272,7 +269,7 @@ supine_status supine_mesh_read_obj(mesh_file *file, supine_mesh *mesh, size_t *d
   return bad > 0 ? bad_line(file, bad, error) : import_file(file, "obj", mesh, dropped, error);
 }
 
-/* Read STL: as text if the file has no NUL byte; binary files, too, may begin with "solid". */
+/* Read STL. Only text has no NUL byte; binary files, too, may begin with "solid". */
 supine_status supine_mesh_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                    supine_error *error) {
   mesh_text last = {0};

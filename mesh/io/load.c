@@ -17,7 +17,6 @@ static supine_status cannot_read(const char *path, supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_READ, "%s: cannot read: %s", path, strerror(code));
 }
 
-/* Return the reader for the ending of the name, or NULL if there is none. */
 static mesh_reader *find_reader(const char *path) {
   static const struct {
     const char *ending;
@@ -36,7 +35,7 @@ static mesh_reader *find_reader(const char *path) {
   return ending != NULL && supine_mesh_import_knows(ending) ? supine_mesh_import : NULL;
 }
 
-/* Check that the path is a file, and return its size in *size. */
+/* Check that the path names a file that is not empty, and return its size in *size. */
 static supine_status check_file(const char *path, size_t *size, supine_error *error) {
   struct stat about;
   errno = 0;
@@ -57,7 +56,7 @@ static supine_status check_file(const char *path, size_t *size, supine_error *er
                     : SUPINE_OK;
 }
 
-/* Find the axes in the head of the file, where 3D Slicer writes SPACE=LPS. */
+/* Find the axes near the start of the file, where 3D Slicer writes a tag such as SPACE=LPS. */
 static void find_space(mesh_file *file) {
   char head[4096];
   char letters[4] = "";
@@ -76,7 +75,6 @@ static void find_space(mesh_file *file) {
   }
 }
 
-/* Read the file, and find its reader. */
 static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_error *error) {
   size_t size = 0;
   supine_status status = check_file(file->path, &size, error);
@@ -103,13 +101,11 @@ static supine_status read_file(mesh_file *file, mesh_reader **reader, supine_err
   }
   find_space(file);
   *reader = find_reader(file->path);
-  return *reader != NULL
-             ? SUPINE_OK
-             : supine_error_set(
-                   error, SUPINE_ERROR_FORMAT,
-                   "%s: no importer for the ending of its name; give the mesh as .ply, .obj, .stl "
-                   "or .vtp",
-                   file->path);
+  return *reader != NULL ? SUPINE_OK
+                         : supine_error_set(error, SUPINE_ERROR_FORMAT,
+                                            "%s: no importer for this ending; give the mesh "
+                                            "as .ply, .obj, .stl or .vtp",
+                                            file->path);
 }
 
 static supine_status choose_axes(const mesh_file *file, supine_axes asked,
@@ -132,7 +128,6 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
 /* Largest coordinate, mm, that single precision resolves to 1 mm. */
 static const double farthest = 1e7;
 
-/* Convert the vertices to millimetres and LPS. */
 static supine_status convert(const char *path, double scale, supine_axes axes, supine_mesh *mesh,
                              supine_error *error) {
   for (size_t i = 0; i < mesh->vertex_count; ++i) {

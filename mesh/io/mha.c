@@ -17,7 +17,7 @@ enum { HEADER_MAX = 1 << 16 };
 static const struct {
   const char *name;
   supine_image_voxel voxel;
-  bool wide; /* 64-bit integers, which are read as F64 */
+  bool wide; /* whether voxels are 64-bit integers, which are read as F64 */
 } types[] = {{"MET_CHAR", SUPINE_VOXEL_I8, false},      {"MET_UCHAR", SUPINE_VOXEL_U8, false},
              {"MET_SHORT", SUPINE_VOXEL_I16, false},    {"MET_USHORT", SUPINE_VOXEL_U16, false},
              {"MET_INT", SUPINE_VOXEL_I32, false},      {"MET_UINT", SUPINE_VOXEL_U32, false},
@@ -36,7 +36,7 @@ typedef struct header {
   size_t length; /* bytes before the voxels */
 } header;
 
-/* Return the last value of any of three keys, or "" if there is none. An unused key is "". */
+/* Return the last value of any of three keys, or "" if there is none; "" stands for no key. */
 static const char *value_of(const header *h, const char *key, const char *second,
                             const char *third) {
   const char *value = "";
@@ -98,7 +98,7 @@ static const char *check(const header *h) {
   const char *object = value_of(h, "ObjectType", "", "");
   const char *binary = value_of(h, "BinaryData", "", "");
   if (*object != '\0' && strcasecmp(object, "Image") != 0) {
-    return "it is not an image; give an image";
+    return "its ObjectType is not Image; give an image";
   }
   if (strcasecmp(value_of(h, "ElementDataFile", "", ""), "LOCAL") != 0) {
     return "the voxels are in another file; save header and voxels in one .mha";
@@ -109,7 +109,7 @@ static const char *check(const header *h) {
   return NULL;
 }
 
-/* Find size, frame and type; return NULL, or a message on failure. */
+/* Find the image's size, position, axes and type; return NULL, or a message on failure. */
 static const char *describe(const header *h, supine_image *image, size_t *type_index) {
   const char *name = value_of(h, "ElementType", "", "");
   double dimensions = 0.0;
@@ -128,11 +128,11 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
       !numbers(value_of(h, "Offset", "Position", "Origin"), offset, n) ||
       !numbers(value_of(h, "TransformMatrix", "Rotation", "Orientation"), matrix, n * n) ||
       !numbers(value_of(h, "ElementNumberOfChannels", "", ""), &channels, 1)) {
-    return "a line of its header has too few numbers; save it again";
+    return "a line of its header has too few numbers; save the image again";
   }
   if (channels != 1.0 || (n == 4 && size[3] != 1.0)) {
-    return channels != 1.0 ? "it has several numbers per voxel; save one per voxel"
-                           : "it has several volumes; save one of them";
+    return channels != 1.0 ? "it has several numbers per voxel; save one channel alone"
+                           : "it has several volumes; save one volume alone";
   }
   size_t type = 0;
   while (type < TYPES && strcmp(name, types[type].name) != 0) {
@@ -148,7 +148,7 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
   image->frame_source = "TransformMatrix";
   for (size_t a = 0; a < 3; ++a) {
     if (!(size[a] >= 1.0 && size[a] <= 1e6) || size[a] != (double)(size_t)size[a]) {
-      return "its DimSize is invalid; save it again";
+      return "its DimSize is invalid; save the image again";
     }
     image->size[a] = (size_t)size[a];
     image->origin[a] = offset[a];

@@ -34,7 +34,7 @@ static bool forms_differ(const nifti_image *nifti) {
   return nifti->sform_code > 0 && nifti->qform_code > 0 && farthest >= 0.5 * voxel;
 }
 
-/* Check size and type. Convert origin and steps from RAS, NIfTI's axes, to LPS. */
+/* Check the image's size and type. Convert origin and steps from RAS, NIfTI's axes, to LPS. */
 static supine_status check(const char *path, const nifti_image *nifti, supine_image *image,
                            image_storage *storage, supine_error *error) {
   const double unit = nifti->xyz_units == NIFTI_UNITS_METER    ? 1000.0
@@ -61,7 +61,7 @@ static supine_status check(const char *path, const nifti_image *nifti, supine_im
   }
   if (type == SUPINE_VOXEL_COUNT) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: voxels of type %s are not read; convert them to int16", path,
+                            "%s: voxels of type %s are not supported; convert them to int16", path,
                             nifti_datatype_string(nifti->datatype));
   }
   image->voxel = (supine_image_voxel)type;
@@ -160,7 +160,7 @@ supine_status supine_image_write_nifti(const char *path, const supine_image *ima
       image->size[1] > INT16_MAX || image->size[2] > INT16_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "%s: NIfTI-1 holds one number or a 3-vector per voxel, and at most "
-                            "%d voxels along an axis: write .nrrd",
+                            "%d voxels along an axis: save it as .nrrd",
                             path, INT16_MAX);
   }
   float *planar = vectors ? planes(image) : NULL;

@@ -43,13 +43,13 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
                            supine_image *image, image_storage *storage, supine_error *error) {
   if (io->detachedHeader || io->dataFNFormat != NULL || io->dataFNArr->len > 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its voxels are in another file; save both in one file", path);
+                            "%s: its voxels are in another file; save all in one file", path);
   }
   if (nrrd->dim != 3 || nrrd->spaceDim != 3) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
         nrrd->dim != 3 ? "%s: dimension %u; give an image with one number per voxel and three axes"
-                       : "%s: the header has no space directions for its %u axes; write them",
+                       : "%s: the header lacks space directions for its %u axes; add them",
         path, nrrd->dim);
   }
   double turn = 0.0;
@@ -71,8 +71,8 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   if ((io->encoding != *teem.nrrdEncodingRaw && !storage->packed && !storage->text) ||
       io->lineSkip != 0 || io->byteSkip != 0) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: its encoding is not raw, gzip or ascii, or it skips lines or "
-                            "bytes; save it again as gzip",
+                            "%s: its encoding is not raw, gzip or ascii, or its header skips lines "
+                            "or bytes; save the image again as gzip",
                             path);
   }
   const bool wide = nrrd->type == nrrdTypeLLong || nrrd->type == nrrdTypeULLong;
@@ -82,7 +82,7 @@ static supine_status check(const char *path, const Nrrd *nrrd, const NrrdIoState
   }
   if (type == SUPINE_VOXEL_COUNT) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: voxels of type %s are not read; convert them to int16", path,
+                            "%s: voxels of type %s are not supported; convert them to int16", path,
                             teem.airEnumStr(*teem.nrrdType, nrrd->type));
   }
   image->voxel = (supine_image_voxel)type;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Read the vertices and faces of a PLY file, which may be shorter than its header says. */
+/* Read the vertices and faces of a PLY file. A file shorter than its header says is refused. */
 #include <stdlib.h>
 
 #include "mesh/io/read.h"
@@ -12,7 +12,7 @@ typedef enum kind { VERTICES, FACES, STRIPS, OTHER } kind;
 typedef enum role { X, Y, Z, CORNERS, NONE } role;
 
 typedef struct property {
-  const mesh_type *count; /* type of the length of a list; NULL if the property is no list */
+  const mesh_type *count; /* type of a list's length; NULL if the property is not a list */
   const mesh_type *type;
   role role;
 } property;
@@ -30,7 +30,7 @@ typedef struct ply {
   encoding encoding;
   mesh_text text; /* part of the file not yet read */
   mesh_text line;
-  unsigned present; /* bit 1 << role is set if an element with items has a property of this role */
+  unsigned present; /* bit 1 << role is set if a nonempty element has a property of this role */
   size_t element_count;
   size_t property_count;
   element elements[ELEMENTS_MAX];
@@ -55,7 +55,7 @@ static bool add_element(ply *in, mesh_text name, mesh_text count) {
   element *added = &in->elements[in->element_count];
   *added = (element){.kind = (kind)find_name(name, kinds), .first_property = in->property_count};
   for (size_t e = 0; added->kind != OTHER && e < in->element_count; ++e) {
-    if (in->elements[e].kind == added->kind) { /* two elements of one kind are ambiguous */
+    if (in->elements[e].kind == added->kind) { /* two elements of the same kind are ambiguous */
       return false;
     }
   }
@@ -143,12 +143,11 @@ static supine_status read_header(ply *in) {
       "%s: the PLY header has no end_header: the file is truncated; save it again", path);
 }
 
-/* Check that the header announces vertices and faces that can be read. */
 static supine_status check_header(const ply *in) {
   static const unsigned needed = 1U << X | 1U << Y | 1U << Z | 1U << CORNERS;
   const char *path = in->file->path;
   for (size_t e = 0; e < in->element_count; ++e) {
-    if (in->elements[e].property_count == 0) { /* items of this element would have 0 bytes */
+    if (in->elements[e].property_count == 0) {
       return supine_error_set(
           in->error, SUPINE_ERROR_FORMAT,
           "%s: element %zu of the PLY header has no property; save the mesh again", path, e + 1);
@@ -197,10 +196,11 @@ static bool take(ply *in, const mesh_type *type, double *value) {
 
 static supine_status cut_short(const ply *in, const element *of, uint64_t item) {
   static const char *const names[] = {"vertex", "face", "tristrips", "item"};
-  return supine_error_set(
-      in->error, SUPINE_ERROR_FORMAT,
-      "%s: truncated or malformed at %s %llu of the %llu in the PLY header; save the mesh again",
-      in->file->path, names[of->kind], (unsigned long long)item, (unsigned long long)of->count);
+  return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
+                          "%s: truncated or malformed at %s %llu (the PLY header says %llu in "
+                          "all); save the mesh again",
+                          in->file->path, names[of->kind], (unsigned long long)item,
+                          (unsigned long long)of->count);
 }
 
 static supine_status take_list(ply *in, const element *of, uint64_t item, const property *list) {
@@ -211,8 +211,8 @@ static supine_status take_list(ply *in, const element *of, uint64_t item, const 
   }
   if (length < 0.0 || length > (double)in->file->size) {
     return supine_error_set(in->error, SUPINE_ERROR_FORMAT,
-                            "%s: a list has the length %.0f; save the mesh again", in->file->path,
-                            length);
+                            "%s: a list has the impossible length %.0f; save the mesh again",
+                            in->file->path, length);
   }
   const uint64_t count = (uint64_t)length;
   for (uint64_t k = 0; k < count; ++k) {
@@ -253,7 +253,7 @@ static supine_status take_items(ply *in, const element *of) {
 
 /* Allocate the vertices that the header announces, at most as many as the file can hold. */
 static supine_status make_room(const ply *in, const element *of, supine_mesh *mesh) {
-  uint64_t least = 0; /* smallest size of an item, bytes */
+  uint64_t least = 0; /* smallest possible size of a vertex in the file, bytes */
   for (size_t p = 0; p < of->property_count; ++p) {
     const property *item = &in->properties[of->first_property + p];
     least += in->encoding == ASCII ? 2 /* at least a digit and a blank */

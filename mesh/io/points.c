@@ -83,7 +83,6 @@ static supine_status read_csv(reading *r) {
   return status;
 }
 
-/* Read the control points of one markup. */
 static supine_status read_markup(reading *r, const json_t *markup) {
   const char *system = json_string_value(json_object_get(markup, "coordinateSystem"));
   const char *unit = json_string_value(json_object_get(markup, "coordinateUnits"));

@@ -8,7 +8,7 @@
 typedef struct supine_mesh_points {
   size_t count;
   double *at;   /**< [count, 3] positions, mm, LPS */
-  char **names; /**< [count] never NULL; "1", "2", ... if the file has no names */
+  char **names; /**< [count] "1", "2", ... if the file has no names; never NULL */
 } supine_mesh_points;
 
 /** Read points from a CSV file with the columns x,y,z and optionally name (or label), or from 3D

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Readers of surface files, and what they share. */
+/* Readers of surface files, and functions that they share. */
 #ifndef SUPINE_MESH_READ_H
 #define SUPINE_MESH_READ_H
 
@@ -9,7 +9,7 @@
 
 #include "mesh/mesh.h"
 
-/* ---- tokens.c: lines and words of a file with any content. ---- */
+/* ---- tokens.c: split the text of a file, which may hold any bytes, into lines and words. ---- */
 
 /** A text: the bytes from `at` up to `end`, not NUL-terminated. */
 typedef struct mesh_text {
@@ -29,7 +29,8 @@ bool supine_mesh_text_count(mesh_text word, uint64_t *value);
 /** Remove the next word from `text` and parse it with strtod; return false if it is missing or
  * not a number. A NUL must follow the text. */
 bool supine_mesh_text_number(mesh_text *text, double *value);
-/** Parse three numbers, rounded to single precision. */
+/** Remove three numbers from `text`, and round them to single precision; return false on
+ * failure. */
 bool supine_mesh_text_position(mesh_text *text, double position[3]);
 
 /** A type of binary numbers. */
@@ -60,7 +61,7 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error);
 /* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 
 enum {
-  MESH_CORNERS_MAX = 1024, /**< limit for one face, as cutting takes quadratic time */
+  MESH_CORNERS_MAX = 1024, /**< limit per face: cutting a face takes quadratic time */
   MESH_VERTICES_MAX = INT32_MAX,
   MESH_TRIANGLES_MAX = UINT32_MAX / 3
 };
@@ -68,14 +69,14 @@ enum {
 typedef struct mesh_faces {
   const char *path;
   supine_mesh *mesh;
-  size_t capacity; /**< triangles allocated */
+  size_t capacity; /**< number of triangles that have been allocated */
   size_t count;    /**< faces read, including points and lines */
   size_t dropped;  /**< points and lines skipped */
 } mesh_faces;
 
 /** Cut a face into triangles, and add them. A face of more than MESH_CORNERS_MAX corners is refused
  * without reading `corners`.
- * @retval SUPINE_ERROR_FORMAT  a corner is not a vertex, or there are too many corners */
+ * @retval SUPINE_ERROR_FORMAT  a corner names no vertex, or there are too many corners */
 supine_status supine_mesh_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                     supine_error *error);
 

@@ -13,9 +13,9 @@ typedef struct mesh_writer {
   const supine_mesh *mesh;
   supine_mesh_save_options options;
   unsigned char source[3]; /**< axis of `mesh`, 0 to 2, that gives each coordinate of the file */
-  double factor[3];        /**< sign of each coordinate, divided by the file's unit in mm */
+  double factor[3]; /**< sign of each coordinate (1 or -1), divided by the file's unit in mm */
   bool mirrored; /**< whether axes are left-handed: triangles are then written in reverse order */
-  double step;   /**< step of rounded lengths in the file's unit; 0 if lengths are not rounded */
+  double step;   /**< step of rounded lengths, in the file's unit; 0 for no rounding */
   char space[4]; /**< letters of the axes: "LPS", "RAS", ... */
   char unit[24]; /**< unit of lengths: "mm", "cm", ... */
   char comment[256]; /**< one printable line, or "" */
@@ -35,7 +35,8 @@ void supine_mesh_writer_triangle(const mesh_writer *writer, size_t t, uint32_t c
 /** Fill a writer, except `out`, from the arguments of supine_mesh_save. */
 void supine_mesh_writer_begin(const supine_mesh *mesh, const supine_mesh_save_options *options,
                               mesh_writer *writer);
-/** Check that all formats can hold a surface. Return the statuses of supine_mesh_save. */
+/** Return SUPINE_ERROR_ARGUMENT for a surface too large for the formats, SUPINE_ERROR_MESH for one
+ * with a coordinate that is not finite. */
 supine_status supine_mesh_writer_check(const char *path, const supine_mesh *mesh,
                                        supine_error *error);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Write VTK XML PolyData with compressed appended arrays, for one surface or for a series: frames
- * with the same triangles. The arrays of a series are written frame by frame. Then the head
- * is written again, with the offsets of the arrays. */
+/* Write VTK XML PolyData with compressed appended arrays, for one surface, or for a series:
+ * surfaces with the same triangles, called frames. The arrays of a series are written frame by
+ * frame. Then the head of the file is written a second time, with the offsets of the arrays. */
 #include <stdlib.h>
 
 #include <libdeflate.h>
@@ -24,7 +24,7 @@ typedef struct vtp_array {
   unsigned components;
   size_t item_size; /* bytes per point or triangle: 1, 4 or 12 */
   size_t count;
-  bool constant; /* the same in all frames, so written once */
+  bool constant; /* whether the array is equal in all frames and written once */
   vtp_put *put;
 } vtp_array;
 
@@ -38,7 +38,7 @@ struct vtp {
   size_t next_frame;
   uint64_t bytes_written;
   size_t threads;
-  unsigned char *raw;    /* [threads, BLOCK] blocks before compression */
+  unsigned char *raw;    /* [threads, BLOCK] a block of each thread, not compressed */
   unsigned char *packed; /* compressed blocks of one array */
   uint64_t *sizes;       /* header of an array: three numbers, then each block's compressed size */
   const vtp_array *packing; /* array being compressed */
@@ -105,7 +105,6 @@ static void vtp_end(vtp *file) {
   file->raw = file->packed = NULL;
 }
 
-/* List the arrays and allocate room for them. */
 static supine_status vtp_begin(vtp *file) {
   const mesh_writer *writer = &file->writer;
   const size_t points = writer->mesh->vertex_count;
@@ -151,7 +150,7 @@ static void put_sizes(FILE *out, const uint64_t *sizes, size_t count) {
   }
 }
 
-/* Fill and compress blocks of an array; file->packed has a place for each. */
+/* Fill and compress the blocks begin <= i < end of the array file->packing. */
 static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) {
   vtp *file = context;
   const vtp_array *array = file->packing;
@@ -195,7 +194,6 @@ static supine_status put_array(vtp *file, const vtp_array *array, FILE *out) {
   return status;
 }
 
-/* Write the arrays of the next frame. */
 static supine_status vtp_frame(vtp *file, FILE *out) {
   const size_t frame = file->next_frame++;
   supine_status status = SUPINE_OK;
@@ -251,7 +249,6 @@ static void write_text(const char *name, const char *text, FILE *out) {
   (void)fputs("0</Array>\n", out);
 }
 
-/* Write a field as numbers, one tuple for each frame. */
 static void write_numbers(const vtp *file, const supine_mesh_field *field, FILE *out) {
   (void)fprintf(out,
                 "<DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"%zu\" "
@@ -270,7 +267,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
-  if (file->times != NULL) { /* not named TimeValue, which is the time of a file with one frame */
+  if (file->times != NULL) { /* readers take the name TimeValue for the time of a single frame */
     write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
   }
   for (size_t i = 0; i < writer->options.field_count; ++i) {
@@ -397,7 +394,7 @@ supine_status supine_mesh_series_add(supine_mesh_series *series, supine_error *e
 
 supine_status supine_mesh_series_commit(supine_mesh_series *series, supine_error *error) {
   vtp_foot(series->output.file);
-  (void)fseeko(series->output.file, 0, SEEK_SET); /* succeeds, as in supine_mesh_series_open */
+  (void)fseeko(series->output.file, 0, SEEK_SET);
   vtp_head(&series->file, series->output.file);
   return supine_output_commit(&series->output, error);
 }

@@ -6,7 +6,6 @@
 
 #include "mesh/io/save.h"
 
-/* Return whether a value is finite in float32. */
 static bool fits(double x) {
   return fabs(x) <= (double)FLT_MAX;
 }
@@ -72,7 +71,7 @@ static double rounded(const mesh_writer *writer, double length) {
 }
 
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
-  static const double steps = 256.0; /* if lengths are rounded, so are normals, to 1/256 */
+  static const double steps = 256.0; /* if lengths are rounded, normals are rounded to 1/256 */
   for (size_t axis = 0; axis < 3; ++axis) {
     const double value = (double)writer->options.normals[3 * i + writer->source[axis]];
     const double turned = copysign(value, value * writer->factor[axis]);

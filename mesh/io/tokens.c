@@ -119,7 +119,7 @@ bool supine_mesh_guard_text(const mesh_file *file, supine_error *error) {
        ++at) {
     if (at + 1 == end || at[1] != '\n') {
       (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
-                             "%s: a carriage return without a line feed; save it with LF line ends",
+                             "%s: a line ends in CR alone; save the text with LF line ends",
                              file->path);
       return false;
     }

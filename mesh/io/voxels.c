@@ -50,7 +50,6 @@ static void swap_bytes(unsigned char *bytes, size_t count, size_t size) {
   }
 }
 
-/* Convert 64-bit integers to doubles in place. */
 static void widen(unsigned char *at, size_t count, bool is_signed) {
   for (size_t i = 0; i < count; ++i, at += 8) {
     int64_t number = 0;
@@ -83,7 +82,6 @@ static supine_status rescale(const char *path, const image_storage *storage, sup
   return SUPINE_OK;
 }
 
-/* Read voxels that are written as decimal numbers. */
 static bool read_text(FILE *file, supine_image *image, size_t count) {
   double value = 0.0;
   size_t i = 0;
@@ -102,8 +100,8 @@ supine_status supine_image_read_voxels(const char *path, size_t file_size,
       (double)image->size[0] * (double)image->size[1] * (double)image->size[2] * (double)each;
   if (!(bytes > 0.0 && bytes <= gzip_ratio * (double)file_size)) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "%s: %zu x %zu x %zu voxels are more than its %zu bytes can hold: it "
-                            "is truncated; fetch or write the file again",
+                            "%s: %zu x %zu x %zu voxels do not fit in %zu bytes: the file is "
+                            "truncated; fetch or write it again",
                             path, image->size[0], image->size[1], image->size[2], file_size);
   }
   const size_t count = image->size[0] * image->size[1] * image->size[2];

@@ -12,16 +12,15 @@
 
 typedef struct vtp_file {
   const mesh_file *file;
-  const char *bytes, *end; /* content of the file, with a NUL at `end` and perhaps others before */
+  const char *bytes, *end; /* content of the file, followed by a NUL at `end` */
   const char *appended;    /* first byte of the appended data; NULL if there are none */
   bool appended_raw, compressed;
-  size_t header_size; /* bytes of each integer in the header of an array: 4 or 8 */
+  size_t header_size; /* size of each integer in an array's header, bytes: 4 or 8 */
 } vtp_file;
 
-/* An XML element. */
 typedef struct element {
-  const char *at, *end; /* attributes, name="value" */
-  const char *body;     /* text after the > of the tag */
+  const char *at, *end; /* begin and end of the element's attributes */
+  const char *body;     /* first byte after the > of the tag */
 } element;
 
 static supine_status malformed(const vtp_file *v, const char *what, supine_error *error) {
@@ -45,7 +44,7 @@ static bool find_element(const char *from, const char *to, const char *name, ele
   return false;
 }
 
-/* Copy the value of an attribute, truncated to `size` bytes; return false if there is none. */
+/* Copy the value of an attribute, truncated to `size` bytes; return false if it is missing. */
 static bool attribute(const element *e, const char *name, char *value, size_t size) {
   const size_t length = strlen(name);
   for (const char *at = e->at; at + length + 2 < e->end; ++at) {
@@ -77,7 +76,7 @@ static uint64_t little(const unsigned char *bytes, size_t size) {
 }
 
 /* Decode base64 up to the first character that is not base64. Several streams may follow each
- * other, each padded to groups of four characters. Return the number of bytes.
+ * other, each padded to groups of four characters. Return the number of bytes decoded.
  * @param bytes  output: room for 3 bytes for each 4 characters */
 static size_t base64(const char *at, const char *end, unsigned char *bytes) {
   static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -106,9 +105,10 @@ static size_t base64(const char *at, const char *end, unsigned char *bytes) {
   return (size_t)(to - bytes);
 }
 
-/* Unpack the bytes of an array into out [wanted]. An uncompressed array is its size, then the
- * numbers. A compressed array is the number of blocks, the size of a block, the size of the last
- * block if it is shorter (else 0), the compressed size of each block, and the blocks. */
+/* Unpack the bytes of an array into out [wanted]. An array that is not compressed holds its size in
+ * bytes, then its numbers. A compressed array holds the number of blocks, the size of a block, the
+ * size of the last block if it is shorter (else 0), the compressed size of each block, and the
+ * blocks. */
 static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, size_t wanted,
                    unsigned char *out) {
   const size_t h = v->header_size;
@@ -184,9 +184,10 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
   *numbers = NULL;
   /* zlib expands a byte to at most 1032 bytes */
   if (type == NULL || count > 1032 * (size_t)(v->end - v->bytes)) {
-    return malformed(
-        v, "an array of its points or polygons has an unknown type or is too large; save it again",
-        error);
+    return malformed(v,
+                     "an array of its points or polygons has an unknown type or is too large; "
+                     "write the file again",
+                     error);
   }
   double *values = malloc((count + 1) * sizeof *values);
   unsigned char *bytes = malloc(count * type->size + 1);
@@ -205,8 +206,8 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
     for (size_t i = 0; i < count && good && !ascii; ++i) {
       values[i] = supine_mesh_type_decode(type, bytes + i * type->size, false);
     }
-    status =
-        good ? SUPINE_OK : malformed(v, "an array is truncated or damaged; save it again", error);
+    status = good ? SUPINE_OK
+                  : malformed(v, "an array is truncated or damaged; write the file again", error);
   }
   free(bytes);
   if (status != SUPINE_OK) {
@@ -260,21 +261,23 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   }
   if (!find_array(v, piece, "Polys", "offsets", &offsets) ||
       !find_array(v, piece, "Polys", "connectivity", &connectivity)) {
-    return malformed(v, "its polygons have no offsets or connectivity; save it again", error);
+    return malformed(v, "its polygons have no offsets or connectivity; write the file again",
+                     error);
   }
   double *ends = NULL;
   double *corners = NULL;
   supine_status status = take_numbers(v, &offsets, count, &ends, error);
   const double total = status == SUPINE_OK ? ends[count - 1] : 0.0;
   if (status == SUPINE_OK) {
-    status = total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX
-                 ? take_numbers(v, &connectivity, (size_t)total, &corners, error)
-                 : malformed(v, "the offsets of its polygons are invalid; save it again", error);
+    status =
+        total >= 0.0 && total <= 3.0 * MESH_TRIANGLES_MAX
+            ? take_numbers(v, &connectivity, (size_t)total, &corners, error)
+            : malformed(v, "the offsets of its polygons are invalid; write the file again", error);
   }
   double from = 0.0;
   for (size_t p = 0; p < count && status == SUPINE_OK; ++p) {
     if (!(ends[p] >= from && ends[p] <= total)) {
-      status = malformed(v, "the offsets of its polygons are invalid; save it again", error);
+      status = malformed(v, "the offsets of its polygons are invalid; write the file again", error);
       break;
     }
     status =
@@ -286,7 +289,6 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   return status;
 }
 
-/* Read the head of the file, and find its only piece. */
 static supine_status read_head(vtp_file *v, element *piece, supine_error *error) {
   element root;
   element appended;
@@ -297,12 +299,12 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
     return malformed(v, "no VTKFile of type PolyData; save the surface as PolyData", error);
   }
   if (is_attribute(&root, "byte_order", "BigEndian")) {
-    return malformed(v, "big-endian VTP is not read; save it as PLY", error);
+    return malformed(v, "big-endian VTP is not supported; save the surface as PLY", error);
   }
   v->header_size = is_attribute(&root, "header_type", "UInt64") ? 8 : 4;
   v->compressed = attribute(&root, "compressor", compressor, sizeof compressor);
   if (v->compressed && strcmp(compressor, "vtkZLibDataCompressor") != 0) {
-    return malformed(v, "its arrays are not compressed by zlib; save it as PLY", error);
+    return malformed(v, "its compressor is not zlib; save the surface as PLY", error);
   }
   if (find_element(root.body, v->end, "AppendedData", &appended)) {
     const char *mark = memchr(appended.body, '_', (size_t)(v->end - appended.body));
@@ -311,10 +313,10 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
   }
   const char *limit = v->appended != NULL ? v->appended : v->end;
   if (!find_element(root.body, limit, "Piece", piece)) {
-    return malformed(v, "no element Piece; save the surface again", error);
+    return malformed(v, "no element Piece; write the file again", error);
   }
   if (find_element(piece->body, limit, "Piece", &second)) {
-    return malformed(v, "it has several pieces; save it as one", error);
+    return malformed(v, "it has several Piece elements; save the surface as one piece", error);
   }
   return SUPINE_OK;
 }
@@ -357,13 +359,14 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
   if (!count_of(&piece, "NumberOfPoints", &count[0]) ||
       !count_of(&piece, "NumberOfPolys", &count[1]) ||
       !count_of(&piece, "NumberOfStrips", &count[2])) {
-    return malformed(&v, "its numbers of points and polygons are invalid; save it again", error);
+    return malformed(&v, "its numbers of points and polygons are invalid; write the file again",
+                     error);
   }
   if (count[2] > 0) {
     return malformed(&v, "it has strips of triangles; save single triangles", error);
   }
   if (count[0] > 0 && !find_array(&v, &piece, "Points", NULL, &points)) {
-    return malformed(&v, "no array of points; save the surface again", error);
+    return malformed(&v, "no array of points; write the file again", error);
   }
   if (count[0] > 0) {
     status = take_numbers(&v, &points, 3 * count[0], &mesh->vertices, error);
@@ -372,7 +375,7 @@ supine_status supine_mesh_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *d
     }
     mesh->vertex_count = count[0];
   }
-  for (size_t i = 0; i < 3 * count[0]; ++i) { /* round to single precision, as for all formats */
+  for (size_t i = 0; i < 3 * count[0]; ++i) {
     mesh->vertices[i] = (double)(float)mesh->vertices[i];
   }
   mesh_faces faces = {.path = file->path, .mesh = mesh};

@@ -23,8 +23,8 @@ static bool same_position(const double a[3], const double b[3]) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Keep the first vertex at each position, without gaps; return the number kept. Write the new index
- * of each old vertex to `remap`. `slots` is a hash table, initially all free_slot. */
+/* Remove all vertices but the first at each position, and return the number kept. Write the new
+ * index of each old vertex to `remap`. `slots` is a hash table, initially all free_slot. */
 static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t slot_count) {
   const size_t mask = slot_count - 1;
   double *vertices = mesh->vertices;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Choose the side of each label by --labels, by the labels present, or by their position. */
+/* Choose the side of each label: the left lung, the right lung, either or none. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +19,8 @@ static const struct {
 
 enum { CONVENTIONS = sizeof conventions / sizeof *conventions };
 
-/* Find the centre, mm, of all voxels of the side `wanted`; return false if there are none. */
+/* Find the centre of all voxels of the side `wanted`, mm; return false if no voxel has that
+ * side. */
 static bool centre_of(const supine_image *image, const labels_tally *tally, const uint8_t *side,
                       uint8_t wanted, double centre[3]) {
   double count = 0.0;
@@ -63,7 +64,7 @@ static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t 
   }
 }
 
-/* Parse labels such as "10+11", and set their sides. Return where they end, NULL if invalid. */
+/* Give the labels in a text such as "10+11" the side `value`. Return their end, NULL if invalid. */
 static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   for (;; ++at) {
     char *end;
@@ -79,7 +80,7 @@ static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   }
 }
 
-/* Parse a list such as "left=10+11,right=12" into `side`, all 0 before. Return false if invalid. */
+/* Parse a list such as "left=10+11,right=12" into `side`, initially 0; return false if invalid. */
 static bool read_sides(const char *wanted, uint8_t *side) {
   const char *at = wanted;
   bool seen[2] = {false, false};
@@ -97,8 +98,8 @@ static bool read_sides(const char *wanted, uint8_t *side) {
   }
 }
 
-/* Choose by the labels present: one label holds both lungs, two labels hold a lung each, and more
- * must be exactly those of a convention. Return false if they are not. */
+/* Choose by the labels present: a single label holds both lungs, two labels hold one lung each,
+ * and three or more must be exactly the labels of a convention. Return false if they are not. */
 static bool choose_by_presence(const supine_image *image, const labels_tally *tally, uint8_t *side,
                                const char **name) {
   size_t present[2] = {0, 0};
@@ -141,7 +142,7 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
   return false;
 }
 
-/* Set the side of each label as requested; set `name` to the convention used, if any. */
+/* Set the side of each label; set `name` to the convention used, if any. */
 static supine_status choose(const char *path, const supine_image *image, const labels_tally *tally,
                             const char *wanted, uint8_t *side, const char **name,
                             supine_error *error) {
@@ -169,8 +170,8 @@ static supine_status choose(const char *path, const supine_image *image, const l
   }
   if (!read_sides(labels, side)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "--labels takes one, lungmask, lobes, totalsegmentator, "
-                            "totalsegmentator-v1 or left=LABEL+...,right=LABEL+..., not '%s'",
+                            "--labels takes the word one, lungmask, lobes, totalsegmentator or "
+                            "totalsegmentator-v1, or left=LABEL+...,right=LABEL+..., not '%s'",
                             wanted);
   }
   return SUPINE_OK;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Average a mask over cubes aligned with its axes. Correct the cubes so that no two inside, and no
- * two outside, meet only in an edge or a corner: the surface is then a manifold [Latecki1995]. */
+/* Average a mask over cubes aligned with its axes. Fill cubes until no two cubes inside, and no two
+ * outside, meet only in an edge or a corner: the surface is then a manifold [Latecki1995]. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -54,8 +54,8 @@ static void average_rows(const labels_mask *mask, size_t m, double ratio, float 
   }
 }
 
-static const float half = 0.5F; /* least share of a cube that counts as inside */
-/* Shares are multiples of 1 / levels, so that all processors find the same cubes inside. */
+static const float half = 0.5F; /* a cube is inside if its share is at least this */
+/* Shares are rounded to multiples of 1 / levels, so that they are equal on all processors. */
 static const float levels = 65536.0F;
 
 /* If only two opposite cubes of the four around an edge are inside, fill the fuller of the other

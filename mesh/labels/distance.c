@@ -12,7 +12,7 @@ static const float far_away = 1e30F; /* squared distance in a row without voxels
 
 typedef struct sweep {
   const labels_mask *mask;
-  bool zero; /* whether the set is the zero voxels, else the nonzero voxels */
+  bool zero; /* whether zero voxels, rather than nonzero voxels, form the set */
   float *squares;
   int axis;
   size_t length; /* larger of the mask's size[1] and size[2] */
@@ -41,9 +41,9 @@ static void along_rows(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Replace the n values f(x), `stride` apart in `line`, by the minimum over y of (x - y)^2 + f(y).
- * Work space: v, the y of each parabola in the envelope; z, where it begins, mm; f, the old
- * values. */
+/* Replace the n values f(x), `stride` apart in `line`, by the minimum over y of (x - y)^2 +
+ * f(y). Work space: v, the index y of each parabola in the envelope; z, the x from which that
+ * parabola is lowest, mm; f, the old values. */
 static void envelope(float *line, size_t n, size_t stride, double step, double *v, double *z,
                      double *f) {
   size_t last = 0;

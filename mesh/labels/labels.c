@@ -14,10 +14,10 @@ static const double least_edge = 0.2;           /* mm; makes some ten million ve
 static const double most_edge = 20.0;           /* mm; larger cubes leave little of a lung */
 static const double most_closing_radius = 20.0; /* mm */
 static const double least_volume = 1.0;         /* mL */
-static const double longest_lung = 1000.0;      /* mm; a longer lung must have a wrong voxel size */
+static const double longest_lung = 1000.0; /* mm; if a lung seems longer, the voxel size is wrong */
 
 typedef struct work {
-  const char *path; /* first file, for messages */
+  const char *path; /* path of the first file, for messages */
   const supine_labels_options *options;
   supine_labels_report *report;
   double edge;
@@ -26,7 +26,6 @@ typedef struct work {
   bool doubted; /* whether the left lung does not lie left of the right lung */
 } work;
 
-/* Report progress. Return SUPINE_ERROR_INTERRUPTED if the caller asks to stop. */
 static supine_status advance(work *w, double fraction, supine_error *error) {
   const supine_labels_options *options = w->options;
   return options->progress == NULL || options->progress(options->progress_context, fraction)
@@ -59,7 +58,6 @@ static bool same_frame(const supine_image *a, const supine_image *b) {
   return true;
 }
 
-/* Read an image in the axes requested. */
 static supine_status read_image(const work *w, const char *path, supine_image *image,
                                 supine_error *error) {
   const supine_status status = supine_image_read(path, image, error);
@@ -82,7 +80,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
     status = f == 0 ? SUPINE_OK : read_image(w, paths[f], &next, error);
     if (status == SUPINE_OK && !same_frame(&w->image, image)) {
       status = supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: differs in size or frame from %s: give masks of one scan",
+                                "%s: size, position or axes differ from %s: give masks of one scan",
                                 paths[f], paths[0]);
     }
     for (size_t i = 0; i < voxels && status == SUPINE_OK; ++i) {
@@ -97,7 +95,8 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
   return status;
 }
 
-/* Copy the box of the lungs from the map; its voxels are 0, LABELS_LEFT, _RIGHT or _EITHER. */
+/* Copy the box of the lungs to w->both; voxels become 0, LABELS_LEFT, LABELS_RIGHT or
+ * LABELS_EITHER. */
 static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t *side,
                                supine_error *error) {
   size_t low[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
@@ -114,7 +113,7 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
   return SUPINE_OK;
 }
 
-/* Return whether a lung's box reaches a face of the image, where the lung is cut off. */
+/* Return whether a lung's box reaches the border of the image, which probably cuts the lung off. */
 static bool is_cut(const work *w, const labels_mask *lung, size_t margin) {
   bool cut = false;
   for (int a = 0; a < 3; ++a) {
@@ -207,7 +206,7 @@ static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mas
   }
 }
 
-/* Close gaps as requested, keep the largest piece, and fill its cavities. */
+/* Close gaps up to the width in the options, keep the largest piece, and fill its cavities. */
 static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);
@@ -293,7 +292,7 @@ static supine_status refuse_sides(const work *w, const supine_mesh *surfaces, su
       w->path, report->taken,
       found.axes == SUPINE_AXES_LPS
           ? "Exchange the labels, --labels left=...,right=..., or correct the axes with --axes"
-          : "Their shape fits other axes: if the labels are correct, add --axes ",
+          : "The lungs' shape fits other axes: if the labels are correct, add --axes ",
       found.axes == SUPINE_AXES_LPS ? "" : letters);
 }
 

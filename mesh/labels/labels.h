@@ -8,7 +8,7 @@
 
 #include "mesh/mesh.h"
 
-/** Default distance between vertices, mm: some 100,000 vertices in two adult lungs. */
+/** Default distance between vertices, mm, which gives some 100,000 vertices in two adult lungs. */
 #define SUPINE_LABELS_EDGE 2.0
 
 typedef struct supine_labels_options {
@@ -18,7 +18,7 @@ typedef struct supine_labels_options {
   const char *labels;
   supine_axes axes; /**< axes of the header's coordinates; AUTO for those that the header names */
   double edge;      /**< approximate distance between vertices, mm; 0 for SUPINE_LABELS_EDGE */
-  double close;     /**< radius of closing, mm, which fills gaps up to twice as wide; 0 for none */
+  double close;     /**< gaps up to twice this width are closed, mm; 0 for none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
@@ -42,11 +42,11 @@ typedef struct supine_labels_lung {
 typedef struct supine_labels_report {
   size_t size[3];
   double spacing[3];  /**< distances between voxels, mm */
-  char axes[64];      /**< "i to the left, j to the back, k to the head" */
+  char axes[64];      /**< such as "i to the left, j to the back, k to the head" */
   const char *source; /**< header field that gives origin and steps, such as "sform" */
   bool frames_differ; /**< whether qform and sform of a NIfTI header differ */
-  char taken[256];    /**< labels of each side: "2 left; 1 right (convention lungmask)" */
-  double neck;        /**< width of the neck where lungs were split, mm; 0 if they were apart */
+  char taken[256];    /**< labels of each side, such as "2 left; 1 right (convention lungmask)" */
+  double neck; /**< width of the bridge cut between touching lungs, mm; 0 if they did not touch */
   size_t lung_count;
   supine_labels_lung lung[2]; /**< the left lung first if there are two */
   supine_axes coordinates;    /**< axes assumed for the header's coordinates */
@@ -59,7 +59,7 @@ typedef struct supine_labels_report {
  * cubes with sides of `edge` along the map's axes. Cubes at least half filled are inside. Cubes are
  * corrected so that no two inside, and no two outside, meet only in an edge or a corner, which
  * makes the surface net [Gibson1998] a closed manifold. The net is smoothed without shrinking
- * [Taubin1995], each vertex within its cell.
+ * [Taubin1995]; each vertex stays between the centres of eight neighbouring cubes.
  *
  * @param surfaces  [2] zero-initialised; surface i is that of report->lung[i] and faces outwards
  * @retval SUPINE_ERROR_ARGUMENT  an edge, closing distance or list of labels that is invalid
@@ -68,8 +68,8 @@ typedef struct supine_labels_report {
  *             large
  * @retval SUPINE_ERROR_FORMAT    voxels that are not labels, images that differ in size or frame
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and the statuses of supine_image_read
- * Memory: the map and 1 byte per voxel; per voxel of the lungs' box 10 bytes more to split lungs,
- * and 4 more to close gaps. */
+ * Memory: the map and 1 byte per voxel. To split lungs takes 10 bytes more per voxel of the lungs'
+ * box, to close gaps 4 bytes more. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);

@@ -58,7 +58,7 @@ static bool read_row(const supine_image *image, size_t row, uint16_t *labels, do
   return true;
 }
 
-/* Add the voxels of one row to the tally of each label, run by run. */
+/* Add the voxels of one row to the tallies of their labels. */
 static void count_row(const supine_image *image, size_t row, const uint16_t *labels,
                       labels_tally *tally) {
   const size_t size = image->size[0];
@@ -139,7 +139,7 @@ supine_status supine_labels_mask_cut(const supine_image *image, const size_t low
   for (size_t k = low[2]; k <= high[2]; ++k) {
     for (size_t j = low[1]; j <= high[1]; ++j) {
       double bad;
-      (void)read_row(image, j + image->size[1] * k, row, &bad); /* checked by supine_labels_count */
+      (void)read_row(image, j + image->size[1] * k, row, &bad);
       uint8_t *out = mask->at + margin +
                      mask->size[0] * (j - low[1] + margin + mask->size[1] * (k - low[2] + margin));
       for (size_t i = low[0]; i <= high[0]; ++i) {

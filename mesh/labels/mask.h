@@ -18,7 +18,7 @@ typedef struct labels_mask {
   uint8_t *at;       /**< [size[2], size[1], size[0]] values */
 } labels_mask;
 
-enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* values of a mask of both lungs */
+enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* EITHER: not yet split */
 
 /* ---- mask.c ---- */
 size_t supine_labels_mask_count(const labels_mask *mask);
@@ -51,11 +51,11 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
                                   supine_error *error);
 
 typedef struct labels_choice {
-  char *taken;  /**< [256] output: labels of each side (supine_labels_report) */
+  char *taken;  /**< [256] output, as in supine_labels_report */
   bool doubted; /**< whether the left lung does not lie left of the right lung */
 } labels_choice;
 
-/** Choose the side of each label by `wanted`, the `labels` of supine_labels_options.
+/** Choose the side of each label as `wanted`, the field `labels` of supine_labels_options, says.
  * @param side     [LABELS_MAX] output: 0, LABELS_LEFT, LABELS_RIGHT or LABELS_EITHER */
 supine_status supine_labels_choose(const char *path, const supine_image *image,
                                    const labels_tally *tally, const char *wanted, uint8_t *side,
@@ -85,11 +85,11 @@ typedef struct labels_pieces {
   size_t run_count;
   size_t *row;         /**< [rows + 1] index of the first run of each row of voxels */
   labels_run *run;     /**< [run_count] runs of all rows, in order */
-  labels_piece *piece; /**< [run_count] piece[r] is the piece whose first run is r; 0 if none */
+  labels_piece *piece; /**< [run_count] pieces, at the index of each piece's first run */
   size_t piece_count;
 } labels_pieces;
 
-/** Find the pieces of zero voxels or, if `zero` is false, of nonzero voxels. */
+/** Find the pieces of zero voxels if `zero` is true, otherwise the pieces of nonzero voxels. */
 supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, labels_pieces *pieces);
 void supine_labels_pieces_free(labels_pieces *pieces);
 /** If `zero` is false, set all pieces of nonzero voxels except the largest to 0. Otherwise fill the
@@ -101,7 +101,7 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
 /* ---- distance.c ---- */
 
 /** Compute the squared distance, mm^2, from the centre of every voxel to the centre of the nearest
- * zero voxel or, if `zero` is false, nonzero voxel. The steps are assumed to be orthogonal.
+ * zero voxel or, if `zero` is false, nonzero voxel. The steps must be orthogonal.
  * @param squares  [size] output */
 supine_status supine_labels_distance(const labels_mask *mask, bool zero, float *squares);
 /** Close the mask: fill all voxels that no ball of this radius, mm, can reach without entering the
@@ -112,7 +112,7 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
 /* ---- split.c ---- */
 
 /** Replace LABELS_EITHER by LABELS_LEFT or LABELS_RIGHT.
- * @param neck  output: width of the neck at which the lungs were split, mm; 0 if they were apart
+ * @param neck  output: width of the bridge cut between the lungs, mm; 0 if they did not touch
  * @retval SUPINE_ERROR_MESH  one lung, or two that cannot be separated */
 supine_status supine_labels_split(const char *path, labels_mask *both, double *neck,
                                   supine_error *error);
@@ -135,8 +135,7 @@ void supine_labels_cubes_free(labels_cubes *cubes);
 
 /* ---- net.c ---- */
 
-/** Make the surface of a mask by a surface net of cubes of `edge` mm, and smooth it, keeping each
- * vertex within its cell.
+/** Make the surface of a mask: a surface net on cubes with edges of `edge` mm, smoothed.
  * @param one  whether to keep only the largest piece and fill its cavities */
 supine_status supine_labels_mask_surface(const labels_mask *mask, double edge, bool one,
                                          supine_mesh *mesh);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Make the surface of a mask as a surface net [Gibson1998]: a vertex in each cell that the surface
- * runs through, and a quadrilateral between neighbouring cubes of which only one is inside. */
+/* Make the surface of a mask as a surface net [Gibson1998]: a vertex between eight neighbouring
+ * cubes if only some are inside, and a quadrilateral between two neighbours if only one is
+ * inside. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,7 +19,7 @@ typedef struct surface_net {
   double (*at)[3];          /* [count] position of the vertex in its cell, 0 to 1 along each axis */
   uint32_t (*neighbour)[6]; /* [count] vertices across the cell's faces -x, +x, -y, ..., or NONE */
   size_t quad_count;
-  uint32_t (*quad)[4]; /* corners; quads face outwards if the map's axes are right-handed */
+  uint32_t (*quad)[4]; /* vertices; quads face outwards if the map's axes are right-handed */
 } surface_net;
 
 static const float half = 0.5F;
@@ -26,12 +27,12 @@ static const float half = 0.5F;
 typedef struct build {
   const labels_cubes *cubes;
   size_t stride[3]; /* index step from a cube to the next along each axis */
-  uint32_t *vertex; /* [cubes] vertex of the cell whose first cube this is, if it has one */
+  uint32_t *vertex; /* [cubes] vertex of the cell whose first cube this is, if there is a vertex */
   surface_net *net;
 } build;
 
-/* Find the mean of the points where the surface crosses edges of the cell, 0 to 1 along each axis;
- * return false if there are none. */
+/* Find the mean of the points where the surface crosses the edges of a cell, 0 to 1 along each
+ * axis. Return false if it crosses none. */
 static bool crossing(const build *b, size_t cell, double mean[3]) {
   const float *share = b->cubes->share;
   double sum[3] = {0.0, 0.0, 0.0};
@@ -169,8 +170,8 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
   return SUPINE_OK;
 }
 
-/* Factors of the smoothing. Their pass band, 1 / 0.5 - 1 / 0.51 = 0.04, keeps waves longer than
- * some 16 cubes and removes the steps between slices. */
+/* Factors of smoothing by shrinking and inflation. Their pass band, 1 / 0.5 - 1 / 0.51 = 0.04,
+ * keeps waves longer than some 16 cubes and removes the steps between slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
 enum { TURNS = 40 }; /* number of times that the net is shrunk and inflated */
@@ -212,7 +213,6 @@ static supine_status relax(surface_net *net) {
   return SUPINE_OK;
 }
 
-/* Compute the position of a vertex in voxels of the mask. */
 static void in_voxels(const surface_net *net, const labels_cubes *cubes, size_t vertex,
                       double voxel[3]) {
   for (size_t a = 0; a < 3; ++a) {
@@ -221,7 +221,6 @@ static void in_voxels(const surface_net *net, const labels_cubes *cubes, size_t 
   }
 }
 
-/* Cut the net into triangles, and convert it to mm. */
 static supine_status make_mesh(const surface_net *net, const labels_cubes *cubes,
                                const labels_mask *mask, supine_mesh *mesh) {
   const bool turned = supine_triple(mask->step[0], mask->step[1], mask->step[2]) < 0.0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Find pieces of voxels that share faces, by runs along the rows. */
+/* Find connected pieces, whose voxels share faces, by joining runs of voxels in rows. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -121,7 +121,7 @@ supine_status supine_labels_keep_one(labels_mask *mask, bool zero, size_t *other
   if (status != SUPINE_OK) {
     return status;
   }
-  uint32_t kept = 0; /* first run of the piece to keep; for zeros, run 0, in the margin */
+  uint32_t kept = 0; /* first run of the piece to keep; among zero voxels, run 0, in the margin */
   for (size_t r = 1; !zero && r < pieces.run_count; ++r) {
     kept = pieces.piece[r].count > pieces.piece[kept].count ? (uint32_t)r : kept;
   }

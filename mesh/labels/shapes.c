@@ -8,8 +8,8 @@
 
 enum { PARTS_MAX = 256 }; /* an image with more labels is probably no label map */
 
-/* In large parts, vertices are this multiple of the cube root of the volume apart, which gives
- * 15,000 vertices in a lobe. */
+/* Distance between the vertices of a large part, divided by the cube root of its volume; a lobe
+ * gets 15,000 vertices. */
 static const double edge_share = 0.02;
 
 /* Make the surface of one label.
@@ -32,7 +32,6 @@ static supine_status make_part(const supine_image *image, const labels_tally *ta
   return status;
 }
 
-/* List the labels to make surfaces of; refuse a label without voxels. */
 static supine_status choose(const char *path, const labels_tally *tally, const unsigned *wanted,
                             size_t wanted_count, supine_labels_shape *parts, size_t *count,
                             supine_error *error) {
@@ -49,7 +48,8 @@ static supine_status choose(const char *path, const labels_tally *tally, const u
     if (tally[label].count > 0 && *count == PARTS_MAX) {
       return supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "%s: more than %d labels: if it is a label map, name the labels to use", path, PARTS_MAX);
+          "%s: more than %d labels: if this is a label map, name the labels to use", path,
+          PARTS_MAX);
     }
     if (tally[label].count > 0) {
       parts[(*count)++].label = label;

@@ -12,8 +12,8 @@ typedef struct supine_labels_shape {
 } supine_labels_shape;
 
 /** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz, .mha), as supine_labels_surfaces
- * does, but with all pieces and cavities. Vertices are about one voxel apart; in large parts, 1/50
- * of the cube root of their volume.
+ * does, but with all pieces and cavities. Vertices are about one voxel apart; in a large part, 1/50
+ * of the cube root of the part's volume.
  * @param wanted  [wanted_count] labels, 1 to 65535; all labels present if the count is 0
  * @param parts   [*count] output in the order of `wanted`, or by label; release with
  *             supine_labels_shapes_free

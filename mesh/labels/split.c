@@ -7,13 +7,13 @@
 
 #include "mesh/labels/mask.h"
 
-/* Smallest ratio of the smaller lung's volume to the larger lung's volume. */
+/* Smallest accepted ratio of the smaller lung's volume to the larger lung's volume. */
 static const double least_share = 0.1;
-/* Widest neck between lungs that is cut, mm. */
+/* Widest bridge between touching lungs that is cut, mm. */
 static const double widest_neck = 40.0;
 
 typedef struct pair {
-  uint32_t piece[2]; /* first run of each piece, left piece first */
+  uint32_t piece[2]; /* index of each piece's first run, left piece first */
 } pair;
 
 /* Find the two largest pieces. Return false unless they lie side by side along x and the smaller
@@ -59,7 +59,7 @@ static void erode(const labels_mask *both, const float *squares, double depth, u
   }
 }
 
-/* Mark the voxels of the pair as LABELS_LEFT and LABELS_RIGHT, all others as 0. */
+/* Mark the voxels of two pieces as LABELS_LEFT and LABELS_RIGHT, all others as 0. */
 static void mark_pair(const labels_mask *mask, const labels_pieces *pieces, const pair *found,
                       uint8_t *marks) {
   memset(marks, 0, supine_labels_mask_count(mask));

@@ -12,8 +12,8 @@
 
 #include "precompute/inside/biharmonic.h"
 
-/* AFFINE: number of affine terms. COLUMNS: columns of the matrix that are eliminated together.
- * POINTS, CENTRES: points and centres that are evaluated together. */
+/* AFFINE: number of affine terms. COLUMNS: number of matrix columns that are eliminated
+ * together. POINTS, CENTRES: numbers of points and centres that are evaluated together. */
 enum { AFFINE = 4, COLUMNS = 128, POINTS = 32, CENTRES = 64 };
 
 /* Set `middle` to the middle of the points' box, and `unit` to half its diagonal. */
@@ -75,7 +75,7 @@ SUPINE_CLONES static supine_status choose(size_t count, const double *points, si
  *
  *     K_ij = alpha - |p_i - p_j|,    alpha > 2
  *
- * For weights with sum 0, alpha cancels: K gives the same result as the matrix of -|p_i - p_j|. */
+ * It may replace the matrix of -|p_i - p_j|, because alpha cancels for weights whose sum is 0. */
 typedef struct kernel {
   size_t size;
   double *matrix; /* [size, size], the lower triangle column by column */
@@ -91,8 +91,8 @@ SUPINE_CLONES static void fill(const double *c, const kernel *k) {
   }
 }
 
-/* Subtract the products of the COLUMNS columns eliminated last from the columns after them. Long
- * and short blocks alternate, so that threads get equal work. */
+/* Cholesky step: subtract the products of the COLUMNS columns eliminated last from all later
+ * columns. Long and short blocks alternate, so that threads get equal work. */
 static void update_blocks(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const kernel *k = context;
@@ -237,7 +237,7 @@ typedef struct evaluation {
   size_t count;
 } evaluation;
 
-/* Add the terms of centres [first, last) to the values of the first point_count of the points x. */
+/* Add the terms of the centres first <= j < last to the values of point_count points x. */
 SUPINE_CLONES static void add_centres(const supine_inside_biharmonic *fit, size_t first,
                                       size_t last, const double (*x)[POINTS], size_t point_count,
                                       double *values) {

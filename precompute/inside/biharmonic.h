@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file The biharmonic interpolation of values at points p_j, several columns of values at once:
+/** @file Biharmonic interpolation: the function u with given values at points p_j,
  *
  *     u(x) = sum over j of w_j |x - p_j|  +  a + B x,    sum w_j = 0, sum w_j p_j = 0
  *
- * Among all functions through the values, it minimises the integral over space of the squared
- * second derivatives. It reproduces affine functions. */
+ * whose w_j, a and B follow from the values. Among all functions with these values, u minimises the
+ * integral over space of the squared second derivatives. Affine functions are reproduced. */
 #ifndef SUPINE_INSIDE_BIHARMONIC_H
 #define SUPINE_INSIDE_BIHARMONIC_H
 
@@ -18,10 +18,10 @@ typedef struct supine_inside_biharmonic {
   size_t columns;   /**< number of values per point, R */
   size_t *chosen;   /**< [M] indices of the centres among the points, in order of choice */
   double *centres;  /**< [M, 3] positions relative to `middle`, divided by `unit` */
-  double *weights;  /**< [R, M + 4] weights of the centres, then of 1, x, y, z */
+  double *weights;  /**< [R, M + 4] factors of the distances from centres, then of 1, x, y, z */
   double middle[3]; /**< centre of the points' box, mm */
   double unit;      /**< half the diagonal of the points' box, mm */
-  double spacing;   /**< largest distance of a point from the nearest centre, mm */
+  double spacing;   /**< largest distance of any point from the centre nearest to it, mm */
 } supine_inside_biharmonic;
 
 /** Choose at most `centre_max` of the points as centres, each as far as possible from the earlier

@@ -63,7 +63,7 @@ supine_status supine_inside_content_points(const char *path,
   return status;
 }
 
-/* Find a mesh's name in its path, such as "airways" in "/scans/airways.ply", and its length. */
+/* Find the name and its length in a mesh's path, such as "airways" in "/scans/airways.ply". */
 static const char *part_name(const char *path, size_t *length) {
   const char *slash = strrchr(path, '/');
   const char *name = slash != NULL ? slash + 1 : path;

@@ -11,8 +11,7 @@
 typedef struct supine_inside_content {
   size_t count;
   double *points; /**< [count, 3] mm, LPS */
-  uint32_t *part; /**< [count] index of the point's part; in a grid, of its node (i, j, k): i +
-                     size[0] (j + size[1] k) */
+  uint32_t *part; /**< [count] index of the part; in a grid, of the node as a voxel of `grid` */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] indices of points */
   size_t part_count;   /**< number of named parts; 0 for a grid */
@@ -27,8 +26,8 @@ supine_status supine_inside_content_points(const char *path,
                                            const supine_mesh_load_options *options,
                                            supine_inside_content *content, supine_error *error);
 
-/** Append a mesh as one part, named after its file.
- * @retval as supine_mesh_load */
+/** Append a mesh as one part, named after its file; for options and statuses see
+ * supine_mesh_load. */
 supine_status supine_inside_content_mesh(const char *path, const supine_mesh_load_options *options,
                                          supine_inside_content *content, supine_error *error);
 
@@ -44,13 +43,12 @@ supine_status supine_inside_content_surface(const char *name, const supine_mesh 
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);
 
-/** Make a grid of all nodes inside the lungs, and of the nodes outside that are nearer than about a
- * cell's diagonal, so that every point inside lies between nodes.
+/** Make a grid of all nodes inside the lungs, and of the nodes outside whose distance is less than
+ * the sum of a cell's three edges, so that every point inside lies between nodes.
  *
  * @param like     image of which every n-th voxel along each axis is a node; NULL for axes x, y, z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
- * @param margin   distance, mm, by which the grid extends beyond the lungs' box, for the field to
- *             fade out
+ * @param margin   distance, mm, by which the grid extends beyond the lungs' box
  * @param content  zero-initialised
  * @retval SUPINE_ERROR_ARGUMENT  a spacing that is not positive, more than 2^31 nodes
  * @retval SUPINE_ERROR_MESH      no node is inside a lung

@@ -143,7 +143,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
     return status;
   }
   double diagonal = 0.0;
-  for (int k = 0; k < 3; ++k) { /* upper bound: the sum of a cell's edges */
+  for (int k = 0; k < 3; ++k) { /* upper bound: the sum of a cell's three edges */
     diagonal += supine_length(grid.step[k]);
   }
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];

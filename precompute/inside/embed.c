@@ -19,17 +19,17 @@ typedef struct embedding {
   const supine_inside_shells *shells;
   const supine_inside_content *content;
   const supine_inside_options *options;
-  size_t columns;             /* values per point: 3 K for K modes */
+  size_t columns;             /* numbers for each point: 3 K for K modes */
   supine_inside_place *place; /* [N] place of each point in its lung, in the content's order */
   unsigned char *lung;        /* [N] lung of each point, in the content's order */
   size_t *order;              /* [N] indices of the content's points, lung by lung */
-  float *vertices;      /* [N, 3] at full inflation, mm; this and the arrays below follow `order` */
-  float *coefficients;  /* [N, 3, K] displacement by each mode, mm */
-  float *depth;         /* [N] mm below the surface */
-  uint32_t *part;       /* [N] index of the part */
-  unsigned char *group; /* [N] index of the lung */
-  uint32_t *triangles;  /* [M, 3] indices of vertices */
-  uint32_t *rigid;      /* [rigid_count, 2] each rigid part has the vertices begin <= i < end */
+  float *vertices;            /* [N, 3] at full inflation, mm; sorted, like all below, by `order` */
+  float *coefficients;        /* [N, 3, K] displacement by each mode, mm */
+  float *depth;               /* [N] mm below the surface; negative outside */
+  uint32_t *part;             /* [N] index of the part */
+  unsigned char *group;       /* [N] index of the lung */
+  uint32_t *triangles;        /* [M, 3] indices of vertices */
+  uint32_t *rigid; /* [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
 } embedding;
 
@@ -109,7 +109,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
   return SUPINE_OK;
 }
 
-/* Find the displacement by each mode at a place on the surface, interpolated in its triangle. */
+/* Interpolate the displacement by each mode at place->nearest from the corners of its triangle. */
 static void surface_motion(const embedding *e, const supine_inside_shell *shell,
                            const double *displacement, const supine_inside_place *place,
                            double *motion) {
@@ -122,7 +122,7 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
   }
 }
 
-/* Compute vertices [begin, end) at full inflation: positions in the scan less displacements. */
+/* Compute vertices begin <= i < end at full inflation from displacements `values` by each mode. */
 static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
                            const double *values) {
   const size_t modes = e->columns / 3;
@@ -138,13 +138,12 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
   }
 }
 
-/* Find the displacements of the points [begin, end) of `order`, at most BLOCK, all of one lung. All
- * eight parameters describe one block and its work space.
- * @param space  positions of 2 BLOCK points, then values of 2 BLOCK + 1 points: first the given
- *             ones, then the surface points nearest to those within `reach` of the surface */
-static void move_block(embedding *e, const supine_inside_shell *shell, const double *displacement,
+/* Find the displacements of the points begin <= i < end of `order`, at most BLOCK, all in one lung.
+ * @param space  work space: positions of 2 BLOCK points, then values of 2 BLOCK + 1 points */
+static void move_block(embedding *e, const double *displacement,
                        const supine_inside_biharmonic *fit, double reach, size_t begin, size_t end,
                        double *space) {
+  const size_t lung = e->group[begin];
   double *positions = space;
   double *values = space + (size_t)6 * BLOCK;
   const size_t count = end - begin;
@@ -171,7 +170,7 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
     const double weight = (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t);
     const double *at_surface = values + (count + j) * e->columns;
     double *value = values + near[j] * e->columns;
-    surface_motion(e, shell, displacement, place, motion);
+    surface_motion(e, &e->shells->shell[lung], displacement, place, motion);
     for (size_t r = 0; r < e->columns; ++r) {
       value[r] += weight * (motion[r] - at_surface[r]);
     }
@@ -179,12 +178,12 @@ static void move_block(embedding *e, const supine_inside_shell *shell, const dou
   for (size_t i = 0; i < count * e->columns; ++i) {
     e->coefficients[begin * e->columns + i] = (float)values[i];
   }
-  points_to_full(e, (size_t)(shell - e->shells->shell), begin, end, values);
+  points_to_full(e, lung, begin, end, values);
 }
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
                                 supine_error *error) {
-  static const double reach_spacings = 2.0; /* ratio of reach to (centres' spacing + mean edge) */
+  static const double reach_spacings = 2.0; /* reach (embed.h) / (centres' spacing + mean edge) */
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
@@ -203,7 +202,7 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
                                         displacement, centres, &fit, error);
   const double reach = reach_spacings * (fit.spacing + shell->edge);
   for (size_t at = begin; at < end && status == SUPINE_OK; at += BLOCK) {
-    move_block(e, shell, displacement, &fit, reach, at, at + BLOCK < end ? at + BLOCK : end, space);
+    move_block(e, displacement, &fit, reach, at, at + BLOCK < end ? at + BLOCK : end, space);
   }
 cleanup:
   supine_inside_biharmonic_free(&fit);
@@ -212,9 +211,9 @@ cleanup:
   return status;
 }
 
-/* Find a rigid part at full inflation: its shape in the scan, rotated and shifted so that the field
- * at the weights of the scan moves it back. The rotation is found by iteration, because the
- * rotation by the field depends on it. */
+/* Find a rigid part at full inflation: its shape in the scan, rotated and shifted so that the
+ * displacement in the scan moves it back there. The rotation is found by iteration, because the
+ * rotation by the displacement depends on it. */
 static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
@@ -230,7 +229,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double *scan = e->content->points + 3 * e->order[i];
       double p[3];
-      for (size_t a = 0; a < 3; ++a) { /* transposed rotation of (position in the scan - mean) */
+      for (size_t a = 0; a < 3; ++a) { /* rotate by the transpose of r */
         p[a] = r[a] * (scan[0] - given[0]) + r[3 + a] * (scan[1] - given[1]) +
                r[6 + a] * (scan[2] - given[2]);
       }
@@ -247,7 +246,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Return whether metadata with this key describes the surface, but not its content. */
+/* Return whether metadata with this key describes the surface and is not valid for its content. */
 static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};
@@ -293,7 +292,6 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
 }
 
 static supine_status write_content(const embedding *e, const char *path, supine_error *error) {
-  /* Tensors that the surface and its content share. */
   static const char *const shared[] = {"modes", "volume_linear", "volume_quadratic", "volume_cubic",
                                        "resting_volume"};
   const supine_inside_content *content = e->content;

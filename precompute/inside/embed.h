@@ -1,29 +1,30 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file Embed content in the lungs so that it moves with them. A point's displacement is the
  * biharmonic interpolation of its lung's surface displacement (biharmonic.h), mode by mode. The
- * result is a basis of kind vector with the modes, volume forms and metadata of the surface's
- * basis; the same weights and gains apply to both.
+ * result is a basis of the kind "vector", with the modes, volume tensors and metadata of the
+ * surface's basis, so that the weights and gains of a pose apply to both.
  *
- * Near the surface, the residual of the interpolation b on the surface is added:
+ * The displacement u of a point x near the surface is the interpolation b, corrected by the error
+ * of b at the surface point q nearest to x:
  *
  *     u(x) = b(x) + (1 - t)^2 (1 + 2 t) (s(q) - b(q)),    t = |x - q| / reach < 1
  *
- * where q is the surface point nearest to x, s(q) its displacement (linear in a triangle), and
- * reach is twice the sum of the centres' spacing and the mean edge. So points on the surface move
- * exactly with the surface, although only some vertices are centres of b.
+ * where s(q) is the displacement of q (linear in a triangle), and reach is twice the sum of the
+ * centres' spacing and the mean edge. So points on the surface move exactly with the surface,
+ * although only some vertices are centres of b.
  *
  * A rigid part belongs to the lung with most of its vertices (runtime/rigid.h).
  *
- * Content, x and q are given in the scan. The file holds the content at full inflation, as a basis
- * holds the surface: x minus u at the scan's weights and gains. */
+ * Content is given as it is in the scan. The file holds it at full inflation, as a basis holds the
+ * surface: each position x minus u(x) at the scan's weights and gains. */
 #ifndef SUPINE_INSIDE_EMBED_H
 #define SUPINE_INSIDE_EMBED_H
 
 #include "precompute/inside/content.h"
 #include "precompute/inside/shells.h"
 
-/** Default largest number of centres per lung, which are chosen from its vertices. On two lungs of
- * 20,000 vertices with a spreading length of 10 mm (--reach), the error is 0.2 % of the
+/** Default largest number of vertices of a lung that are centres of the interpolation. On two lungs
+ * of 20,000 vertices with a spreading length of 10 mm (--reach), the error is 0.2 % of the
  * displacement at vertices that are no centres, and 0.05 % inside; this takes a few seconds. */
 enum { SUPINE_INSIDE_CENTRES = 4000 };
 
@@ -35,7 +36,7 @@ typedef struct supine_inside_options {
 
 typedef struct supine_inside_report {
   size_t count;                     /**< number of points in the file */
-  size_t in_lung[SUPINE_LUNGS_MAX]; /**< number of points in each lung or nearest to it */
+  size_t in_lung[SUPINE_LUNGS_MAX]; /**< number of points in or nearest to each lung */
   size_t outside;                   /**< number of points outside every lung */
   size_t farthest;    /**< index of the outside point that is farthest from the lungs */
   double farthest_mm; /**< distance of that point from the lungs, mm */

@@ -24,7 +24,7 @@ typedef struct supine_inside_shells {
   const supine_basis *basis; /**< owned by the caller; must outlive the shells */
   size_t count;
   supine_inside_shell shell[SUPINE_LUNGS_MAX];
-  supine_pose scan; /**< the scan's state, in which content is given */
+  supine_pose scan; /**< pose in the scan, in which content is given */
 } supine_inside_shells;
 
 /** Extract each lung's surface as it is in the scan.
@@ -37,15 +37,15 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                                           supine_error *error);
 void supine_inside_shells_free(supine_inside_shells *shells);
 
-/** Find the displacements of a lung's vertices by each of the K modes, at weight 1 and gain 1.
+/** Find the displacement of each vertex of a lung by each of the K modes, at weight 1 and gain 1.
  * @param displacement  [vertex_count, 3, K] output, mm */
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);
 
-/** State of a search for successive nearby points: the last place found in each lung. */
+/** Memory of a search for successive nearby points: a place found before in each lung. */
 typedef struct supine_inside_walk {
   bool known[SUPINE_LUNGS_MAX];
-  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< place of an earlier point */
+  supine_inside_place place[SUPINE_LUNGS_MAX]; /**< [lung] place of an earlier point */
   size_t lung;                                 /**< lung found for the last point */
 } supine_inside_walk;
 

@@ -12,8 +12,8 @@
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
-/* A dipole replaces the triangles of a box farther away than this, in radii of the box. The winding
- * number, whose threshold is 0.5, then errs by less than 0.01. */
+/* Distance of a box, in radii of the box, beyond which a dipole replaces its triangles. The
+ * error of the winding number, which is compared with 0.5, is then less than 0.01. */
 static const double dipole_distance = 2.0;
 /* Points nearer than this, mm, count as on the surface, as positions are in float32. */
 static const double on_surface = 1e-3;
@@ -238,19 +238,19 @@ void supine_inside_surface_destroy(supine_inside_surface *surface) {
   }
 }
 
-/* Find the point of an edge that is nearest to x. Return its place: 0 at the start of the edge to 1
- * at its end. `offset` leads from the start to x. */
+/* Find where on an edge the point nearest to x lies: 0 at the start to 1 at the end. `offset` leads
+ * from the start to x. */
 static double along(const double offset[3], const double edge[3]) {
   const double length = supine_dot(edge, edge);
   const double t = length > 0.0 ? supine_dot(offset, edge) / length : 0.0;
   return t > 1.0 ? 1.0 : t > 0.0 ? t : 0.0;
 }
 
-/* Find the barycentric coordinates b of the triangle's point nearest to x. Return false, with b
- * undefined, if its squared distance from x must exceed `best`. */
+/* Find the barycentric coordinates b of the point nearest to x in a triangle. Return false, with b
+ * undefined, if its squared distance from x certainly exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  static const double slender = 1e-4; /* squared sine of an angle below which b is inexact */
+  static const double slender = 1e-4; /* squared sine of p[0]'s angle below which b is inexact */
   double u[3];
   double v[3];
   double w[3];
@@ -270,13 +270,13 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
     return true;
   }
   const double ww = supine_dot(w, w);
-  const double opposite[3] = {uu + vv - 2.0 * uv, vv,
-                              uu}; /* squared length of each opposite edge */
-  /* Squared distance from x's projection beyond which the triangle is farther than `best`. */
+  const double opposite_square[3] = {uu + vv - 2.0 * uv, vv, uu};
+  /* Squared distance from x's projection beyond which the triangle is farther from x than
+   * sqrt(best). */
   const double limit = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
-    farther |= b[k] < 0.0 && b[k] * b[k] * determinant > limit * opposite[k];
+    farther |= b[k] < 0.0 && b[k] * b[k] * determinant > limit * opposite_square[k];
   }
   if (farther && determinant > slender * uu * vv) {
     return false;
@@ -320,7 +320,6 @@ static double box_square(const node *n, const double x[3]) {
   return square;
 }
 
-/* Find the squared distances of x from the boxes of a leaf's triangles. */
 SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], double *square) {
   for (size_t i = 0; i < LEAF; ++i) {
     square[i] = gap_square((double)leaf->low[0][i], (double)leaf->high[0][i], x[0]) +
@@ -329,7 +328,7 @@ SUPINE_CLONES static void boxes_squares(const boxes *leaf, const double x[3], do
   }
 }
 
-/* Search node `at` and below for the triangle nearest to x, among those nearer than sqrt(*best). */
+/* Search below node `at` for the triangle nearest to x, among those nearer than sqrt(*best). */
 static void search(const supine_inside_surface *s, size_t at, const double x[3], double *best,
                    supine_inside_place *place) {
   const node *n = &s->nodes[at];

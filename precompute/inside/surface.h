@@ -31,7 +31,7 @@ supine_status supine_inside_surface_create(const double *vertices, size_t count,
 /** Free the tree; NULL is legal. */
 void supine_inside_surface_destroy(supine_inside_surface *surface);
 
-/** Find the surface point nearest to a point; `depth` is positive on both sides. Thread-safe.
+/** Find the surface point nearest to a point; its `depth` is positive on both sides. Thread-safe.
  * @param near  the place of a nearby point, which saves work, or NULL */
 supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *surface,
                                                   const double point[3],
@@ -47,7 +47,7 @@ void supine_inside_surface_distances(const supine_inside_surface *surface, size_
  *
  *     (1 / 4 pi) sum over triangles of their solid angle seen from the point > 1/2
  *
- * Boxes farther than twice their radius are approximated by a dipole. Thread-safe.
+ * A dipole approximates the triangles of a distant box of the tree. Thread-safe.
  * @param near  the place of a nearby point, found by this function, which saves work, or NULL
  * Sources: Jacobson, Kavan, Sorkine-Hornung, ACM Trans. Graph. 32(4), 2013; for the dipoles Barill,
  * Dickson, Schmidt, Levin, Jacobson, ACM Trans. Graph. 37(4), 2018. */

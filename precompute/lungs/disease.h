@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Diseased lungs ([Santhanam2008] VI): tumours that stiffen the tissue around them, and collapse.
+ * Diseased lungs ([Santhanam2008] VI): tumours, which stiffen the tissue around them, and collapsed
+ * lungs.
  *
- * The model (model.h) stores lesions as factors on the stiffness, and collapse as each lung's share
- * of its healthy volume. */
+ * The model (model.h) stores lesions as factors on the stiffness, and collapse as the volume of
+ * each lung divided by its healthy volume. */
 #ifndef SUPINE_DISEASE_H
 #define SUPINE_DISEASE_H
 
@@ -14,7 +15,7 @@
  *     factor^w     w = 1 for r <= radius/2,  0 for r >= radius,  3 q^2 - 2 q^3 between
  *                  q = 2 (1 - r / radius)
  *
- * so that it changes smoothly, and not at all from the radius on. The factors of several lesions
+ * so that it changes smoothly, and not at all beyond the radius. The factors of several lesions
  * multiply. */
 typedef struct supine_lesion {
   double centre[3]; /**< mm, LPS; inside the lung or on its surface */
@@ -22,11 +23,11 @@ typedef struct supine_lesion {
   double factor;    /**< > 0; above 1 stiffer, below 1 softer, 1 changes nothing */
 } supine_lesion;
 
-/** Multiply the factors of a lesion into `factors` [N], which start as 1 everywhere. They apply
- * after stiffness was scaled to geometric mean 1: otherwise the scaling would soften all other
- * tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices. So at a given breath scale,
- * other tissue moves as before; at a given volume, all tissue moves more, by one ratio, to make up
- * for the lesion.
+/** Multiply `factors` [N], which start as 1, by the stiffness factors of a lesion. The stiffness is
+ * scaled to geometric mean 1 before it is multiplied by `factors`; the other order would soften all
+ * other tissue, by 4 % for a lesion of factor 10 over 2 % of the vertices. So a stiff lesion does
+ * not change how other tissue moves at a given depth of the breath; at a given volume of the lungs,
+ * all displacements grow by one ratio, to make up for the lesion.
  *
  * @param reached  optional output: number of vertices nearer than the radius; if 0, no effect
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
@@ -38,18 +39,19 @@ supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_l
  * which forces, heights and links are based.
  *
  * A lung of share < 1 is shrunk about its hilum, the mean of the vertices in the quarter of its
- * width nearest the midline. Lengths, and displacements with them, are multiplied by share^(1/3)
- * after the field was solved on the healthy shape, so at any breath scale s the volume of lung j is
+ * width nearest the midline. Its lengths and displacements are multiplied by share^(1/3) after the
+ * displacements of the healthy shape were solved. So at depth s of the breath, lung j has the
+ * volume
  *
  *     V_j(s, g) = share x healthy V_j(s, g)
  *
- * exactly, for every direction g of gravity. The volume of `vertices` is scaled alike.
+ * exactly, for every direction g of gravity. The volume of `vertices` is scaled by `share`, too.
  *
  * @param share     [lungs] volume divided by healthy volume, 0 < share <= 1
  * @param vertices  [N, 3] output, mm */
 void supine_tissue_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
-/** Scale the directions [N, 3] of displacement of healthy lungs to collapsed lungs, in place. */
+/** Multiply the displacement directions [N, 3] of each collapsed lung by share^(1/3), in place. */
 void supine_tissue_collapse_directions(const supine_lungs *lungs, const double share[2],
                                        double *directions);
 

@@ -24,7 +24,7 @@ void supine_tissue_expandability_regional(const supine_lungs *lungs,
   }
 }
 
-/* Parse the index of a vertex; false if it is not a whole number. */
+/* Parse the index of a vertex; return false if it is not a whole number. */
 static bool parse_vertex(const char *text, size_t *vertex) {
   char *end = NULL;
   errno = 0;
@@ -48,14 +48,14 @@ static supine_status take_row(const supine_csv *csv, size_t row, size_t count, d
   if (status != SUPINE_OK) {
     return status;
   }
-  const char *wrong = vertex >= count    ? "is not in the model"
-                      : !positive(value) ? "is not positive"
-                      : a[vertex] != 0.0 ? "was given before"
+  const char *wrong = vertex >= count    ? "there is no such vertex"
+                      : !positive(value) ? "it must be positive"
+                      : a[vertex] != 0.0 ? "the vertex was given before"
                                          : NULL;
   if (wrong != NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "%s:%zu: expandability %g of vertex %zu %s: give one positive value for "
+        "%s:%zu: expandability %g of vertex %zu: %s; give one positive value for "
         "each of %zu vertices, counted from 0",
         csv->path, csv->line, value, vertex, wrong, count);
   }

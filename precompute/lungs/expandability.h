@@ -18,21 +18,21 @@ typedef enum supine_expandability_shape {
   SUPINE_EXPANDABILITY_EXPONENTIAL  /**< a = from (to / from)^t */
 } supine_expandability_shape;
 
-/** A regional model. t is a box coordinate (lungs.h), 0 to 1: axis 0 from the midline outwards,
- * 1 from the back to the front, 2 from the apex to the base. */
+/** A regional model of expandability. t is a box coordinate (lungs.h), 0 to 1: axis 0 from the
+ * midline outwards, 1 from the back to the front, 2 from the apex to the base. */
 typedef struct supine_expandability_law {
   supine_expandability_shape shape;
   int axis;        /**< 0, 1 or 2 */
   double from, to; /**< values of a, > 0, at t = 0 and at t = 1 */
 } supine_expandability_law;
 
-/** Compute a [N] by a regional model whose shape is not UNIFORM. */
+/** Compute the expandability a [N] of all vertices by a regional model that is not UNIFORM. */
 void supine_tissue_expandability_regional(const supine_lungs *lungs,
                                           const supine_expandability_law *law, double *a);
 
-/** Read a [N] from a CSV file with the column `expandability`. Lines are in the model's order, or
- * in any order if a column `vertex` numbers the vertices from 0. Empty lines, and lines that begin
- * with #, are skipped.
+/** Read the expandability a [count] from the column `expandability` of a CSV file. Lines are in the
+ * model's order, or in any order if a column `vertex` numbers the vertices from 0. Empty lines, and
+ * lines that begin with #, are skipped.
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice
  *             or not in the model: the message names line and vertex

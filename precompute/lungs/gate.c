@@ -50,9 +50,9 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         name, specks, plural(specks), 100.0 * speck_share, pieces,
                         pieces == 1 ? " is" : "s are");
   }
-  if (pieces > 6) { /* more than the five lobes of two lungs and one other */
-    supine_findings_add(findings, "%s: warning: %zu pieces; remove the pieces that are not lung",
-                        name, pieces);
+  if (pieces > 6) { /* more than the five lobes of two lungs and one other piece */
+    supine_findings_add(findings, "%s: warning: %zu pieces; remove those that are not lung", name,
+                        pieces);
   }
   return SUPINE_OK;
 }
@@ -82,14 +82,14 @@ static supine_status check_size(const supine_lungs *lungs, const supine_lungs_so
     return SUPINE_OK;
   }
   if (source->axes_given || source->units_given) {
-    supine_findings_add(findings,
-                        "%s: warning: %.3g mm long, which is impossible for lungs: check --units",
-                        source->name, side);
+    supine_findings_add(
+        findings, "%s: warning: the lungs are %.3g mm long, which is impossible: check --units",
+        source->name, side);
     return SUPINE_OK;
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "%s: %.3g mm long, which is impossible for lungs: %s%s. If the size is "
-                          "right, add --units mm",
+                          "%s: the lungs are %.3g mm long, which is impossible: %s%s. To use this "
+                          "size all the same, add --units mm",
                           source->name, side, unit != NULL ? "add --units " : "check its units",
                           unit != NULL ? unit : "");
 }

@@ -14,7 +14,7 @@ typedef struct supine_lungs_source {
   supine_axes axes; /**< axes of all files; AUTO if they differ */
   bool axes_given;
   bool units_given;
-  const double *midline; /**< midline for supine_lungs_create */
+  const double *midline; /**< x of the midline, mm, or NULL (supine_lungs_create) */
 } supine_lungs_source;
 
 /** Repair and check surfaces, and join them into lungs.
@@ -27,9 +27,9 @@ typedef struct supine_lungs_source {
  *
  * @param meshes     [count] changed in place
  * @param axes_hold  output: whether the shape fits LPS clearly better than all other axes
- * @retval SUPINE_ERROR_MESH  a size impossible for lungs, both lungs in one piece; and those of
- *             supine_lungs_create
- * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed */
+ * @retval SUPINE_ERROR_MESH  a size impossible for lungs, or both lungs in one piece
+ * @retval SUPINE_ERROR_OPEN_SURFACE  a surface that is not closed
+ * @retval the statuses of supine_lungs_create */
 supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
                                 const supine_lungs_source *source, supine_lungs *lungs,
                                 bool *axes_hold, supine_findings *findings, supine_error *error);

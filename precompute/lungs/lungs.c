@@ -6,11 +6,11 @@
 
 #include "precompute/lungs/lungs.h"
 
-/* A component with less than this share of the vertices does not make a lung. */
+/* A component with less than this share of the vertices does not count as a lung. */
 static const double significant_share = 0.05;
-/* Two surfaces are the same lung if the faces of their boxes differ by less than this share of the
- * longest side. The faces of one lung meshed at half the resolution differ by thousandths, those of
- * two lobes or lungs by far more. */
+/* Two surfaces are the same lung if the positions of their boxes' faces differ by less than this
+ * share of the longest side: by thousandths if one lung is meshed at two resolutions, but by far
+ * more for two lobes or lungs. */
 static const double same_box_share = 0.01;
 /* Least ratio of the longest sides of two surfaces: lobes and lungs of one chest differ by less
  * than a factor of ten. */
@@ -170,7 +170,7 @@ static supine_status group(supine_lungs *lungs, const uint8_t *left, supine_erro
   return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory for edges");
 }
 
-/* Refuse a lung that is given twice, even at two resolutions, and a surface tiny beside another. */
+/* Refuse a lung given twice, even at two resolutions, and a surface tiny compared with another. */
 static supine_status check_surfaces(const supine_mesh *meshes, size_t count, supine_error *error) {
   for (size_t m = 1; m < count; ++m) {
     for (size_t i = 0; i < m; ++i) {
@@ -227,7 +227,6 @@ static supine_status check_midline(const supine_lungs *lungs, bool two_sided, su
   return SUPINE_OK;
 }
 
-/* Reverse the triangles of each lung whose volume is negative. */
 static void face_outwards(supine_lungs *lungs) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const supine_mesh part = supine_lungs_part(lungs, lung);

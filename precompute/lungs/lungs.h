@@ -18,8 +18,8 @@ typedef struct supine_lungs {
   bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
-  double *scanned; /**< [N, 3] vertices in the scan if `mesh` was moved from there to full
-                        inflation (reference.h); else NULL */
+  double *scanned; /**< [N, 3] vertices in the scan, mm, if `mesh` is at full inflation instead;
+                      otherwise NULL */
   double midline;  /**< x of the sagittal plane where the box coordinate X is 0, mm */
 } supine_lungs;
 
@@ -49,7 +49,7 @@ void supine_lungs_free(supine_lungs *lungs);
 #define SUPINE_LUNGS_MOST_OVERLAP 0.5
 
 /** Sort connected components to the two sides of `middle` along an axis, by the mean of their
- * vertices. The range of a side is that of its components with at least 5 % of the vertices.
+ * vertices. The range of a side spans its components with at least 5 % of the vertices.
  * @param above  [components] written: whether the mean is above `middle`
  * @return overlap of the two ranges as a share of the narrower one; INFINITY if a side has no
  *             range, NAN if out of memory */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make a synthetic pair of lungs: the radius about an inner centre, mm, is a sum of real spherical
- * harmonics to band 12.
+/* Make a synthetic pair of lungs: the distance of the surface from a centre inside, mm, is a sum of
+ * real spherical harmonics up to band 12.
  *
  * The sums were fitted, to 5 mm RMS, to the surfaces of one adult's lungs in deep inspiration,
  * derived from the lung test data of Chaste (BSD-3-Clause, (c) University of Oxford and Chaste
@@ -31,7 +31,7 @@ size_t supine_phantom_geodesic_triangle_count(size_t frequency) {
 /* Compute a corner of the icosahedron: corners are cyclic permutations of (+-1, +-golden, 0). */
 static void corner(size_t index, double p[3]) {
   const double golden = 0.5 * (1.0 + sqrt(5.0));
-  const size_t axis = index / 4; /* axis with coordinate +-1; the next axis has +-golden */
+  const size_t axis = index / 4; /* coordinate that is +-1; the next one is +-golden */
   const double one = index % 2 == 0 ? -1.0 : 1.0;
   const double far = index % 4 < 2 ? golden : -golden;
   p[axis % 3] = one;
@@ -73,13 +73,14 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
       if (step[k] > 0 && step[next] > 0) {
         const unsigned a = faces[face][k];
         const unsigned b = faces[face][next];
-        /* Steps from the corner with the lower index. */
+        /* number of steps from the corner with the lower index */
         const size_t along = a < b ? step[next] : step[k];
         return CORNERS + edge_index(a, b) * (f - 1) + along - 1;
       }
     }
   }
-  const size_t row = (i - 1) * (f - 1) - (i - 1) * i / 2; /* rows have f - 2, f - 3, ... vertices */
+  const size_t row =
+      (i - 1) * (f - 1) - (i - 1) * i / 2; /* rows inside a face have f - 2, f - 3, ... vertices */
   return CORNERS + EDGES * (f - 1) + face * ((f - 1) * (f - 2) / 2) + row + (j - 1);
 }
 
@@ -123,8 +124,8 @@ enum { BAND = 12, TERMS = (BAND + 1) * (BAND + 1) };
 /* Centres of the left and the right lung, mm, LPS. */
 static const double centre[2][3] = {{97.4, -135.2, -98.5}, {-114.3, -153.7, -85.5}};
 
-/* Coefficients of the radius, mm, of the left, then the right lung; Y(l, m) has the coefficient at
- * l * l + l + m. */
+/* Coefficients of the spherical harmonics of the radius, mm, for the left and the right lung;
+ * that of Y(l, m) has the index l * l + l + m. */
 static const double radii[2][TERMS] = {
     {
         261.2139, -51.4562, -67.2911, -92.7709, -6.8369,  2.0246,  34.6912,  -9.3122,  -20.3808,
@@ -197,8 +198,8 @@ supine_status supine_phantom_create(size_t vertices, double millilitres, supine_
                             vertices, SUPINE_PHANTOM_VERTICES_MIN, SUPINE_PHANTOM_VERTICES_MAX);
   }
   if (!(millilitres > 0.0) || !isfinite(millilitres)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a volume of %g mL: give a positive one",
-                            millilitres);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a volume of %g mL: give a positive volume", millilitres);
   }
   const double exact = sqrt(((double)vertices / 2.0 - 2.0) / 10.0);
   const size_t frequency = (size_t)fmax(2.0, floor(exact + 0.5));
