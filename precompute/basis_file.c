@@ -18,7 +18,7 @@
 
 enum { ENTRIES_MAX = 64 };
 
-/* Metadata of a basis file. entries_free releases their values. */
+/* Metadata entries of a basis file. Release their values with entries_free. */
 typedef struct entries {
   size_t count;
   supine_metadata metadata[ENTRIES_MAX];
@@ -60,7 +60,7 @@ static void add_accuracy(entries *list, const supine_accuracy *accuracy, bool at
   }
 }
 
-/* Add the number of vertices in lesions, and the range of the factors on the stiffness. */
+/* Add the number of vertices in lesions, and the range of the factors on their stiffness. */
 static void add_lesions(entries *list, size_t count, const double *factors) {
   size_t changed = 0;
   double low = 1.0;
@@ -97,7 +97,7 @@ static void add_model(entries *list, const supine_lungs *lungs, const supine_mod
   }
 }
 
-/* Add an entry with a number for each lung, separated by commas. */
+/* Add an entry that holds one number for each lung, separated by a comma. */
 static void add_by_lung(entries *list, const char *key, size_t count, const double values[2]) {
   if (count == 2) {
     add(list, key, "%.9g,%.9g", values[0], values[1]);
@@ -106,7 +106,7 @@ static void add_by_lung(entries *list, const char *key, size_t count, const doub
   }
 }
 
-/* Add the scan's state and volumes, the full volume, and the volumes at rest as shares of it. */
+/* Add the state and the volumes of the scan, and the volumes at full inflation and at rest. */
 static void add_reference(entries *list, const supine_reference *reference, const double share[2]) {
   const double *g = reference->scan.state.gravity;
   const bool full = reference->scan.state.volume.kind == SUPINE_VOLUME_FULL;
@@ -130,7 +130,7 @@ static void add_reference(entries *list, const supine_reference *reference, cons
   add(list, "resting_shares", "%s", shares);
 }
 
-/* Add the constant of the expected error, and whether volumes at rest differ from the default. */
+/* Add the constant of the expected error, and a mark if the volumes at rest are not the default. */
 static void add_expected_error(entries *list, const supine_basis_content *content) {
   const supine_resting usual = supine_reference_resting_default();
   if (content->fit == NULL) {
@@ -177,7 +177,7 @@ static float *to_float(const double *values, size_t count) {
   return out;
 }
 
-/* Compute the modes of the normals from the single-precision numbers that the file will hold. */
+/* Find modes of the normals from the vertices and directions in single precision. */
 static supine_status find_normals(const supine_basis_content *content, const float *vertices,
                                   const float *directions, supine_normals_modes *normals,
                                   supine_error *error) {

@@ -10,17 +10,18 @@
 /** Content of a basis file, with N vertices and G lungs. */
 typedef struct supine_basis_content {
   const supine_lungs *lungs;
-  const supine_precompute_options *options; /**< if `fit` is set, `model` is not used */
-  const supine_fit_report *fit; /**< fit of another simulator's fields, or NULL for a model */
-  const double *directions;     /**< [N, 3] mm, or NULL if the coefficients are vectors */
+  const supine_precompute_options *options; /**< options->model is unused if `fit` is not NULL */
+  const supine_fit_report *fit;             /**< NULL if the basis is made from a physical model */
+  const double *directions; /**< [N, 3] directions, mm; NULL if coefficients are vectors */
   const supine_compression *compression;
-  const supine_volume_forms *forms; /**< volumes that the lungs gain, as polynomials */
+  const supine_volume_forms *forms;
   const supine_accuracy *accuracy;
   const supine_reference *reference; /**< NULL if the volume at rest is unknown */
-  const double *resting;             /**< [G, 9] harmonics of the volumes at rest, mL beyond the
-                                          reference surface; NULL if `reference` is NULL */
-  const double *turned_over;         /**< result of supine_accuracy_turned_over, or NULL */
-  const supine_error_table *table;   /**< errors to write, or NULL */
+  /** [G, 9] volume of each lung at rest minus that of its reference surface, mL, as harmonics of
+   * the direction of gravity; NULL if `reference` is NULL */
+  const double *resting;
+  const double *turned_over;       /**< result of supine_accuracy_turned_over, or NULL */
+  const supine_error_table *table; /**< may be NULL */
 } supine_basis_content;
 
 /** Write a basis file, whole or not at all.

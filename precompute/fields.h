@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Fit harmonics to another simulator's fields, and compress the fit. A field u(g_j) holds the
- * displacements of one surface for the direction of gravity g_j. With the harmonics Y, the
- * coefficients C minimise
+ * Fit spherical harmonics of the direction of gravity to the displacement fields of another
+ * simulator, and compress the fit. The field u(g_j) holds the displacements of all vertices for the
+ * direction of gravity g_j, and Y(g_j) holds the values of the harmonics at g_j. The coefficients C
+ * minimise
  *
  *     sum over j of |u(g_j) - C Y(g_j)|^2
  *
- * By default, bands are tried in rising order. A higher band is chosen if it reduces the
- * leave-one-out error by more than 1 %. */
+ * The band of a fit is the highest degree of its harmonics. By default, bands are tried in rising
+ * order, and a higher band is chosen if it reduces the leave-one-out error by more than 1 %. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
@@ -41,26 +42,26 @@ void supine_fields_free(supine_fields *fields);
 enum { SUPINE_FIT_BAND_MAX = 11 };
 
 typedef struct supine_fit_report {
-  size_t band_highest;                   /**< highest band that the directions determine */
-  size_t band;                           /**< band of the fit */
-  double condition;                      /**< condition number of the matrix Y(g_j) of this band */
-  size_t mode_count;                     /**< set only by supine_precompute_fields */
-  double error[SUPINE_FIT_BAND_MAX + 1]; /**< leave-one-out error of each band, relative RMS */
-  supine_accuracy accuracy;              /**< leave-one-out error; its `volume` is 0 */
+  size_t band_highest; /**< highest band whose coefficients the directions determine */
+  size_t band;         /**< chosen band */
+  double condition;    /**< condition number of the matrix of harmonics at all directions */
+  size_t mode_count;   /**< set only by supine_precompute_fields */
+  double error[SUPINE_FIT_BAND_MAX + 1]; /**< relative RMS leave-one-out error of each band */
+  supine_accuracy accuracy; /**< leave-one-out errors of the chosen band; accuracy.volume is 0 */
 } supine_fit_report;
 
 typedef struct supine_fit_options {
-  int band;             /**< highest degree of the harmonics, or negative to choose it by error */
-  size_t modes;         /**< largest number of modes, or 0 to keep the harmonics */
+  int band; /**< highest degree of the harmonics; if negative, chosen by the leave-one-out error */
+  size_t modes;         /**< largest number of modes; 0 uses the harmonics instead of modes */
   const char *findings; /**< notes on the surface for the metadata, one per line, or NULL */
   const char *made_by;  /**< command line for the metadata, or NULL */
 } supine_fit_options;
 
-/** Fit the fields, compress and cross-validate.
+/** Fit harmonics to the fields, compress the fit, and measure its leave-one-out error.
  *
- * @param compression  written: 3 N rows, one for each component of each vertex. Release with
- *                     supine_projection_compression_free
- * @retval SUPINE_ERROR_ARGUMENT   the directions do not determine the band, or are fewer than two
+ * @param compression  written; it has 3 N rows, one for each coordinate of each vertex. Release it
+ *   with supine_projection_compression_free
+ * @retval SUPINE_ERROR_ARGUMENT   fewer than two directions, or too few to determine options->band
  * @retval SUPINE_ERROR_NUMERICAL  all displacements are zero, or a decomposition failed
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_fields_fit(const supine_fields *fields, const supine_fit_options *options,

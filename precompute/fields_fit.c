@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit harmonics to the fields of another simulator, cross-validate, and write the basis. */
+/* Fit harmonics to another simulator's fields, cross-validate the fit, and write a basis file. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -12,19 +12,21 @@
 #include "sh/base/vec3.h"
 #include <supine/sh.h>
 
-/* The directions determine a band if neither the condition number of its harmonics nor the leverage
- * of a direction exceeds its limit. With leverage 1, one direction alone determines a
- * coefficient. */
+/* The directions determine a band if the condition number of its matrix of harmonics and the
+ * leverage of each direction are within these limits. With leverage 1, the fit would reproduce the
+ * field of that direction whatever it is. */
 static const double condition_max = 100.0;
 static const double leverage_max = 0.999;
 
-/* A higher band is chosen only if its error is below `worthwhile` times the error of the band
- * chosen before. If that error is at most `exact`, it is rounding error, and the band is kept. */
+/* A higher band replaces the chosen one if its leave-one-out error is below `worthwhile` times that
+ * of the chosen band. An error of at most `exact` is rounding error: such a band is not
+ * replaced. */
 static const double worthwhile = 0.99;
-static const double exact = 1e-6; /* relative RMS */
+static const double exact = 1e-6;
 
-/* A least-squares fit of P harmonics to the fields of M directions. With the harmonics Y = U S V^T
- * at the directions, the coefficients are A times the fields, where A = V S^-1 U^T. */
+/* A least-squares fit of P harmonics to the fields of M directions. Y holds the values of the
+ * harmonics at the directions. With its singular value decomposition Y = U S V^T, the coefficients
+ * are A times the fields, where A = V S^-1 U^T. */
 typedef struct fit {
   size_t count; /* M */
   size_t terms; /* P */
@@ -37,18 +39,18 @@ typedef struct fit {
 typedef struct prediction {
   double *a;        /* [P, M] matrix A of the fit without one direction */
   double *part;     /* [P, M] */
-  double *gram;     /* [P, P] scalar products of the coefficients, mm^2 */
+  double *gram;     /* [P, P] scalar products of the P coefficient fields, mm^2 */
   double *values;   /* [P] eigenvalues of `gram` */
   double *vectors;  /* [P, P] eigenvectors of `gram` */
   double *target;   /* [P] harmonics at the predicted direction, projected onto the modes */
-  double *residual; /* [M] weights with which the fields sum to the residual */
+  double *residual; /* [M] weight of each field in the sum that gives the residual field */
   double *product;  /* [M] */
 } prediction;
 
 typedef struct fitting {
   const supine_fields *fields;
   size_t rows;  /* 3 N */
-  double *gram; /* [M, M] scalar products of the fields, mm^2 */
+  double *gram; /* [M, M] scalar products of the M fields, mm^2 */
   fit chosen;
   prediction work;
 } fitting;
@@ -112,8 +114,8 @@ static bool fit_is_determined(const fit *f) {
   return determined;
 }
 
-/* Allocate all arrays in one block. Matrices have room for M x M numbers, as P < M in every
- * band. */
+/* Allocate all arrays in one block. Each matrix has room for M x M numbers, where M is the number
+ * of fields: only bands with fewer than M harmonics are tried. */
 static supine_status allocate(fitting *w, supine_error *error) {
   const size_t m = w->fields->direction_count;
   double *next = w->gram = malloc((5 * m * m + 4 * m) * sizeof *next);
@@ -132,10 +134,13 @@ static supine_status allocate(fitting *w, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Predict the field of direction d from all other fields, and find the residual's square, mm^2. The
- * residual is the sum of all fields, weighted by work.residual. If `modes` is 0, the prediction
- * uses the harmonics, otherwise the leading modes of their coefficients. The fit without direction
- * d is A_d, where e_d is the unit vector d, and h is row d of Y A:
+/* Predict the field of direction d from all other fields. The residual is the true field minus the
+ * prediction. It is a sum of all fields, whose weights are written to w->work.residual; its squared
+ * norm, mm^2, is written to `square`. If `modes` is 0, predict with the harmonics; otherwise
+ * predict with that number of leading modes of their coefficients.
+ *
+ * The fit without direction d has the matrix A_d instead of A. e_d is unit vector d, h is row d of
+ * Y A:
  *
  *     A_d = A - A e_d (e_d - h)^T / (1 - h_d) */
 static supine_status predict(const fitting *w, const fit *f, size_t d, size_t modes,
@@ -178,7 +183,7 @@ static double square_sum(const fitting *w) {
   return sum;
 }
 
-/* Compute the leave-one-out error of the harmonics, relative RMS. */
+/* Compute the relative RMS leave-one-out error of a fit that uses the harmonics without modes. */
 static double leave_one_out(const fitting *w, const fit *f) {
   double sum = 0.0;
   for (size_t d = 0; d < f->count; ++d) {
@@ -189,8 +194,8 @@ static double leave_one_out(const fitting *w, const fit *f) {
   return sqrt(sum / square_sum(w));
 }
 
-/* Fit the bands that the directions determine. Choose band `wanted` or, if `wanted` is negative, a
- * band with a small leave-one-out error. */
+/* Fit every band that the directions determine. Choose band `wanted`. If `wanted` is negative,
+ * choose a band by the leave-one-out errors, as `worthwhile` says. */
 static supine_status choose_band(fitting *w, int wanted, supine_fit_report *report,
                                  supine_error *error) {
   const size_t m = w->fields->direction_count;
@@ -221,8 +226,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   }
   if (w->chosen.y == NULL) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "%zu directions do not determine band %d (%d harmonics), only bands up "
-                            "to %d: give more directions, or leave --band out",
+                            "%zu directions do not determine band %d (%d harmonics), but only the "
+                            "bands up to %d: give more directions, or leave --band out",
                             m, wanted, (wanted + 1) * (wanted + 1), (int)determined_count - 1);
   }
   report->band_highest = determined_count - 1;
@@ -230,8 +235,8 @@ static supine_status choose_band(fitting *w, int wanted, supine_fit_report *repo
   return SUPINE_OK;
 }
 
-/* Make a projection whose columns [rows, M] are the fields, and whose functions [M, P] are the
- * transpose of the chosen fit's A. */
+/* Make a projection from the chosen fit: its columns are the M fields, and its functions [M, P] are
+ * the transpose of the fit's matrix A. */
 static supine_status project(const fitting *w, size_t band, supine_projection *made,
                              supine_error *error) {
   const size_t m = w->chosen.count;

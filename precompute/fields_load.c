@@ -80,8 +80,8 @@ static supine_status take_tensors(const char *path, const supine_tensor *gravity
   if (displacement->shape[1] != n) {
     return supine_error_set(
         error, SUPINE_ERROR_MESH,
-        "%s: displacements of %zu vertices, but the reference surface has %zu: give one for each "
-        "vertex",
+        "%s: has displacements of %zu vertices, but the reference surface has %zu vertices: give "
+        "one displacement for each",
         path, displacement->shape[1], n);
   }
   const size_t count = gravity->shape[0];

@@ -12,12 +12,13 @@
 #include "precompute/basis_file.h"
 #include "precompute/projection/projection.h"
 
-/* The default number of held-out directions is HELD_OUT_WORK over the number of vertices, but at
- * least HELD_OUT_MIN and at most HELD_OUT_MAX. With 100 directions, the measured error is accurate
- * to about 5 %, with 1000 to 1 or 2 %. */
+/* The default number of held-out directions is HELD_OUT_WORK divided by the number of vertices, but
+ * at least HELD_OUT_MIN and at most HELD_OUT_MAX. With 100 directions, the measured error is
+ * accurate to about 5 %, with 1000 to 1 or 2 %. */
 enum { HELD_OUT_MIN = 100, HELD_OUT_MAX = 1000, HELD_OUT_WORK = 20000000 };
 
-/* If rest is unknown, errors in mm are measured at this volume beyond the reference surface, mL. */
+/* If rest is unknown, errors in mm are measured where the volume of the lungs is that of the
+ * reference surface plus this, mL. */
 static const double breath_volume = 500.0;
 static const double sqrt_4pi = 3.5449077018110321;
 
@@ -32,8 +33,9 @@ typedef struct pipeline {
   supine_lungs anchored; /* `given` with vertices moved by anchor(), or empty */
   supine_reference reference;
   double *directions; /* [N, 3] mm */
-  double *weight; /* [N] squared length of each direction, so that the modes minimise the error of
-                     displacement: 0.34 % RMS for a left lung, without weights 0.40 % */
+  /* [N] squared length of each direction, so that the modes minimise the error of the displacement:
+   * 0.34 % RMS for a left lung, without weights 0.40 % */
+  double *weight;
   supine_projection projection;
   supine_compression compression;
   double singular[SUPINE_MODES_MADE_MAX];
@@ -42,8 +44,9 @@ typedef struct pipeline {
   supine_truth truth;
   supine_accuracy accuracy;
   double turned_over;
-  double resting[2][9]; /* harmonics of each lung's volume at rest, mL beyond the reference */
-  /* Harmonics of the volume at which errors in mm are measured, mL beyond the reference. */
+  double resting[2][9]; /* volume of each lung at rest minus that of its reference surface, mL, as
+                           harmonics */
+  /* Volume beyond the reference surface at which errors in mm are measured, mL, as harmonics. */
   double volume[9];
   supine_error_table table;
 } pipeline;
@@ -86,12 +89,12 @@ static supine_status compress(pipeline *p, supine_error *error) {
                                                 &p->compression, p->singular, &p->energy, error);
 }
 
-/* Correct the surface p at full inflation, so that the compressed field F takes it exactly to the
- * scan. For the scan's gravity, this cancels the error of compression:
+/* Correct the vertices p of the reference surface so that the compressed field F takes them exactly
+ * to the scan. For the scan's direction of gravity, this cancels the error of compression:
  *
  *     p_j = scan_j - A_j F d_j
  *
- * d are the directions. The gains A keep the volumes. */
+ * along axis j. d are the directions of displacement. The gains A keep the volumes. */
 static supine_status anchor(pipeline *p, supine_error *error) {
   const supine_lungs *lungs = p->given;
   const supine_compression *field = &p->compression;
@@ -129,8 +132,8 @@ static supine_status find_forms(pipeline *p, supine_error *error) {
       &p->compression, p->lungs, p->options->model.share, p->directions, &p->forms, error);
 }
 
-/* Check that the field takes each lung to its volume at rest with gravity along the unit vector g.
- * @param volume  [lungs] volume at rest, mL beyond the reference surface */
+/* Check that some gains give each lung its volume at rest, with gravity along the unit vector g.
+ * @param volume  [lungs] volume at rest minus that of the reference surface, mL */
 static supine_status check_rest(const supine_compression *compression,
                                 const supine_volume_forms *forms, const double g[3],
                                 const double *volume, supine_error *error) {
@@ -153,8 +156,8 @@ static supine_status check_rest(const supine_compression *compression,
   return SUPINE_OK;
 }
 
-/* Find the volume of each lung at rest, mL beyond the reference surface, as real harmonics of bands
- * 0 to 2 that interpolate the volumes along the axes.
+/* Find the volume of each lung at rest minus that of its reference surface, mL, as real harmonics
+ * of bands 0 to 2. They interpolate the volumes for gravity along the six axes.
  * @param share  volume of each lung divided by its healthy volume
  * @retval SUPINE_ERROR_NUMERICAL  the surface folds before a lung has its volume at rest */
 static supine_status rest_harmonics(const supine_reference *reference, const double share[2],
@@ -180,7 +183,7 @@ static supine_status rest_harmonics(const supine_reference *reference, const dou
   return status;
 }
 
-/* Find the volumes at rest if rest is known, and the volume at which errors in mm are measured. */
+/* Find the volumes at rest if known, and the volume at which errors in mm are measured. */
 static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_precompute_options *options = p->options;
   p->volume[0] = breath_volume * sqrt_4pi;
@@ -190,7 +193,7 @@ static supine_status find_rest(pipeline *p, supine_error *error) {
   const supine_status status = rest_harmonics(&p->reference, options->model.share, &p->compression,
                                               &p->forms, p->resting, error);
   for (size_t t = 0; t < 9; ++t) {
-    p->volume[t] = p->resting[0][t] + p->resting[1][t]; /* resting[1] is 0 if there is one lung */
+    p->volume[t] = p->resting[0][t] + p->resting[1][t]; /* resting[1] is 0 for a single lung */
   }
   return status;
 }
@@ -213,7 +216,7 @@ static supine_status measure(pipeline *p, supine_error *error) {
   return status;
 }
 
-/* Find the smallest number of modes with an error below `same_error` times the present error. */
+/* Find the smallest number of modes with an error below `same_error` times that of all modes. */
 static size_t modes_needed(const pipeline *p) {
   const size_t most = p->compression.mode_count;
   const double limit = pow(same_error, 2.0) - 1.0;
@@ -230,12 +233,12 @@ static size_t modes_needed(const pipeline *p) {
   return count;
 }
 
-/* Tabulate the error by band and by number of modes, before modes are dropped. */
+/* Tabulate the error for each band and each number of modes, before modes are dropped. */
 static supine_status tabulate(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_error_table_create(
       &p->truth, &p->projection, &p->compression, p->directions, &p->table);
   return status == SUPINE_OK ? status
-                             : supine_error_set(error, status, "no memory to tabulate the error");
+                             : supine_error_set(error, status, "no memory for the table of errors");
 }
 
 /* Drop modes that are not needed, and measure the error again. */
@@ -255,8 +258,7 @@ static supine_status drop_modes(pipeline *p, supine_error *error) {
 static supine_status find_turned_over(pipeline *p, supine_error *error) {
   const supine_status status = supine_accuracy_turned_over(p->lungs, p->directions, &p->compression,
                                                            &p->forms, p->volume, &p->turned_over);
-  return status == SUPINE_OK ? status
-                             : supine_error_set(error, status, "no memory to look for folds");
+  return status == SUPINE_OK ? status : supine_error_set(error, status, "no memory to count folds");
 }
 
 static supine_status write_file(const pipeline *p, const char *path, supine_error *error) {

@@ -14,9 +14,10 @@ typedef struct supine_precompute_options {
   supine_model model;
   const supine_reference *reference; /**< NULL if the volume at rest is unknown */
   size_t band;                       /**< highest degree of the harmonics */
-  size_t modes;                      /**< largest number of modes, or 0 to keep the harmonics */
-  size_t held_out;                   /**< number of held-out directions, or 0 for the default */
-  double expected_error; /**< c of supine/locate.h, mm, at most the default; 0 is the default */
+  size_t modes;          /**< largest number of modes; 0 uses the harmonics instead of modes */
+  size_t held_out;       /**< number of held-out directions, or 0 for the default */
+  double expected_error; /**< constant c of supine/locate.h, mm; the default if 0 or above the
+                            default */
   supine_scan_frame frame;
   /** @{ Metadata of the file. Each may be NULL. */
   const char *made_by;         /**< command line */
@@ -33,14 +34,14 @@ typedef struct supine_precompute_report {
   double turned_over; /**< share of triangles that turn over (supine_accuracy_turned_over) */
 } supine_precompute_report;
 
-/** Make a basis of a model of lungs, measure its error, and write the file, whole or not at all.
- * @retval SUPINE_ERROR_WRITE, and those of projection and compression */
+/** Make a basis from lungs and a model, measure its error, and write the file, whole or not at all.
+ * @retval SUPINE_ERROR_WRITE, and those of projection.h and accuracy.h */
 supine_status supine_precompute(const supine_lungs *lungs, const supine_precompute_options *options,
                                 const char *path, supine_precompute_report *report,
                                 supine_error *error);
 
-/** Fit, compress and cross-validate another simulator's fields, and write the basis file. A gain of
- * 1 reproduces the fields.
+/** Fit harmonics to another simulator's displacement fields, compress and cross-validate the fit,
+ * and write a basis file. A gain of 1 reproduces the given displacements.
  * @retval SUPINE_ERROR_WRITE, and those of supine_fields_fit */
 supine_status supine_precompute_fields(const supine_lungs *lungs, const supine_fields *fields,
                                        const supine_fit_options *options, const char *path,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Make a model from the user's choices, and move the lungs from the scan to the reference. */
+ * Make a model from the user's choices, and move lungs from the scan to the reference surface. */
 #ifndef SUPINE_PREPARE_H
 #define SUPINE_PREPARE_H
 
@@ -14,11 +14,11 @@ enum { SUPINE_LESIONS_MAX = 64 };
 
 /** The user's choices for the model and the scan. */
 typedef struct supine_model_choice {
-  int law; /**< a supine_law; if SUPINE_LAW_COUNT, `paper` with --scanned none, otherwise `deep` */
-  supine_model model;      /**< a constant that is NAN is taken from the law */
+  int law;            /**< a supine_law; SUPINE_LAW_COUNT: `deep`, or `paper` with --scanned none */
+  supine_model model; /**< a constant that is NAN is taken from the law */
   const char *patient_law; /**< name of the patient's law in `model`, or NULL if there is none */
   const double *stiffness; /**< [N] stiffness E of the patient's law, or NULL */
-  bool has_scan; /**< whether the user gave `scan`; otherwise, the deep law assumes full */
+  bool has_scan; /**< whether the user gave `scan`; if not, `deep` assumes full inflation */
   supine_scan scan;
   supine_resting resting;
   supine_person person;
@@ -26,22 +26,21 @@ typedef struct supine_model_choice {
   supine_expandability_law expandability_law;
   size_t lesion_count;
   supine_lesion lesions[SUPINE_LESIONS_MAX];
-  double share[2]; /**< volume of the collapsed left or right lung divided by its healthy
-                      volume; 0 if the lung is healthy */
+  double share[2]; /**< volume of the collapsed left or right lung / healthy volume; 0 if healthy */
 } supine_model_choice;
 
 supine_model_choice supine_precompute_choice_default(void);
 
-/** A model, the volumes of its lungs, and the assumptions about both. */
+/** A physical model, the volumes of the lungs, and the assumptions about both. */
 typedef struct supine_prepared {
   supine_model model; /**< points to `stiffness` and `lesions` */
   supine_reference reference;
   char summary[512]; /**< the assumed law, scan and volumes in words */
   double *stiffness; /**< [N] stiffness E, or NULL */
-  double *lesions;   /**< [N] factors on the stiffness, or NULL */
+  double *lesions;   /**< [N] factors by which lesions multiply the stiffness, or NULL */
 } supine_prepared;
 
-/** Select the law, set stiffness and lesions, and move the lungs to the reference.
+/** Select the law, set stiffness and lesions, and move the lungs to the reference surface.
  * @param lungs     in: the scan; out: the reference surface
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error
  * @param findings  warnings are added

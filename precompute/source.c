@@ -18,7 +18,7 @@
 typedef struct reading {
   const supine_source_options *options;
   char **paths;
-  size_t count; /* number of files, or of lungs after loading label maps */
+  size_t count; /* number of files; after label maps are loaded, number of lungs */
   supine_mesh *meshes;
   supine_mesh_report *reports;
   supine_error *errors; /* error of each file; status SUPINE_OK if the file was loaded */
@@ -96,7 +96,7 @@ typedef struct lobe_files {
   char path[LOBES][PATH_MAX];
   char *list[LOBES];
   size_t count;
-  char labels[64]; /* labels of each lung, in the form of --labels */
+  char labels[64]; /* value of --labels that assigns the files to the lungs */
 } lobe_files;
 
 static supine_status find_lobes(const char *folder, lobe_files *found, supine_error *error) {
@@ -123,12 +123,12 @@ static supine_status find_lobes(const char *folder, lobe_files *found, supine_er
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_READ,
                                 "%s: no lung_upper_lobe_left.nii.gz or other lobe of "
-                                "TotalSegmentator in this folder; name the files themselves",
+                                "TotalSegmentator in this folder; give files instead of the folder",
                                 folder);
 }
 
-/* Load label maps. The default midline of a single lung is its box's face towards the other
- * lung. */
+/* Load label maps. Without a given midline, a single lung gets the face of its box that is turned
+ * towards the other lung. */
 static supine_status load_maps(reading *r, supine_source *source, supine_findings *findings,
                                supine_error *error) {
   supine_labels_options wanted = r->options->labels;
@@ -206,7 +206,7 @@ static void summarize(const reading *r, supine_source *source) {
   }
 }
 
-/* Check that the files are all label maps, or all surfaces without options of label maps. */
+/* Check that all files are label maps, or are surfaces without options of label maps. */
 static supine_status check_kinds(const supine_source_options *options, char **paths, size_t count,
                                  bool *is_map, supine_error *error) {
   const supine_labels_options *labels = &options->labels;

@@ -12,7 +12,7 @@
 
 typedef struct supine_source_options {
   supine_mesh_load_options load;
-  supine_labels_options labels; /**< options of label maps; the axes are those of `load` */
+  supine_labels_options labels; /**< options for label maps; load.axes replaces labels.axes */
   const char *surfaces_out;     /**< path to save the surfaces of a label map to, or NULL */
   bool has_midline;
   double midline; /**< x of the plane between the lungs, mm */
@@ -22,7 +22,7 @@ typedef struct supine_source {
   supine_lungs lungs;
   supine_scan_frame frame;
   bool is_map;    /**< whether the files are label maps; if so, `report` is set */
-  bool axes_hold; /**< whether the lungs' shape agrees with the axes */
+  bool axes_hold; /**< whether the shape of the lungs agrees with the axes */
   supine_labels_report report;
   char summary[256]; /**< axes, unit and boxes of the lungs, in words */
 } supine_source;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find a small number of modes that represent the normals with the least error. */
+/* Find a small number of modes that approximate the normals of all vertices in all states. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -21,29 +21,29 @@ enum {
   STEP = 3        /* number of modes that are added at a time */
 };
 
-/* Modes are weighted sums of the normals in at most SNAPSHOTS states. LANES states are computed
- * together. Lane 0 of the first batch is the reference surface, which is not a snapshot. */
+/* Modes are weighted sums of the normals in at most SNAPSHOTS states. LANES states are evaluated
+ * together. Lane 0 of the first batch holds the reference surface, which is not a snapshot. */
 enum { LANES = 8, SNAPSHOTS = 6 * LANES - 1, MOST = SUPINE_NORMALS_MOST };
 
-/* Largest accepted mean and 99.9th percentile of the angle, degrees, between exact normals and
- * their approximation. These limits are a fifth below the goals of 0.1 and 1, because the errors at
- * other vertices and states are slightly different. */
+/* Largest accepted mean and 99.9th percentile of the angle between an exact normal and its
+ * approximation, degrees. These limits are a fifth below the goals of 0.1 and 1 degree, because the
+ * errors at vertices and in states that are not measured differ slightly. */
 static const double mean_wanted = 0.08;
 static const double p999_wanted = 0.8;
 static const double degrees_per_radian = 57.29577951308232;
 
-/* A state can become a snapshot if more than this share of its squared normals is still
- * unexplained. */
+/* A state becomes a snapshot only if the snapshots chosen before it leave more than this share of
+ * the sum of its squared normals unexplained. */
 static const double least_new = 1e-7;
 
-/* The modes of one lung before they are rounded. normal_modes.h defines N, n and V. */
+/* The modes of the normals of one lung, before rounding. normal_modes.h defines N, n and V. */
 typedef struct fit {
-  size_t count;                     /* at most MOST */
+  size_t count;                     /* number of modes, at most MOST */
   size_t snapshot_count;            /* R */
-  size_t state[SNAPSHOTS];          /* [R] state of each snapshot */
-  float share[1 + SNAPSHOTS][MOST]; /* n_j = sum over r of share[1 + r][j] N(state_r) */
-  double *weights;                  /* [MOST, 3, terms] V */
-  supine_normals_rows rows;         /* polynomials of held-out vertices */
+  size_t state[SNAPSHOTS];          /* [R] index of the state of each snapshot */
+  float share[1 + SNAPSHOTS][MOST]; /* [1 + r][j] weight of snapshot r in mode j; [0] is zero */
+  double *weights;                  /* [MOST, 3, terms] by mode, axis and monomial */
+  supine_normals_rows rows;         /* polynomials for the normals of held-out vertices */
   float *modes;                     /* [rows, 3, MOST] modes of the held-out vertices */
 } fit;
 
@@ -56,8 +56,8 @@ typedef struct normals_work {
   fit fits[SUPINE_LUNGS_MAX];
 } normals_work;
 
-/* Compute out_c = in_c matrix_c^T for each component c, with in [count, 3, terms], matrix [n, 3,
- * terms] and out [count, 3, n]. */
+/* Compute out[i, c, j] = sum over t of in[i, c, t] matrix[j, c, t] for in [count, 3, terms], matrix
+ * [n, 3, terms] and out [count, 3, n]. */
 static void apply_rows(const double *in, size_t count, size_t terms, const double *matrix, size_t n,
                        double *out) {
   for (size_t c = 0; c < 3; ++c) {
@@ -67,8 +67,9 @@ static void apply_rows(const double *in, size_t count, size_t terms, const doubl
   }
 }
 
-/* Compute out_c = in_c A_c^T A_c for each component c, with rows A, in [count, 3, terms] and out
- * [count, 3, terms]. gram [terms, terms] is work space. */
+/* Compute out[i, c, t] = sum over u of in[i, c, u] G_c[u, t] for `in` and `out` [count, 3, terms].
+ * Here G_c = A_c^T A_c, where A_c [rows->count, terms] holds the coefficients of the polynomials
+ * `rows` along axis c. gram [terms, terms] is work space. */
 static void apply_gram(const supine_normals_rows *rows, size_t terms, const double *in,
                        size_t count, double *gram, double *out) {
   const int width = (int)terms;
@@ -81,18 +82,19 @@ static void apply_gram(const supine_normals_rows *rows, size_t terms, const doub
   }
 }
 
-/* Choose the snapshots by pivoted Cholesky factorisation, P ~ L L^T, of the products P [S, S] of
- * normalised states, which are overwritten. Find the best modes n_j = sum over r of coefficients_jr
- * snapshot_r. */
+/* Choose the snapshots among s states, and find the best modes as weighted sums of the R snapshots.
+ * product [s, s] holds the scalar products of the normals in each two states, scaled to 1 on the
+ * diagonal. Its pivoted Cholesky factorisation L L^T, which overwrites it, picks the snapshots.
+ * Write the weight of snapshot r in mode j to coefficients[j R + r]. */
 static supine_status choose_snapshots(size_t s, double *product, fit *made,
                                       double coefficients[MOST * SNAPSHOTS]) {
   lapack_int pivots[STATES];
   lapack_int rank = 0;
-  double gram[SNAPSHOTS * SNAPSHOTS]; /* L^T L */
+  double gram[SNAPSHOTS * SNAPSHOTS];
   double values[SNAPSHOTS];
   const lapack_int info = LAPACKE_dpstrf(LAPACK_COL_MAJOR, 'L', (lapack_int)s, product,
                                          (lapack_int)s, pivots, &rank, least_new);
-  if (info < 0) { /* a positive result says that the rank is below S, which is no error */
+  if (info < 0) { /* a positive result means a singular matrix, which is no error */
     return supine_lapack_status(info);
   }
   const size_t r = rank < SNAPSHOTS ? (size_t)rank : SNAPSHOTS;
@@ -111,8 +113,11 @@ static supine_status choose_snapshots(size_t s, double *product, fit *made,
   return status;
 }
 
-/* Find the modes that approximate the normals of all states best, with equal weights. They are
- * orthonormal over the rows. Write T with n_jc = T_jc . A_c to mix [MOST, 3, terms]. */
+/* Find the modes n_j that approximate the normals in all sampled states best, with equal weights
+ * for all states. The modes are orthonormal over the vertices of `rows`. Write V (normal_modes.h)
+ * to made->weights. Write to mix [MOST, 3, terms] the matrix T that turns the polynomial
+ * coefficients A of a vertex into its modes: along axis c, n_jc = sum over t of T[j, c, t] A[c, t].
+ */
 static supine_status find_fit(const normals_work *work, size_t lung,
                               const supine_normals_rows *rows, double *mix, fit *made) {
   const size_t terms = work->terms;
@@ -193,7 +198,8 @@ static supine_status find_lung(const normals_work *work, size_t lung, fit *made)
   return status;
 }
 
-/* Round a vertex's modes along one axis as an open basis stores them, with 13, 10 and 9 bits. */
+/* Round the modes [count] of one vertex along one axis to the precision of an open basis, which
+ * stores them with 13, 10 and 9 bits. */
 static void pack(const int16_t *modes, size_t count, double *packed) {
   const size_t words = supine_tiles_normal_words(count);
   for (size_t j = 0; j < words; ++j) {
@@ -208,9 +214,10 @@ static void pack(const int16_t *modes, size_t count, double *packed) {
   }
 }
 
-/* Divide the modes, values [n, 3, stride], by the lengths [n] of the reference normals, unless
- * `lengths` is NULL. Round the first `count` modes to 16 bits in rounded [n, 3, count], and write
- * the unit [count] of each. A vertex whose reference normal is zero gets zero modes. */
+/* Divide the modes of n vertices, values [n, 3, stride], in place by the lengths [n] of their
+ * normals on the reference surface, unless `lengths` is NULL. Modes of a vertex with length 0
+ * become 0. Round the first `count` modes to 16 bits in rounded [n, 3, count], and write the value
+ * of an integer step of each mode to unit [count]. */
 static void round_modes(float *values, const float *lengths, size_t n, size_t stride, size_t count,
                         int16_t *rounded, double *unit) {
   float top[MOST] = {0.0f};
@@ -234,7 +241,7 @@ static void round_modes(float *values, const float *lengths, size_t n, size_t st
   }
 }
 
-/* Multiply the weights [count, 3, terms] by the units [count] of their modes. */
+/* Multiply the weights [count, 3, terms] of each mode by the unit [count] of that mode. */
 static void scale_weights(const double *weights, const double *unit, size_t count, size_t terms,
                           double *scaled) {
   for (size_t i = 0; i < count * 3 * terms; ++i) {
@@ -242,7 +249,7 @@ static void scale_weights(const double *weights, const double *unit, size_t coun
   }
 }
 
-/* Find the angles [count], degrees, between `count` vectors a and b, [3, count]. */
+/* Find the angles [count], degrees, between the columns of a [3, count] and those of b. */
 SUPINE_CLONES static void find_angles(size_t count, const double *a, const double *b,
                                       double *angles) {
   double cosine[HELD_OUT];
@@ -259,8 +266,9 @@ SUPINE_CLONES static void find_angles(size_t count, const double *a, const doubl
   }
 }
 
-/* Add the angular errors of a lung's held-out vertices in the held-out states to `tally` and `sum`.
- * modes [rows, 3, count] and weights [count, 3, terms] are as in the file. */
+/* Add the angles between exact and approximate normals of the held-out vertices of a lung, in all
+ * held-out states, to `tally` and `sum`. modes [rows, 3, count] and weights [count, 3, terms] hold
+ * the same values as the basis file. */
 static void measure(const normals_work *work, size_t lung, size_t count, const int16_t *modes,
                     const double *weights, supine_tally *tally, double *sum) {
   enum { BLOCK = 16 }; /* vertices whose exact normals are computed at a time */
@@ -293,8 +301,8 @@ static void measure(const normals_work *work, size_t lung, size_t count, const i
   }
 }
 
-/* Measure the error of `count` modes and set mean and p999. The modes are those of `made` or, if it
- * has none yet, the rounded modes of the fits. */
+/* Measure the angular error of `count` modes, and set made->mean and made->p999. Measure the modes
+ * in `made` if it has any; otherwise measure the modes in work->fits after rounding. */
 static supine_status measure_all(const normals_work *work, size_t count,
                                  supine_normals_modes *made) {
   const size_t all = 3 * work->terms;
@@ -328,15 +336,17 @@ static supine_status measure_all(const normals_work *work, size_t count,
   return memory ? SUPINE_OK : SUPINE_ERROR_MEMORY;
 }
 
-/* Work space of make_modes(), which sums every vertex's modes over the snapshots. */
+/* Work space of make_modes(), which computes the modes of every vertex as sums over the
+ * snapshots. */
 typedef struct planes_work {
   const normals_work *work;
-  size_t count; /* Q */
-  size_t first; /* state in the first lane: 0 is the reference surface, 1 + r is snapshot r */
-  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] products of gain and weight */
+  size_t count; /* number of modes */
+  size_t first; /* index of the state in the first lane: 0 is the reference surface, 1 + r is
+                   snapshot r */
+  float (*steer)[3][SUPINE_NORMALS_FIELD_MAX][LANES]; /* [G] gain times weight */
   float *at;                                          /* [N, 3, LANES] positions, mm */
-  float *modes;                                       /* [N, 3, Q] sums so far */
-  float *lengths;                                     /* [N] length of each reference normal */
+  float *modes;   /* [N, 3, count] sums over the snapshots so far */
+  float *lengths; /* [N] length of each normal on the reference surface */
 } planes_work;
 
 static size_t lung_of(const supine_normals_surface *s, size_t vertex) {
@@ -408,8 +418,8 @@ SUPINE_CLONES static void sum_range(void *context, size_t begin, size_t end, siz
   }
 }
 
-/* Copy the products of gain and weight for each lane from the monomials. For axis a, they are terms
- * 1 to K of component (a + 2) mod 3. */
+/* Set planes->steer from the sampled monomials: with K modes of the field, monomials 1 to K along
+ * axis (a + 2) mod 3 are the weights times the gain of axis a. */
 static void find_steer(const planes_work *planes) {
   const normals_work *work = planes->work;
   for (size_t lung = 0; lung < work->surface->lung_count; ++lung) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expand normals, the sums of triangles' area vectors, as polynomials of weights and gains. */
+/* Express normals, the sums of triangles' area vectors, as polynomials of weights and gains. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,9 @@
 
 enum { COLUMNS = SUPINE_NORMALS_FIELD_MAX + 1 };
 
-/* Find the index of the monomial for column k along axis a times column l along axis b. Column 0 is
- * the reference position; column k > 0 is the displacement by mode k - 1. */
+/* Find the index of the monomial for the product of column k along one axis and column l along the
+ * next axis. Column 0 is the position on the reference surface; column k > 0 is the displacement by
+ * mode k - 1. */
 static size_t term_of(size_t modes, size_t k, size_t l) {
   const size_t low = (k < l ? k : l) - 1;
   const size_t high = (k < l ? l : k) - 1;
@@ -47,7 +48,7 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface,
     supine_normals_fans_free(fans);
     return SUPINE_ERROR_MEMORY;
   }
-  uint32_t *next = fans->begin + 1; /* filling the fans advances next[i] to the end of fan i */
+  uint32_t *next = fans->begin + 1;
   for (size_t s = 0; s < corners; ++s) {
     ++next[surface->triangles[s] + 1];
   }
@@ -66,8 +67,8 @@ void supine_normals_fans_free(supine_normals_fans *fans) {
   *fans = (supine_normals_fans){0};
 }
 
-/* Subtract vertex `from` from vertex `to`: first their reference positions, then their
- * displacements by each mode. Write the differences to side [3, COLUMNS]. */
+/* Write the differences of vertex `to` minus vertex `from` to side [3, COLUMNS]: of their positions
+ * on the reference surface in column 0, of their displacements by mode k in column k + 1. */
 static void read_side(const supine_normals_surface *s, size_t from, size_t to,
                       double (*side)[COLUMNS]) {
   const size_t modes = s->field->mode_count;
@@ -84,7 +85,8 @@ static void read_side(const supine_normals_surface *s, size_t from, size_t to,
   }
 }
 
-/* Add the polynomials of the area vectors around a vertex to row [3, terms]. */
+/* Add to row [3, terms] the coefficients of the area vectors of all triangles around a vertex, as
+ * polynomials of the weights and the gains. */
 static void find_row(const supine_normals_surface *s, const supine_normals_fans *fans,
                      size_t vertex, size_t terms, double *row) {
   for (size_t at = fans->begin[vertex]; at < fans->begin[vertex + 1]; ++at) {

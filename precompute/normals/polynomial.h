@@ -1,28 +1,28 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expand a vertex's normal as a polynomial of the weights and the three gains, and sample the
- * states in which modes of the normals are found and measured. */
+/* Express the normal of a vertex as a polynomial of weights and gains (normal_modes.h), and sample
+ * the states in which modes of the normals are found and measured. */
 #ifndef SUPINE_NORMALS_POLYNOMIAL_H
 #define SUPINE_NORMALS_POLYNOMIAL_H
 
 #include "precompute/normals/normal_modes.h"
 
-/* Return the number of monomials of a normal along one axis. With a and b the gains of the next two
- * axes in cyclic order and w the weights of the modes, they are
+/* Return the number of monomials in the component of a normal along one axis. Let a and b be the
+ * gains of the next two axes in cyclic order, and w the weights of the modes. The monomials are
  *
  *     1, a w_k, b w_k, a b w_k w_l for k <= l */
 static inline size_t supine_normals_terms(size_t modes) {
   return 1 + 2 * modes + modes * (modes + 1) / 2;
 }
 
-/* Compute the monomials phi [3, terms] along x, y and z. */
+/* Compute the monomials of supine_normals_terms() along x, y and z, phi [3, terms]. */
 void supine_normals_monomials(size_t modes, const double *weights, const double gains[3],
                               double *phi);
 
-/* The triangles around each vertex. Vertex i stands in the array `triangles` at the indices
- * corner[begin[i]] to corner[begin[i + 1] - 1]. */
+/* The triangles around each vertex. The array `triangles` of the surface contains vertex i at the
+ * indices corner[begin[i]] to corner[begin[i + 1] - 1]. */
 typedef struct supine_normals_fans {
   uint32_t *begin;  /* [N + 2]; the last entry is work space */
-  uint32_t *corner; /* [3 M] indices into `triangles` */
+  uint32_t *corner; /* [3 M] indices into `triangles` of a surface with M triangles */
 } supine_normals_fans;
 
 /* Find the triangles around each vertex. Release them with supine_normals_fans_free.
@@ -31,7 +31,8 @@ supine_status supine_normals_fans_create(const supine_normals_surface *surface,
                                          supine_normals_fans *fans);
 void supine_normals_fans_free(supine_normals_fans *fans);
 
-/* Read the vertices that follow index `corner` of `triangles` in the same triangle, cyclically. */
+/* Find the other two corners of the triangle that contains element `corner` of `triangles`, in the
+ * cyclic order of that triangle. */
 static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t corner,
                                              uint32_t others[2]) {
   const uint32_t v = corner % 3;
@@ -39,15 +40,16 @@ static inline void supine_normals_fan_others(const uint32_t *triangles, uint32_t
   others[1] = triangles[corner - v + (v + 2) % 3];
 }
 
-/* The polynomials of some vertices of one lung. */
+/* The polynomials for the normals of some vertices of one lung. */
 typedef struct supine_normals_rows {
   size_t count;     /* R */
   uint32_t *vertex; /* [R] */
   double *terms;    /* [R, 3, terms] coefficients A_i / |N_i(0)| (normal_modes.h) */
 } supine_normals_rows;
 
-/* Find the polynomials of every `stride`-th vertex of a lung, beginning at its vertex `offset`.
- * Leave out vertices whose normal on the reference surface is zero.
+/* Find the polynomials for the normals of every `stride`-th vertex of a lung. The first of these
+ * vertices is `offset`, counted from the first vertex of the lung. Leave out vertices whose normal
+ * on the reference surface is zero.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_rows_create(const supine_normals_surface *surface,
                                          const supine_normals_fans *fans, size_t lung,
@@ -56,15 +58,16 @@ void supine_normals_rows_free(supine_normals_rows *rows);
 
 /* Sampled states of the lungs, and the monomials of their weights and gains. */
 typedef struct supine_normals_states {
-  size_t count;    /* number of states whose volumes the lungs can reach, S */
+  size_t count;    /* number of sampled states, at most `room` */
   size_t room;     /* requested number of states */
   double *phi;     /* [G, room, 3, terms] monomials of each lung in each state */
-  double range[2]; /* range of the states, as in supine_normals_modes */
+  double range[2]; /* as in supine_normals_modes */
 } supine_normals_states;
 
-/* Spread up to `count` states over all directions of gravity, and over the volumes from rest to the
- * reference surface. If rest is unknown, spread their largest displacements from -15 to 60 mm. A
- * different `shift`, 0 to 1, gives states in between. Release them with supine_normals_states_free.
+/* Sample up to `count` states with directions of gravity all over the sphere and volumes from rest
+ * to the reference surface. If rest is unknown, their largest displacements range from -15 to 60
+ * mm. States that the lungs cannot reach are left out. A different `shift`, 0 to 1, gives different
+ * states. Release them with supine_normals_states_free.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_normals_states_create(const supine_normals_surface *surface, size_t count,
                                            double shift, supine_normals_states *states);

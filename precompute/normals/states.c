@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Sample states: gravity on a golden-angle spiral, volumes at multiples of an irrational number. */
+/* Sample states: gravity on a golden-angle spiral, volumes by multiples of an irrational number. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -9,11 +9,11 @@
 
 #include "precompute/normals/polynomial.h"
 
-/* If rest is unknown, range of the states' largest displacement, mm. Negative values deflate. */
+/* Range of the largest displacement in a state if rest is unknown, mm; negative if it deflates. */
 static const double lowest_mm = -15.0;
 static const double highest_mm = 60.0;
 
-/* Find the largest displacement at weights w and gain 1, mm, over some of the vertices. */
+/* Find the largest displacement at weights w and gain 1, mm, over evenly chosen vertices. */
 static double largest(const supine_normals_surface *s, const double *w) {
   enum { SOME = 4096 };
   const size_t modes = s->field->mode_count;
@@ -38,9 +38,10 @@ static double largest(const supine_normals_surface *s, const double *w) {
   return sqrt(top);
 }
 
-/* Find the gains that take each lung from rest (share 0) towards the volume of the reference
- * surface (share 1). Write the volume of all lungs, mL beyond that surface, to `amount`. y [9] are
- * the harmonics of gravity. Return false if the surface folds before it reaches the volume. */
+/* Find the gains at which the volume of each lung lies at `share` between rest (0) and the
+ * reference surface (1). Write the volume of all lungs minus that of the reference surface, mL, to
+ * `amount`. y [9] are the harmonics of gravity, w the weights of the modes. Return false if a lung
+ * folds before it holds its volume. */
 static bool gains_from_rest(const supine_normals_surface *s, const double *y, const double *w,
                             double share, double (*gains)[3], double *amount) {
   *amount = 0.0;
@@ -60,8 +61,9 @@ static bool gains_from_rest(const supine_normals_surface *s, const double *y, co
   return true;
 }
 
-/* Find the gain, equal for all lungs, at which the largest displacement is at `share`, 0 to 1, of
- * its range. Write the displacement, mm, to `amount`. Return false if no vertex moves. */
+/* Find the gain, equal for all axes and lungs, at which the largest displacement is lowest_mm +
+ * share (highest_mm - lowest_mm). Write this displacement to `amount`. Return false if no vertex
+ * moves. */
 static bool common_gain(const supine_normals_surface *s, const double *w, double share,
                         double (*gains)[3], double *amount) {
   const double size = largest(s, w);

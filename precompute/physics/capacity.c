@@ -15,13 +15,13 @@
 
 static const double tissue = 860.0; /* volume of the tissue of both lungs, mL */
 
-/* The state given for a scan is doubtful if the full volume of both lungs is less than
- * `least_share` of the expected volume, less than `least_ml`, or more than `most_ml`. */
+/* The state given for a scan is doubtful if it implies a volume of both lungs at full inflation
+ * below `least_share` of the expected volume, below `least_ml`, or above `most_ml`. */
 static const double least_share = 0.75;
 static const double least_ml = 3500.0;
 static const double most_ml = 10000.0;
 
-/* Largest relative difference between a scan's volume and the volume stated in the options. */
+/* Largest accepted relative difference between the scan's volume and the one the options imply. */
 static const double agreement = 0.05;
 
 void supine_reference_capacity(const supine_person *person, double range[2]) {
@@ -45,7 +45,7 @@ void supine_reference_capacity(const supine_person *person, double range[2]) {
   }
 }
 
-/* Return the usual share of the given lungs in the volume of both lungs: 1 if both are given. */
+/* Return the usual share of the given lungs in the volume of a pair: 1 if both are given. */
 static double part_of_pair(const supine_reference *reference) {
   return reference->lung_count == 2 ? 1.0
          : reference->side[0] > 0   ? SUPINE_LEFT_SHARE

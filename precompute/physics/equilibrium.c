@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Solve for the equilibrium of (5), (8), (12)-(14): eliminate the springs, make the matrix
- * symmetric, and factorise it with CHOLMOD. */
+/* Solve for the equilibrium of [Santhanam2008], equations (5), (8) and (12)-(14): eliminate the
+ * springs, make the matrix symmetric (equilibrium.h), and factorise it with CHOLMOD. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,12 +22,12 @@
 
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cholmod;
 
-/* Up to BATCH right-hand sides are solved together, which limits the work space. The factor of a
- * part with more than LARGE vertices is freed after each solve. */
+/* Up to BATCH right-hand sides are solved together, which limits the work space. The Cholesky
+ * factor of a part of the mesh with more than LARGE vertices is freed after each solve. */
 enum { BATCH = 8, LARGE = 100000 };
 
-/* Largest accepted relative residual of a solve. With a reach R and edges of length h, rounding
- * errors alone cause about 1e-16 (R / h)^2. */
+/* Largest accepted relative residual of a solve. With a reach R (equilibrium.h) and edges of length
+ * h, rounding errors alone cause about 1e-16 (R / h)^2. */
 static const double residual_limit = 1e-8;
 
 /* A part of the mesh without edges to other parts, such as one lung. Each part is solved in its own
@@ -36,7 +36,8 @@ typedef struct part {
   size_t vertex, vertex_count; /* index of the first vertex, and number of vertices */
   size_t edge, edge_count;
   bool factorised;        /* whether `factor` matches the values of `matrix` */
-  cholmod_sparse *matrix; /* lower triangle: diagonal element i, then the edges from vertex i */
+  cholmod_sparse *matrix; /* lower triangle; column i has the diagonal element, then one for each
+                             edge from vertex i */
   cholmod_factor *factor;
   cholmod_common common;
 } part;
@@ -44,12 +45,12 @@ typedef struct part {
 struct supine_equilibrium {
   size_t vertex_count;
   const supine_topology *topology;
-  double reach;    /* mm, or 0 for the paper's transfer */
-  double *area;    /* [N] area of each vertex / mean area, or NULL without a reach */
-  double *link;    /* [edges] w / 2 with a reach, otherwise D(mass, spring) in mm (equilibrium.h) */
-  double *lesions; /* [N] factors on the normalised stiffness, or NULL */
-  double *mass_s;  /* [N] S of the masses: 1 with a reach, otherwise 1 / E */
-  double *load;    /* [N] right-hand side for a unit force: area / E with a reach, otherwise 1 */
+  double reach; /* reach R (equilibrium.h), mm, or 0 */
+  double *area; /* [N] area of each vertex divided by the mean area; NULL without a reach */
+  double *link; /* [edges] distance from mass to spring, mm; with a reach, w / 2 (equilibrium.h) */
+  double *lesions; /* [N] factors by which lesions multiply the normalised stiffness, or NULL */
+  double *mass_s;  /* [N] S of each mass (equilibrium.h); 1 with a reach */
+  double *load;    /* [N] right-hand side of the system for a unit force */
   size_t part_count;
   part parts[2];
 };
@@ -104,7 +105,7 @@ supine_status supine_physics_stiffness_normalise(size_t count, const double *sti
 static void split(supine_equilibrium *eq) {
   const size_t n = eq->vertex_count;
   const supine_topology *topology = eq->topology;
-  size_t highest = 0; /* highest index of a neighbour of vertices 0 to i - 1 */
+  size_t highest = 0; /* largest index among the neighbours of vertices 0 to i - 1 */
   size_t least = n;   /* size of the larger part in the best split so far */
   part *first = &eq->parts[0];
   *first = (part){.vertex_count = n, .edge_count = topology->edge_count};
@@ -175,14 +176,14 @@ static size_t find_edge(const supine_equilibrium *eq, uint32_t a, uint32_t b) {
   return e;
 }
 
-/* Compute vertex areas and link weights for a reach R.
+/* Compute the areas of vertices and the weights of edges for a reach R.
  *
  * The system of equilibrium.h with a reach is the weak form of (1 - R^2 Laplacian) F = a f on the
- * surface, divided by the mean vertex area A. Its link weights are w = 2 R^2 c / A. The factors c
- * should make the sum of c (F_i - F_j)^2 over all links equal to the integral of |grad F|^2. If
- * links run equally in all directions, this holds for c = 2 s / h^2, where h is the length of the
- * link and s a third of the area of its triangles. Unlike cotangent weights, these weights are
- * never negative, but R^2 is accurate only to about 10 %. */
+ * surface, divided by the mean vertex area A. Its weights are w = 2 R^2 c / A. The factors c should
+ * make the sum of c (F_i - F_j)^2 over all edges ij equal to the integral of |grad F|^2. If edges
+ * run equally in all directions, this holds for c = 2 s / h^2, where h is the length of the edge
+ * and s a third of the area of its triangles. Unlike cotangent weights, these weights are never
+ * negative, but R^2 is accurate only to about 10 %. */
 static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   const size_t n = eq->vertex_count;
   const double *p = mesh->vertices;
@@ -191,8 +192,7 @@ static void set_reach(supine_equilibrium *eq, const supine_mesh *mesh) {
   for (size_t i = 0; i < n; ++i) {
     mean += eq->area[i] / (double)n;
   }
-  /* Lower bound of areas, mm^2, so that degenerate triangles give no vertex or link the weight 0.
-   */
+  /* Smaller areas, mm^2, count as this one, so that degenerate triangles give no zero weights. */
   const double least = 1e-6 * mean;
   for (size_t i = 0; i < n; ++i) {
     eq->area[i] = fmax(eq->area[i], least) / mean;
@@ -268,7 +268,7 @@ static void set_values(const supine_equilibrium *eq, part *p) {
       const double s[2] = {eq->mass_s[edge[0]], eq->mass_s[edge[1]]};
       const double wide = d + 2.0 * s[0] * s[1];
       c = s[0] * s[1] / (d * wide);
-      *first += (s[0] + s[1]) / (2.0 * s[1] * wide); /* force kept by the spring */
+      *first += (s[0] + s[1]) / (2.0 * s[1] * wide);
       *second += (s[0] + s[1]) / (2.0 * s[0] * wide);
     }
     *first += c;
@@ -342,7 +342,7 @@ static supine_status factorise(part *p) {
   return SUPINE_OK;
 }
 
-/* Solve part k for the right-hand sides r to r + count - 1, and update its largest residual. */
+/* Solve part k for the right-hand sides r to r + count - 1. Update s->residual[k]. */
 static supine_status solve_columns(solve *s, size_t k, size_t r, size_t count) {
   part *p = &s->eq->parts[k];
   const size_t n = p->vertex_count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the applied force (18) and the directions of displacement (15)-(17). */
+/* Compute the force (18) and the directions of displacement (15)-(17) of [Santhanam2008]. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -16,7 +16,7 @@ typedef struct force_work {
   const supine_force_law *law;
   const supine_gravities *gravities;
   const size_t *vertices; /* indices, or NULL for all vertices */
-  double middle[3];       /* mean position of all vertices, mm; computed only with softening */
+  double middle[3];       /* mean position of all vertices, mm; 0 if law->soften is 0 */
   double *force;
 } force_work;
 
@@ -87,5 +87,5 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
     }
   }
   return supine_error_set(error, SUPINE_ERROR_MESH,
-                          "no vertex would move, as every direction is zero: change --constants");
+                          "all directions of displacement are zero: change --constants");
 }

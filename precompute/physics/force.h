@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/** @file Compute the force that gravity and breath apply to the vertices, (18) for any orientation,
- * and the directions of displacement of the vertices, (15)-(17).
+/** @file
+ * Compute the force of gravity and breath on the vertices, (18) of [Santhanam2008] (equilibrium.h)
+ * for any direction of gravity, and the directions of displacement, (15)-(17).
  *
  * With gravity along the unit vector g, the force f_i on vertex i at p_i depends on h_i, which
  * grows from 0 at the uppermost to 1 at the lowest vertex of all lungs:
@@ -9,22 +10,22 @@
  *     f_i(g) = (base + gain h_i(g) + cx X_i + cy Y_i + cz Z_i) exp(soften (h_i(g) - mean h(g)))
  *
  * X, Y and Z are the box coordinates of lungs.h. If soften > 0, the exponential makes lower tissue
- * more expandable, like a factor on a = 1/E (equilibrium.h). Its geometric mean is 1. */
+ * more expandable, like a factor on a = 1/E (equilibrium.h); its geometric mean is 1. */
 #ifndef SUPINE_FORCE_H
 #define SUPINE_FORCE_H
 
 #include "precompute/lungs/lungs.h"
 
-/** Dimensionless constants of the force f. */
+/** Dimensionless constants of the applied force f. */
 typedef struct supine_force_law {
   double base;
-  double gain;   /**< factor of the height h */
-  double box[3]; /**< factors cx, cy, cz of the box coordinates */
-  double soften; /**< exponent that softens lower tissue; needs a reach (model.h) */
-  bool pair;     /**< whether the heights of a single lung also span its mirror image */
+  double gain;   /**< increase of the force from the uppermost to the lowest vertex */
+  double box[3]; /**< factors cx, cy and cz of the box coordinates X, Y and Z */
+  double soften; /**< softens lower tissue if above 0; requires a positive supine_model.reach */
+  bool pair; /**< whether to extend a single lung by its mirror image to find the lowest vertex */
 } supine_force_law;
 
-/** Find the smallest and the largest height g.p of all vertices p, in mm, for each of `count`
+/** Find the smallest and the largest value of g.p over all vertices p, in mm, for each of `count`
  * directions g [count, 3], into minimum [count] and maximum [count]. Uses all cores.
  * @param pair  whether to extend a single lung by its mirror image (supine_force_law)
  * @retval SUPINE_ERROR_MEMORY */
@@ -32,12 +33,13 @@ supine_status supine_physics_height_range(const supine_lungs *lungs, bool pair, 
                                           const double *directions, double *minimum,
                                           double *maximum);
 
-/** Directions of gravity and the range of heights along each; arrays are owned by the caller. */
+/** Directions of gravity g, and for each the range of g.p over all vertices p. The caller owns the
+ * arrays. */
 typedef struct supine_gravities {
   size_t count;
   const double *directions; /**< [count, 3] unit vectors g */
-  const double *minimum;    /**< [count] smallest g.p, mm (supine_physics_height_range) */
-  const double *maximum;    /**< [count] largest g.p, mm */
+  const double *minimum;    /**< [count] mm */
+  const double *maximum;    /**< [count] mm */
 } supine_gravities;
 
 /** Compute the force f on the given vertices for every direction of gravity, into force
@@ -47,11 +49,11 @@ void supine_physics_force(const supine_lungs *lungs, const supine_force_law *law
                           const supine_gravities *gravities, size_t vertex_count,
                           const size_t *vertices, double *force);
 
-/** Directions d of displacement: d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) mm by (15)-(17), with + in the
- * left lung, or directions fitted to a patient. */
+/** Directions of displacement: d = (+-c1 X^c2, -c3 Y^c4, -c5 Z^c6) in mm, with + in the left lung
+ * and box coordinates X, Y and Z (15)-(17), or directions fitted to a patient. */
 typedef struct supine_direction_law {
   double c[6];           /**< c1 to c6 (model.h) */
-  const double *vectors; /**< [N, 3] mm, which replace c, or NULL; owned by the caller */
+  const double *vectors; /**< [N, 3] directions that replace c, mm, or NULL; not owned */
 } supine_direction_law;
 
 /** Compute the directions d of all vertices into directions [N, 3], mm, not normalised.

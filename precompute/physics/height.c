@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the range of heights g.p of all vertices p for many directions g: min and max in (18). */
+/* Find the range of heights g.p over all vertices p for many directions g, for (18) in force.h. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -11,8 +11,8 @@
 #include "sh/base/parallel.h"
 
 /* Vertices are sorted along a Morton curve (1966) through 32 x 32 x 32 cells. BLOCK consecutive
- * vertices form a block, and GROUP blocks a group. The search skips blocks and groups whose
- * bounding boxes are too low. LANES directions are searched together. */
+ * vertices form a block, and GROUP blocks form a group. The search skips blocks and groups whose
+ * bounding boxes cannot contain a new greatest height. LANES directions are searched together. */
 enum { BLOCK = 64, GROUP = 32, CELL_BITS = 5, CELLS = 1 << (3 * CELL_BITS), LANES = 8 };
 
 typedef struct block_box {
@@ -23,19 +23,19 @@ typedef struct block_box {
 typedef struct range_work {
   size_t vertex_count;
   const double *vertices;  /* [vertex_count, 3] sorted along the curve, mm */
-  const block_box *boxes;  /* [box_count] boxes of the blocks */
-  const block_box *groups; /* boxes of GROUP blocks each */
+  const block_box *boxes;  /* [box_count] bounding boxes of the blocks */
+  const block_box *groups; /* bounding boxes of GROUP blocks each */
   size_t box_count;
   size_t direction_count;
   const double *directions;
   double *minimum, *maximum;
 } range_work;
 
-/* LANES directions of gravity. */
+/* LANES directions that are searched together. */
 typedef struct lanes {
   double g[3][LANES];    /* unit vectors */
   double size[3][LANES]; /* absolute value of each component of g */
-  double best[LANES];    /* greatest height g.p found so far, mm */
+  double best[LANES];    /* greatest height along g so far, mm */
 } lanes;
 
 static block_box box_of(const double *vertices, size_t count) {
@@ -54,7 +54,7 @@ static block_box box_of(const double *vertices, size_t count) {
   return box;
 }
 
-/* Return whether a box may hold a vertex above the best height of any lane. */
+/* Return whether a box may contain a vertex that is higher than `best` in some lane. */
 static inline bool may_improve(const block_box *box, const lanes *at) {
   const block_box b = *box;
   int64_t any = 0;
@@ -68,7 +68,7 @@ static inline bool may_improve(const block_box *box, const lanes *at) {
   return any != 0;
 }
 
-/* Raise the best height of each lane to the greatest height of a block's vertices. */
+/* Raise `best` of each lane to the greatest height of a vertex in a block. */
 static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   const size_t end =
       (block + 1) * BLOCK < work->vertex_count ? (block + 1) * BLOCK : work->vertex_count;
@@ -84,8 +84,8 @@ static inline void raise_best(const range_work *work, size_t block, lanes *at) {
   }
 }
 
-/* Find the greatest heights. Search block `seed` first; return the block searched last, which is a
- * good seed for similar directions. */
+/* Find the greatest height in each lane. Search block `seed` first. Return the block searched last,
+ * a good seed for similar directions. */
 static inline size_t search(const range_work *work, size_t seed, lanes *at) {
   raise_best(work, seed, at);
   for (size_t first = 0; first < work->box_count; first += GROUP) {
@@ -126,7 +126,7 @@ SUPINE_CLONES static void height_range(void *context, size_t begin, size_t end, 
   }
 }
 
-/* Return the index along the Morton curve of the cell that holds a vertex. */
+/* Return the index, along the Morton curve, of the cell that contains the vertex p. */
 static size_t cell_of(const block_box *box, const double *p) {
   size_t cell = 0;
   for (size_t k = 0; k < 3; ++k) {
@@ -155,7 +155,7 @@ static void sort_vertices(const double *vertices, size_t count, size_t *begin, d
   }
 }
 
-/* Find the bounding box of each run of `size` vertices. */
+/* Find the bounding box of every `size` consecutive vertices. */
 static void find_boxes(const double *vertices, size_t count, size_t size, block_box *boxes) {
   for (size_t i = 0; i < count; i += size) {
     boxes[i / size] = box_of(vertices + 3 * i, count - i < size ? count - i : size);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Move a scan to full inflation. The surface p at full inflation is the fixed point of the image
  * scan_j - A_j F(g; p) d_j(p), as reference.h explains. It is found by Anderson acceleration (D. G.
- * Anderson, J. ACM 12, 1965): the next p is the combination of the last images with the smallest
- * residual, image - p. */
+ * Anderson, J. ACM 12, 1965): the next p is the combination of the last few images for which the
+ * residual, image - p, is predicted to be smallest. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,15 +17,16 @@
 
 enum { SOLVES_MAX = 30, DEPTH = 4 };
 
-/* RMS residuals, mm. The iteration ends at `converged`, or at `stalled` if a step does not halve
- * the residual: near an almost degenerate triangle some vertices oscillate by about 0.03 mm. */
+/* RMS residuals, mm. The iteration ends if the residual is at most `converged`. It also ends if the
+ * residual is at most `stalled` and the last step did not halve it: near an almost degenerate
+ * triangle, some vertices oscillate by about 0.03 mm. */
 static const double converged = 5e-4;
 static const double stalled = 5e-3;
-static const double folded_share = 0.01; /* largest share of folded triangles in a valid surface */
-static const double ridge = 1e-12; /* relative regularisation, needed if residuals are equal */
+static const double folded_share = 0.01; /* largest accepted share of triangles that turn over */
+static const double ridge = 1e-12;       /* relative increase of the diagonal against singularity */
 
 typedef struct ascent {
-  supine_lungs lungs; /* current estimate; the caller owns its vertices */
+  supine_lungs lungs; /* current estimate of full inflation; the caller owns its vertices */
   supine_lungs scan;
   supine_model model;
   supine_reference *found;
@@ -35,9 +36,9 @@ typedef struct ascent {
   double *previous_image;    /* [size] mm */
   double *previous_residual; /* [size] mm */
   double rms;                /* RMS residual of the current estimate, mm */
-  double *image_changes;     /* [DEPTH, size] differences of successive images, mm */
+  double *image_changes;     /* [DEPTH, size] differences between successive images, mm */
   double *residual_changes;  /* [DEPTH, size] mm */
-  size_t stored, history;    /* number of changes stored so far, and number in use */
+  size_t stored, history;    /* number of changes stored so far, and of changes in use */
 } ascent;
 
 /* Check that few triangles turn over between the scan and full inflation. */
@@ -53,12 +54,12 @@ static supine_status check_folds(const ascent *a, supine_error *error) {
                                 100.0 * share);
 }
 
-/* Find the gains A of one lung in the scan. On the path from full inflation (sigma 0) to rest
- * (sigma 1) of supine/volume.h, gains are s (sigma + 2 bend e(sigma)). Two volumes determine the
- * scan's sigma and s: gains -A, applied to the scan, add `to_full` mL and lead to full inflation;
- * gains s - A add `to_rest` mL and lead to rest. For any sigma, `to_full` gives s. Secant steps
- * find the sigma that satisfies `to_rest`.
- * @param form  volume form of the field applied to the scan */
+/* Find the gains A of one lung in the scan. The path of supine/volume.h leads from full inflation
+ * (sigma = 0) to rest (sigma = 1). Its gains at sigma are s (sigma + 2 bend e(sigma)), with a scale
+ * s. Two volumes determine s and the sigma of the scan. The gains -A, applied to the scan, lead to
+ * full inflation and must add `to_full` mL; the gains s - A lead to rest and must add `to_rest` mL.
+ * For any sigma, `to_full` gives s; secant steps find the sigma that satisfies `to_rest`.
+ * @param form  volume that the displacement field adds to the lung in the scan */
 static supine_status find_lung_gains(const supine_volume_form *form, const double bend[3],
                                      bool at_rest, double to_full, double to_rest, double gains[3],
                                      supine_error *error) {
@@ -115,8 +116,9 @@ supine_status supine_reference_find_gains(const supine_lungs *scan, const double
   return status;
 }
 
-/* Compute the image of the current estimate: apply its field to the scan, with the gains that give
- * each lung its reference volume. */
+/* Compute the image of the current estimate: subtract the displacements that follow from the
+ * estimate from the vertices of the scan. Choose the gains so that each lung gets its reference
+ * volume. */
 static supine_status find_image(ascent *a, supine_error *error) {
   supine_solution *field = &a->field;
   a->rms = 0.0;
@@ -149,7 +151,7 @@ static double product(const double *a, const double *b, size_t size) {
   return sum;
 }
 
-/* Store the image and the residual, and their changes since the previous step. */
+/* Store image and residual of the current estimate, and their changes since the previous step. */
 static void store_differences(ascent *a) {
   double *images = a->image_changes + a->stored % DEPTH * a->size;
   double *residuals = a->residual_changes + a->stored % DEPTH * a->size;
@@ -167,7 +169,7 @@ static void store_differences(ascent *a) {
   }
 }
 
-/* Replace the estimate by the combination of images whose residual is smallest. */
+/* Replace the estimate by the combination of images with the smallest predicted residual. */
 static supine_status advance(ascent *a, supine_error *error) {
   double matrix[DEPTH * DEPTH];
   double weights[DEPTH] = {0.0};
@@ -187,7 +189,7 @@ static supine_status advance(ascent *a, supine_error *error) {
     if (gsl_linalg_HH_svx(&system.matrix, &right.vector) != 0) {
       return supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
-          "no surface at full inflation was found: successive steps are equal. If the scan is "
+          "no surface at full inflation was found: the iteration does not progress. If the scan is "
           "fuller than --scanned says, change --scanned or --resting; --scanned none uses the scan "
           "as it is");
     }
@@ -243,7 +245,7 @@ supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *
               .size = 3 * lungs->mesh.vertex_count};
   const size_t bytes = a.size * sizeof(double);
   supine_status status = SUPINE_OK;
-  a.model.share[0] = a.model.share[1] = 1.0; /* healthy lungs; collapse scales the finished field */
+  a.model.share[0] = a.model.share[1] = 1.0; /* as if healthy; collapse is applied later */
   a.scan.mesh.vertices = malloc(bytes);
   a.image = malloc(bytes);
   a.previous_image = calloc(a.size, sizeof *a.previous_image);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Constants of the two laws, and the physical model of a basis or of one solve. */
+ * Constants of the two displacement laws, and the physical model of a basis or of one solve. */
 #ifndef SUPINE_MODEL_H
 #define SUPINE_MODEL_H
 
@@ -44,14 +44,14 @@ typedef struct supine_model {
   supine_law law;
   supine_force_law force;
   supine_direction_law direction;
-  double bend[3];          /**< bend of the path from full inflation to rest (supine/volume.h) */
+  double bend[3];          /**< bend of the path from full inflation to rest (supine_volume_bend) */
   const double *stiffness; /**< [N] stiffness E, or NULL for 1 everywhere */
-  const double *lesions;   /**< [N] factors on the normalised E (disease.h), or NULL */
-  double reach; /**< mm, at most half the diagonal of the lungs' box; 0 for the paper's transfer */
-  double share[2]; /**< volume and breath of each lung relative to healthy; 1 unless collapsed */
+  const double *lesions;   /**< [N] factors that multiply the normalised stiffness, or NULL */
+  double reach;            /**< R of equilibrium.h, mm; 0 for the paper's transfer of force */
+  double share[2];         /**< volume of each lung as a share of the healthy lung's volume */
 } supine_model;
 
-/** Return the model of healthy lungs of uniform stiffness under a law. */
+/** Return the model of healthy lungs of uniform stiffness with the constants of a law. */
 supine_model supine_physics_model(supine_law law);
 
 /** Names of the laws, indexed by supine_law and ended by NULL. */

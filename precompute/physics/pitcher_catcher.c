@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the Pitcher/Catcher iteration, (5)-(14), as the paper states it. */
+/* Run the Pitcher/Catcher iteration, (5)-(14) of [Santhanam2008], as the paper states it. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -9,13 +9,13 @@
 typedef struct iteration {
   size_t node_count;
   size_t *clique_begin; /* [nodes + 2] index in `clique` of each node's first neighbour */
-  size_t *clique;       /* neighbours of each node */
-  double *te;      /* Te[j->i] from each node j to each neighbour i, in the order of `clique` */
-  double *te_self; /* [nodes] Te[j->j] */
-  double *pitcher; /* [nodes] force that is yet to be distributed; may be negative */
-  double *catcher; /* [nodes] force kept so far */
-  size_t *largest; /* [2 nodes] binary tree of nodes with the root 1. Leaf nodes + j is node j;
-                      entry k is the entry of 2 k and 2 k + 1 with the larger |pitcher| */
+  size_t *clique;       /* neighbours of every node, node by node */
+  double *te;           /* share of its force that a node passes to each neighbour */
+  double *te_self;      /* [nodes] share of its force that each node keeps */
+  double *pitcher;      /* [nodes] force that is yet to be distributed; may be negative */
+  double *catcher;      /* [nodes] force kept so far */
+  size_t *largest; /* [2 nodes] binary tree of nodes. Entry 1 is the root, entry nodes + j is node
+                      j, entry k is the one of entries 2 k and 2 k + 1 with the larger |pitcher| */
 } iteration;
 
 static void iteration_free(iteration *it) {
@@ -28,7 +28,7 @@ static void iteration_free(iteration *it) {
   free(it->largest);
 }
 
-/* Update the tree after the Pitcher of `node` has changed. */
+/* Update the tree it->largest after the Pitcher of `node` has changed. */
 static void update(iteration *it, size_t node) {
   for (size_t k = (it->node_count + node) / 2; k > 0; k /= 2) {
     const size_t a = it->largest[2 * k];
@@ -37,7 +37,7 @@ static void update(iteration *it, size_t node) {
   }
 }
 
-/* Build the cliques and the local transfers Te of (8). Return false if out of memory. */
+/* Find the neighbours of every node and the shares Te of (8). Return false if out of memory. */
 static bool iteration_create(const supine_mesh *mesh, const supine_topology *topology,
                              const double *stiffness, iteration *it) {
   const size_t n = mesh->vertex_count;
@@ -54,7 +54,6 @@ static bool iteration_create(const supine_mesh *mesh, const supine_topology *top
       it->pitcher == NULL || it->catcher == NULL || it->largest == NULL) {
     return false;
   }
-  /* Shifted by one entry, because filling the cliques advances begin[j] to the end of clique j. */
   size_t *begin = it->clique_begin + 1;
   for (size_t e = 0; e < topology->edge_count; ++e) {
     ++begin[topology->edges[2 * e] + 1];

@@ -30,7 +30,7 @@ supine_status supine_reference_scan_parse(const char *text, supine_scan *scan,
   return SUPINE_OK;
 }
 
-/* Compute a lung's volume at t (resting.h) from its volumes at rest and at full inflation. */
+/* Compute a lung's volume at the filling t of resting.h from those at rest and full inflation. */
 static double volume_at(double rest, double full, double t) {
   return t < 0.0 ? rest * (1.0 + t) : rest * (1.0 - t) + full * t;
 }
@@ -67,9 +67,10 @@ void supine_reference_share_out(const supine_reference *reference, const double 
   }
 }
 
-/* Find the reference volume F of each lung from the volumes in the scan, volume [lung_count], mL.
- * Each t of resting.h gives an F; bisect t until the scan differs from rest, or from full
- * inflation, by as many mL as its state says. */
+/* Find the volume F of the reference surface of each lung from the volumes in the scan, volume
+ * [lung_count], mL. Each degree of filling t (resting.h) gives an F for each lung. Bisect t until
+ * the volume in the scan differs from the volume at rest, or at full inflation, by as many mL as
+ * the state of the scan says. */
 static supine_status find_full(supine_reference *found, const double *volume, supine_error *error) {
   const supine_state *state = &found->scan.state;
   const bool from_rest = state->volume.kind == SUPINE_VOLUME_REST;
@@ -78,7 +79,7 @@ static supine_status find_full(supine_reference *found, const double *volume, su
   double high = 1.0;
   double t = from_rest ? 0.0 : 1.0;
   for (int halving = 0; halving < 60; ++halving) {
-    double beyond = 0.0; /* volume of the scan above rest or full inflation at this t, mL */
+    double beyond = 0.0; /* scan volume minus the volume at rest or full inflation, mL */
     for (size_t lung = 0; lung < found->lung_count; ++lung) {
       const double rest =
           supine_reference_resting_share(&found->resting, found->side[lung], state->gravity);
@@ -104,8 +105,8 @@ static supine_status find_full(supine_reference *found, const double *volume, su
     (void)supine_state_print(state, text, sizeof text);
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "a scan of %.0f mL cannot be '%s': %s. Change --scanned", held, text,
-                            beyond_full ? "that is beyond full inflation"
-                                        : "that is less than the tissue, 10 % of full inflation");
+                            beyond_full ? "it is beyond full inflation"
+                                        : "it is less than the tissue, 10 % of full inflation");
   }
   return SUPINE_OK;
 }

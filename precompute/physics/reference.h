@@ -4,18 +4,19 @@
  *
  * A lung at full inflation has nearly the same shape in every posture; at smaller volumes the
  * lowest regions are the emptiest (Milic-Emili 1966; Glazier 1967 found alveoli of one size at 30
- * cmH2O). Displacements are therefore measured from full inflation. Coordinate j of vertex i is
+ * cmH2O). Displacements are therefore measured from full inflation. With gravity along g,
+ * coordinate j of vertex i is
  *
  *     x_ij(g) = p_ij + A_j F_i(g) d_ij
  *
- * with p the surface at full inflation, F the catch (equilibrium.h), d the direction (force.h) and
- * A the gains of the lung, which follow from its volume (supine_volume_form_gains). A scan shows
- * such positions. As F and d depend on p, the unknown p is the fixed point of
+ * where p is the surface at full inflation, F the catch (equilibrium.h), d the direction (force.h)
+ * and A the gains of the lung, which follow from its volume (supine_volume_form_gains). A scan
+ * shows the lungs at such positions x. As F and d depend on p, the unknown p is the fixed point of
  *
  *     p_j = scan_j - A_j F(g_scan; p) d_j(p)
  *
- * with A from the volume between the scan and full inflation. For one person, p is nearly the same
- * whatever state was scanned. */
+ * where A follows from the difference in volume between the scan and full inflation. For one
+ * person, p is nearly the same whatever state was scanned. */
 #ifndef SUPINE_REFERENCE_H
 #define SUPINE_REFERENCE_H
 
@@ -26,7 +27,7 @@
 
 typedef struct supine_scan {
   bool known;         /**< whether the state is known; if not, the scan is the reference surface */
-  supine_state state; /**< rest or full inflation, with a difference in mL */
+  supine_state state; /**< rest or full inflation, plus or minus a volume in mL */
 } supine_scan;
 
 /** Parse a scan's state: "full", "supine:rest", "left:rest+300", "full-2000", or "none". The
@@ -34,24 +35,24 @@ typedef struct supine_scan {
  * @retval SUPINE_ERROR_ARGUMENT  anything else; `error` lists the valid forms */
 supine_status supine_reference_scan_parse(const char *text, supine_scan *scan, supine_error *error);
 
-/** Axes and unit of the input files; both are zero if the files' axes differ. */
+/** Axes and unit of the input files; both are zero if the files have different axes. */
 typedef struct supine_scan_frame {
   supine_axes axes;
   double millimetres_per_unit;
 } supine_scan_frame;
 
-/** Volumes of gas and tissue of each lung, mL, without disease, and the gains of the scan. */
+/** State of the scan, and volumes of healthy lungs: gas and tissue, mL. */
 typedef struct supine_reference {
-  bool known; /**< whether rest is known; if not, volumes are relative to the scan */
+  bool known; /**< whether the volume at rest is known; if not, volumes count from the scan */
   supine_scan scan;
   supine_resting resting; /**< volumes at rest as shares of full_volume */
   size_t lung_count;
   int side[2];           /**< +1 left, -1 right */
-  double full_volume[2]; /**< F, volume of the reference surface */
+  double full_volume[2]; /**< volume F of the reference surface */
   double scan_volume[2]; /**< volume of the scan minus full_volume; negative below full inflation */
-  double scan_rest[2];   /**< volume at rest in the scan's posture; 0 if the scan is full */
-  double scan_gains[2][3]; /**< gains of each lung in the scan */
-  size_t solves;           /**< number of solves to reach the fixed point */
+  double scan_rest[2];   /**< volume at rest in the posture of the scan; 0 for a full scan */
+  double scan_gains[2][3]; /**< gains x, y, z of each lung in the scan, from full inflation */
+  size_t solves; /**< number of solves of the full physics to find the surface at full inflation */
 } supine_reference;
 
 /** Find the reference volumes of scanned lungs, and move the lungs to full inflation, in place.
@@ -70,22 +71,23 @@ double supine_reference_rest(const supine_reference *reference, const double g[3
 /** Compute the volume of each lung at full inflation into ml [lung_count]. Return their sum. */
 double supine_reference_full(const supine_reference *reference, const double g[3], double *ml);
 
-/** Divide `total` mL between the lungs, which have the same t of resting.h, into ml
- * [lung_count]. */
+/** Divide the volume `total`, mL, between the lungs so that all have the same degree of filling t
+ * (resting.h). Write their volumes to ml [lung_count]. */
 void supine_reference_share_out(const supine_reference *reference, const double g[3], double total,
                                 double *ml);
 
-/** Move scanned lungs to their reference volumes F, in place, by solving for the fixed point p.
- * lungs->scanned receives the vertices of the scan. Statuses as supine_reference_find.
+/** Move the vertices of scanned lungs to full inflation, in place. Each lung then has its volume
+ * reference->full_volume. lungs->scanned receives the vertices of the scan. Statuses as
+ * supine_reference_find.
  * @param reference  has the scan and the volumes; scan_gains and solves are written */
 supine_status supine_reference_inflate(supine_lungs *lungs, const supine_model *model,
                                        supine_reference *reference, supine_error *error);
 
-/** Find the gains of the scan for which the field of the reference surface, applied to the scan,
- * leads to the volumes at full inflation and at rest.
+/** Find the gains A of each lung in the scan. If s is the gain at rest, gains of -A applied to the
+ * scan must lead to the volume at full inflation, and gains of s - A to the volume at rest.
  * @param scan        closed lungs with the scan's vertices
- * @param directions  [N, 3] d, mm
- * @param amounts     [N] F for gravity as in the scan
+ * @param directions  [N, 3] directions d of displacement, mm
+ * @param amounts     [N] catch F, with gravity as in the scan
  * @param reference   has the volumes; scan_gains are written
  * @retval SUPINE_ERROR_NUMERICAL  no gains give these volumes */
 supine_status supine_reference_find_gains(const supine_lungs *scan, const double bend[3],
@@ -99,17 +101,18 @@ typedef struct supine_person {
   supine_sex sex;
 } supine_person;
 
-/** Estimate the smallest and the largest volume, mL of gas and tissue, that both lungs of usual
- * adults have at full inflation, supine. If height and sex are known, both values are equal. */
+/** Estimate the volume of both lungs at full inflation, supine, as a range in mL of gas and tissue.
+ * If the height or the sex is unknown, the range covers the usual heights of adults or both sexes.
+ * If both are known, the two values are equal. */
 void supine_reference_capacity(const supine_person *person, double range[2]);
 
-/** Append the full volume, in mL, that is expected of the lungs to text [size]: "expected 6500", or
- * "an adult's 4566 to 8525" if height or sex is unknown. */
+/** Append the expected volume at full inflation, mL, to text [size]: "expected 6500", or "an
+ * adult's 4566 to 8525" if height or sex is unknown. */
 void supine_reference_compare(const supine_reference *reference, const supine_person *person,
                               char *text, size_t size);
 
-/** Write a warning if the full volume is implausible for the person, or if the volume of a scan at
- * rest contradicts the volume given for rest.
+/** Write a warning if the volume at full inflation is implausible for the person, or if the volume
+ * of a scan at rest contradicts the volume that the user gave for rest.
  * @param given  the user's volumes at rest, before supine_reference_resting_settle
  * @param text   [size] the warning; empty if there is none */
 void supine_reference_doubt(const supine_reference *reference, const supine_person *person,

@@ -29,7 +29,7 @@
 static const supine_resting usual = {.share = {{0.413, 0.563, 0.418, 0.464, 0.418, 0.481},
                                                {0.546, 0.435, 0.440, 0.475, 0.440, 0.506}}};
 
-static const double least_share = 0.1; /* share of the tissue alone */
+static const double least_share = 0.1; /* volume of the tissue / full volume */
 static const double most_share = 1.0;
 
 supine_resting supine_reference_resting_default(void) {
@@ -106,7 +106,7 @@ void supine_reference_resting_print(const supine_resting *resting, char *text, s
 supine_status supine_reference_resting_settle(supine_resting *resting, size_t count,
                                               const int *side, const double *full,
                                               supine_error *error) {
-  double sum = 0.0; /* sum of the ratios of given to default volume */
+  double sum = 0.0; /* sum over postures of the given volume divided by the default volume */
   size_t known = 0;
   for (size_t axis = 0; axis < 6; ++axis) {
     double rest = 0.0;
@@ -169,14 +169,14 @@ double supine_reference_along_axes(const double values[6], const double g[3]) {
   return value;
 }
 
-/* Let e_k be the mean of the values along +k and -k, and m the mean of e_x, e_y and e_z. With g =
- * (x, y, z), the sum of e_k g_k^2 is
+/* Let e_k be the mean of the values along +k and -k for k = x, y, z, and m the mean of e_x, e_y,
+ * e_z. At the unit vector g = (x, y, z), the sum of e_k g_k^2 is
  *
  *     m + (e_z - m) (3 z^2 - 1) / 2 + (e_x - e_y) / 2 (x^2 - y^2)
  *
- * Each coefficient is divided by the factor of the polynomial in its harmonic. */
+ * 1, 3 z^2 - 1 and x^2 - y^2 are harmonics divided by factors, which divide their coefficients. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]) {
-  static const size_t axis_term[3] = {3, 1, 2}; /* harmonics of band 1 along x, y and z */
+  static const size_t axis_term[3] = {3, 1, 2}; /* harmonics proportional to x, y and z */
   double even[3];
   for (size_t t = 0; t < 9; ++t) {
     harmonics[t] = 0.0;

@@ -2,10 +2,10 @@
 /** @file
  * Compute volumes at rest and at full inflation, by posture and by lung.
  *
- * At rest, lung l holds the share r_l(g) of its reference volume F_l, tissue included. At full
- * inflation it holds phi(g) F_l with phi(g) = 1 + 0.109 max(0, -g_z)^2, which is larger upright.
- * Between these volumes, each lung fills linearly (Milic-Emili, J Appl Physiol 1966), with one t
- * for both lungs:
+ * With gravity along g, lung l at rest holds the share r_l(g) of F_l, the volume of its reference
+ * surface, tissue included. At full inflation it holds phi(g) F_l with phi(g) = 1 + 0.109 max(0,
+ * -g_z)^2, which is larger upright. Between these volumes, each lung fills linearly (Milic-Emili, J
+ * Appl Physiol 1966), and both lungs have the same degree of filling t:
  *
  *     V_l = F_l [r_l + (phi - r_l) t]      for t >= 0; t is 0 at rest and 1 at full inflation
  *     V_l = F_l r_l (1 + t)                for t < 0; both lungs shrink in proportion */
@@ -26,16 +26,16 @@
 /** Volumes at rest with gravity along +x, -x, +y, -y, +z, -z: lying on the left, on the right,
  * supine, prone, head down, upright. */
 typedef struct supine_resting {
-  double share[2][6]; /**< share r of the left and the right lung */
+  double share[2][6]; /**< volume at rest / reference volume of the left, the right lung */
   double ml[6];       /**< volume of both lungs together, mL; 0 where a share was given */
 } supine_resting;
 
 /** Return the default shares, for healthy people; resting.c names their sources. */
 supine_resting supine_reference_resting_default(void);
 
-/** Set the volume at rest in a posture along an axis ("prone", ...; posture.h).
+/** Set the volume at rest in a posture with gravity along an axis, such as "prone" (posture.h).
  * @param value  "0.43", a share of the full volume; "0.42/0.44", shares for the left and the right
- *               lung; "2600mL", gas and tissue of both lungs together
+ *   lung; "2600mL", gas and tissue of both lungs together
  * @retval SUPINE_ERROR_ARGUMENT  no such posture, or a volume out of range */
 supine_status supine_reference_resting_set(supine_resting *resting, const char *posture,
                                            const char *value, supine_error *error);
@@ -44,8 +44,9 @@ supine_status supine_reference_resting_set(supine_resting *resting, const char *
  * 256 characters are enough. */
 void supine_reference_resting_print(const supine_resting *resting, char *text, size_t size);
 
-/** Convert volumes in mL into shares of the reference volumes. If any was given in mL, shares that
- * still have their default are multiplied by the mean ratio of given to default volume.
+/** Convert volumes at rest in mL into shares of the reference volumes F. If a volume was given in
+ * mL for some posture, shares that still have their default are multiplied by the mean ratio of
+ * given to default volume.
  * @param side  [count] +1: left lung, -1: right lung
  * @param full  [count] F, mL
  * @retval SUPINE_ERROR_ARGUMENT  a share out of range: less than the tissue alone, or above 1 */
@@ -53,14 +54,15 @@ supine_status supine_reference_resting_settle(supine_resting *resting, size_t co
                                               const int *side, const double *full,
                                               supine_error *error);
 
-/** Compute r, the share of F that one lung holds at rest, with gravity along the unit vector g.
+/** Compute a lung's volume at rest as a share of its reference volume, with gravity along g.
  * @param side  +1: left lung, -1: right lung */
 double supine_reference_resting_share(const supine_resting *resting, int side, const double g[3]);
 
-/** Compute phi, the share of F held at full inflation, with gravity along the unit vector g. */
+/** Compute the volume at full inflation as a share of the reference volume, for gravity along g. */
 double supine_reference_full_share(const double g[3]);
 
-/** Compute r of both lungs together, with SUPINE_LEFT_SHARE of their F in the left lung. */
+/** Compute the volume of both lungs at rest as a share of their reference volume, of which the left
+ * lung has SUPINE_LEFT_SHARE. */
 double supine_reference_resting_total(const supine_resting *resting, const double g[3]);
 
 /** Interpolate the values v along the axes +x, -x, +y, -y, +z, -z at the unit vector g:
@@ -68,7 +70,7 @@ double supine_reference_resting_total(const supine_resting *resting, const doubl
  *     sum over k of (v(+k) - v(-k)) / 2 g_k + (v(+k) + v(-k)) / 2 g_k^2 */
 double supine_reference_along_axes(const double values[6], const double g[3]);
 
-/** Expand supine_reference_along_axes in the real harmonics [9] of bands 0 to 2 (sh.h). */
+/** Find the real harmonics [9] of bands 0 to 2 (sh.h) that sum to supine_reference_along_axes. */
 void supine_reference_harmonics(const double values[6], double harmonics[9]);
 
 #endif

@@ -13,16 +13,16 @@
 typedef struct supine_solution {
   size_t vertex_count;
   supine_equilibrium *equilibrium; /**< kept for the next solve of the same lungs */
-  double *catch_;                  /**< [N] F (equilibrium.h) */
-  double *directions;              /**< [N, 3] d, mm; for collapsed lungs scaled by
+  double *catch_;                  /**< [N] catch F (equilibrium.h) */
+  double *directions;              /**< [N, 3] directions, mm, for collapsed lungs as in
                                       supine_tissue_collapse_directions */
   double cubic[3]; /**< volume gained at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3, mL */
-  supine_volume_form form[2]; /**< volume that each lung gains as a form of its three gains, mL */
+  supine_volume_form form[2]; /**< volume gained by each lung, mL */
 } supine_solution;
 
 /** Solve for gravity along the unit vector `g`.
  * @param solution  zero-initialised, or an earlier solution of the same lungs, whose memory is then
- *   reused; vertices may have moved. Empty after a failure. Release it with
+ *   reused; vertices may have moved. After an error it is empty. Release it with
  *   supine_physics_solution_free
  * @retval SUPINE_ERROR_ARGUMENT, SUPINE_ERROR_MESH, SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_physics_solve(const supine_lungs *lungs, const supine_model *model,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute linear, quadratic and cubic forms of the volume that closed lungs gain. */
+/* Compute the volume that closed lungs gain as linear, quadratic and cubic forms of weights. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
  * FORM terms. */
 enum { PARTS = 16, BLOCK = 128, FIELDS = SUPINE_VOLUME_FIELDS, FORM = 7 };
 
-static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron, mL per mm^3 of determinant */
+static const double sixth_ml = 1e-3 / 6.0; /* volume of a tetrahedron in mL / determinant in mm^3 */
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms) {
   free(forms->linear);
@@ -25,11 +25,11 @@ void supine_physics_volume_forms_free(supine_volume_forms *forms) {
 
 typedef struct lung_work {
   const supine_lungs *lungs;
-  const double *directions; /* [N, 3] mm, or NULL if the columns are vectors */
-  const double *columns;    /* [N, count], or [N, 3, count] without directions */
+  const double *directions; /* [N, 3] mm; NULL if each column holds vectors */
+  const double *columns;    /* [N, count]; [N, 3, count] if directions is NULL */
   size_t count;             /* number of columns */
   size_t lung;
-  double centre[3]; /* centre of the lungs' box, mm, subtracted from vertices */
+  double centre[3]; /* centre of the box of all lungs, mm, subtracted from each vertex */
   double *sums;     /* [PARTS, size] */
   size_t size;      /* number of sums of one part */
   double *space;    /* [threads, room] */
@@ -46,7 +46,7 @@ static lung_work begin_lung(const supine_lungs *lungs, const double *directions,
   return work;
 }
 
-/* Read a triangle's corners, mm from the centre of the box. Return their vertex indices. */
+/* Read a triangle's corners, mm from work->centre. Return their vertex indices. */
 static const uint32_t *read_corners(const lung_work *work, size_t triangle, double p[3][3]) {
   const uint32_t *corner = work->lungs->mesh.triangles + 3 * triangle;
   for (size_t v = 0; v < 3; ++v) {
@@ -62,12 +62,12 @@ static size_t part_begin(const lung_work *work, size_t part) {
   return begin[0] + (begin[1] - begin[0]) * part / PARTS;
 }
 
-/* Return the index of the product of columns k and l among the distinct products. */
+/* Return the index of the pair of columns k and l, in either order, among all pairs of columns. */
 static size_t pair_of(size_t k, size_t l) {
   return k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
 }
 
-/* Add factor (a_k b_l + a_l b_k) to pairs [count (count + 1) / 2] for all k >= l. */
+/* Add factor (a_k b_l + a_l b_k) for all k >= l to pairs, a lower triangle stored by rows. */
 static void add_pairs(size_t count, double factor, const double *a, const double *b,
                       double *pairs) {
   for (size_t k = 0; k < count; ++k) {
@@ -79,9 +79,10 @@ static void add_pairs(size_t count, double factor, const double *a, const double
   }
 }
 
-/* Add the cubic terms of n triangles to sums [pairs, count]. The term of a triangle is det(u0, u1,
- * u2) of its corners' displacements, made symmetric in the columns of corners 0 and 1. With
- * directions d and columns c it is det(d0, d1, d2) c0 c1 c2. x is work space. */
+/* Add the cubic terms of n triangles to sums [pairs, count]: a row is a pair of columns at corners
+ * 0 and 1, a column is one at corner 2. The term of a triangle is det(u0, u1, u2) of the
+ * displacements of its corners, averaged over both orders of a pair. With directions d and columns
+ * c, it is det(d0, d1, d2) c0 c1 c2. x is work space. */
 SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t n, const double *u,
                                     double *x, double *sums) {
   const size_t count = work->count;
@@ -114,10 +115,10 @@ SUPINE_CLONES static void add_cubic(const lung_work *work, size_t begin, size_t 
   }
 }
 
-/* Add the terms of det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK, with corners p and
- * their displacements u. Linear terms have a sum for each axis of u, quadratic terms one for each
- * axis of p. In u, area and at, the first corners of all n triangles precede the second corners,
- * and these precede the third. */
+/* Add the terms of the determinants det(p0 + u0, p1 + u1, p2 + u2) of n triangles, at most BLOCK,
+ * to `sums`. p are the corners of a triangle and u their displacements. Terms linear in u have a
+ * sum for each axis of u, terms quadratic in u have one for each axis of p. The arrays u, area and
+ * at hold the first corners of all n triangles, then the second corners, then the third. */
 SUPINE_CLONES static void add_block(const lung_work *work, size_t begin, size_t n, double *u,
                                     double *sums) {
   const size_t count = work->count;

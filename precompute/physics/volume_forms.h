@@ -2,9 +2,10 @@
 /** @file
  * Compute the volume of a deformed lung without a pass over its vertices.
  *
- * If vertex i is displaced by u_ij = A_j (sum over k of w_k c_ik) d_ij along axis j, the volume
- * that a closed surface gains is a polynomial of the gains A and the weights w (supine/volume.h).
- * Its coefficients, the forms, are computed once for K columns c and hold for all weights. */
+ * If vertex i moves by u_ij = A_j (sum over k of w_k c_ik) d_ij along axis j, with gains A, weights
+ * w of K columns c, and directions d, the volume that a closed surface gains is a polynomial of A
+ * and w (supine/volume.h). Its coefficients, the forms, are computed once for all gains and
+ * weights. */
 #ifndef SUPINE_VOLUME_FORMS_H
 #define SUPINE_VOLUME_FORMS_H
 
@@ -15,31 +16,31 @@
 /** Largest number of modes that 'supine precompute' writes to a basis. */
 enum { SUPINE_MODES_MADE_MAX = 64 };
 
-/** Coefficients of the volumes that G lungs gain, mL, as cubic polynomials of K weights. */
+/** Coefficients of the volumes that G lungs gain, mL, as polynomials of K weights and the gains. */
 typedef struct supine_volume_forms {
   size_t lung_count;
   size_t column_count;
   double *linear;    /**< [G, 3, K] */
   double *quadratic; /**< [G, 3, K, K] symmetric in the last two indices */
-  double *cubic;     /**< [G, K, K, K] symmetric */
+  double *cubic;     /**< [G, K, K, K] symmetric in the last three indices */
 } supine_volume_forms;
 
 void supine_physics_volume_forms_free(supine_volume_forms *forms);
 
 /** Compute the forms of closed lungs. Free them with supine_physics_volume_forms_free.
- * @param share       [G] volume of each lung relative to healthy (disease.h), or NULL for 1
- * @param directions  [N, 3] d of the healthy shape, mm; if NULL, the columns are vectors, and
- *                    u_ij = A_j sum over k of w_k c_ijk
+ * @param share       [G] volume of each lung divided by its healthy volume (disease.h); NULL for 1
+ * @param directions  [N, 3] directions d for healthy lungs, mm; if NULL, each column holds vectors,
+ *   and u_ij = A_j sum over k of w_k c_ijk
  * @param columns     [N, count] c; without directions [N, 3, count]
- * Cost: count^3 / 2 multiplications per triangle, three times that without directions.
- * Uses all cores.
+ * Cost: count^3 / 2 multiplications per triangle, three times that without directions. Uses all
+ * cores.
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_physics_volume_forms_create(const supine_lungs *lungs, const double *share,
                                                  const double *directions, const double *columns,
                                                  size_t count, supine_volume_forms *forms,
                                                  supine_error *error);
 
-/** Largest number of fields of supine_physics_volume_of_fields. */
+/** Largest number of fields in one call of supine_physics_volume_of_fields. */
 enum { SUPINE_VOLUME_FIELDS = 16 };
 
 /** Compute the volume form of each closed lung for each of `count` fields u_ij = A_j f_i d_ij.
@@ -51,7 +52,7 @@ void supine_physics_volume_of_fields(const supine_lungs *lungs, const double *sh
                                      const double *directions, const double *fields, size_t count,
                                      supine_volume_form *forms);
 
-/** Compute the volume form of one lung at weights [K], mL. */
+/** Compute the volume that one lung gains at weights [K], mL, as a polynomial of its gains. */
 void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms, size_t lung,
                                                const double *weights, supine_volume_form *form);
 
@@ -60,7 +61,7 @@ void supine_physics_volume_forms_contract_lung(const supine_volume_forms *forms,
 void supine_physics_volume_forms_contract(const supine_volume_forms *forms, const double *weights,
                                           double cubic[3]);
 
-/** Add a form with one gain s on all axes to the coefficients cubic [3] of s, s^2 and s^3, mL. */
+/** Evaluate a form at equal gains s. Add its coefficients of s, s^2 and s^3, mL, to cubic [3]. */
 void supine_physics_volume_form_add(const supine_volume_form *form, double cubic[3]);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure the error of a compressed field against the full solve at held-out directions, and the
- * share of triangles that a state turns over. */
+/* Measure the error of a compressed field against the full physics for held-out directions of
+ * gravity, and the share of triangles that turn over in a state. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -17,8 +17,8 @@
 #include "precompute/projection/tally.h"
 
 /* The vertices are divided into PARTS parts, which are evaluated BLOCK vertices at a time. The
- * number of parts is fixed, so that sums do not depend on the number of threads. A volume is halved
- * at most VOLUME_HALVINGS times. */
+ * number of parts is fixed, so that sums do not depend on the number of threads. If the lungs
+ * cannot reach a volume, it is halved, at most VOLUME_HALVINGS times. */
 enum { BLOCK = 128, PARTS = 16, VOLUME_HALVINGS = 10 };
 
 /* Sums over one of the PARTS of the vertices. */
@@ -33,13 +33,13 @@ typedef struct accuracy_work {
   const supine_compression *compression;
   const double *directions; /* [N, 3] mm */
   const double *weights;    /* [D, K] */
-  const double *scales;     /* [D, 2] gains of the full solve and the compression */
+  const double *scales;     /* [D, 2] gains of the exact and the compressed field */
   tally *tallies;           /* [PARTS] */
   double *space;            /* [threads, BLOCK, K + 2 D] */
 } accuracy_work;
 
-/* Compute the errors |a approximate - b exact| length, mm, of the displacement by a field with gain
- * a, where the exact field has gain b. */
+/* Compute the errors |a approximate - b exact| length, mm, of n displacements. a and b are the
+ * gains of the approximate and the exact field. */
 SUPINE_CLONES static void find_errors(size_t n, const double *approximate, const double *exact,
                                       const double *length, double a, double b, double *out) {
   for (size_t i = 0; i < n; ++i) {
@@ -94,8 +94,9 @@ static void compare_range(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
-/* Find the gains at which the full solve and the compression each reach `part` times the volumes
- * [D]. Return false if either does not reach its volume in some direction. */
+/* For each held-out direction, find the gains at which the exact and the compressed field change
+ * the volume of the lungs by `part` times volumes [D]. Return false if no such gain exists for some
+ * direction. */
 static bool find_scales(const supine_truth *truth, const supine_volume_forms *forms,
                         const double *weights, const double *volumes, double part, double *scales) {
   for (size_t d = 0; d < truth->direction_count; ++d) {
@@ -121,7 +122,7 @@ static double volume_along(const double harmonics[9], const double g[3]) {
   return volume;
 }
 
-/* Return the first of the parts 1, 1/2, 1/4, ... for which find_scales succeeds, or 0 if none. */
+/* Return the first of the parts 1, 1/2, 1/4, ... that find_scales() accepts, or 0 if none. */
 static double find_part(const accuracy_work *work, const supine_volume_forms *forms,
                         const double *volumes, double *scales) {
   double part = 1.0;
@@ -133,7 +134,7 @@ static double find_part(const accuracy_work *work, const supine_volume_forms *fo
   return 0.0;
 }
 
-/* Merge the sums of all parts and compute the errors. */
+/* Merge the sums of all parts of the vertices, and compute the errors from them. */
 static void conclude(const accuracy_work *work, supine_accuracy *made) {
   const double samples =
       (double)work->compression->vertex_count * (double)work->truth->direction_count;
@@ -179,11 +180,12 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
   }
   accuracy->volume = find_part(&work, forms, volumes, scales);
   if (accuracy->volume == 0.0) {
-    status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                              "the error cannot be measured: the surface folds before the lungs "
-                              "reach a thousandth of %g mL; check the surface and the constants "
-                              "of the law",
-                              volumes[0]);
+    status =
+        supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                         "the error cannot be measured: the surface folds before the lungs "
+                         "change by a thousandth of %g mL; check the surface and the constants "
+                         "of the displacement law",
+                         volumes[0]);
     goto cleanup;
   }
   supine_parallel_for(PARTS, 1, threads, compare_range, &work);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Measure the error of a compressed field against the full solve, at directions that no grid used,
- * and the share of triangles that the field turns over. */
+ * Measure the error of a compressed field against the full physics for held-out directions of
+ * gravity, and the share of triangles that the field turns over. */
 #ifndef SUPINE_ACCURACY_H
 #define SUPINE_ACCURACY_H
 
@@ -14,28 +14,28 @@
 /** Errors of displacement over all vertices and held-out directions. */
 typedef struct supine_accuracy {
   size_t direction_count;
-  /** Errors at equal gains, as fractions of the RMS displacement. */
+  /** Errors of states with equal gains, as fractions of the RMS displacement. */
   double relative_rms, relative_p95, relative_max;
-  /** Errors at equal volumes, mm; for fields of another simulator, at the given displacements. */
+  /** Errors of states with equal volumes, or of the given fields of another simulator, mm. */
   double rms_mm, p95_mm, max_mm;
   /** Fraction of the requested volume at which the errors in mm were measured. If rest is unknown,
-   * supine_precompute replaces the fraction by the volume in mL. 0 for fields of another simulator,
-   * whose errors are not measured at a volume. */
+   * supine_precompute replaces it by the volume in mL. 0 for fields of another simulator. */
   double volume;
 } supine_accuracy;
 
-/** The full solve at D held-out directions, which no grid used. The fields are columns x
- * functions^T, exact up to the tolerance of span.c. */
+/** Solutions of the full physics for D held-out directions of gravity. At vertex i, the field for
+ * direction d is sum over k of columns[i, k] functions[d, k], up to the tolerance of span.c. */
 typedef struct supine_truth {
   size_t direction_count;
   double *directions; /**< [D, 3] unit vectors */
   size_t rank;
   const double *columns; /**< [N, rank] owned by the projection */
   double *functions;     /**< [D, rank] weights of the columns */
-  double *cubic;         /**< [D, 3] volume, mL, as a cubic of the gain */
+  double *cubic; /**< [D, 3] coefficients of the gained volume, mL, as a cubic of the gain */
 } supine_truth;
 
-/** Find the full solve at `count` held-out directions. The projection must outlive `truth`.
+/** Solve the full physics for `count` held-out directions of gravity. The projection must outlive
+ * `truth`.
  * @param directions  [N, 3] directions of displacement, mm
  * @param truth       release with supine_accuracy_truth_free
  * @retval SUPINE_ERROR_MEMORY */
@@ -48,11 +48,12 @@ void supine_accuracy_truth_free(supine_truth *truth);
 /** Spread directions [count, 3] evenly along a golden-angle spiral that avoids the grid's nodes. */
 void supine_accuracy_held_out_directions(size_t count, double *directions);
 
-/** Measure the error. The 95th percentiles come from a histogram whose bins are at most 0.4 % wide.
+/** Measure the error of a compressed field. The 95th percentiles come from a histogram whose bins
+ * are at most 0.4 % wide.
  * @param directions  [N, 3] directions of displacement, mm
  * @param forms       volume forms of the compression
- * @param volume      [9] harmonics of the volume at which errors in mm are measured, mL beyond the
- *             reference surface; halved until the field reaches it in every direction
+ * @param volume      [9] harmonics of the volume minus that of the reference surface, mL, at which
+ *   errors in mm are measured; halved until the field reaches it in every direction
  * @retval SUPINE_ERROR_NUMERICAL  not even a thousandth of the volume is reached
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_measure(const supine_truth *truth,
@@ -61,25 +62,26 @@ supine_status supine_accuracy_measure(const supine_truth *truth,
                                       const double volume[9], supine_accuracy *accuracy,
                                       supine_error *error);
 
-/** Find the share, 0 to 1, of triangles whose normal turns by more than a right angle between the
- * reference surface and a volume. It is the largest share in the six postures with gravity along an
- * axis. Postures in which the field cannot reach the volume are left out. Up to 50,000 evenly
- * chosen triangles are examined. Above a few in a thousand, the surface looks torn.
+/** Find the share, 0 to 1, of triangles whose normals on the reference surface and on the surface
+ * at a given volume differ by more than a right angle. It is the largest share in the six postures
+ * with gravity along an axis. Postures in which the field cannot reach the volume are left out. Up
+ * to 50,000 evenly chosen triangles are examined. Above a few in a thousand, the surface looks
+ * torn.
  * @param directions  [N, 3] directions of displacement, mm
  * @param forms       volume forms of the compression
- * @param volume      [9] harmonics of the state's volume, mL beyond the reference surface
+ * @param volume      [9] harmonics of the volume minus that of the reference surface, mL
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_accuracy_turned_over(const supine_lungs *lungs, const double *directions,
                                           const supine_compression *compression,
                                           const supine_volume_forms *forms, const double volume[9],
                                           double *share);
 
-/** Relative RMS errors at the held-out directions, over at most 4096 evenly chosen vertices. */
+/** Relative RMS errors for the held-out directions, over at most 4096 evenly chosen vertices. */
 typedef struct supine_error_table {
-  size_t band_count;                        /**< L + 1 */
-  double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [L + 1] error with the first (l + 1)^2 harmonics */
-  size_t mode_count;                        /**< K */
-  double modes[SUPINE_MODES_MADE_MAX];      /**< [K] error with the first k + 1 modes */
+  size_t band_count;                        /**< number of bands, L + 1 */
+  double harmonics[SUPINE_SH_BAND_MAX + 1]; /**< [l] error with the first (l + 1)^2 harmonics */
+  size_t mode_count;                        /**< number K of modes */
+  double modes[SUPINE_MODES_MADE_MAX];      /**< [k] error with the first k + 1 modes */
 } supine_error_table;
 
 /** Tabulate the error by the number of harmonics and by the number of modes.

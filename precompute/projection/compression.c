@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compress a field to a few functions of orientation, and evaluate it. */
+/* Compress a field to a few functions of the direction of gravity, and evaluate the result. */
 #include <cblas.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,7 +68,7 @@ supine_status supine_projection_compress_harmonics(const supine_projection *proj
   const size_t terms = supine_sh_count(projection->band);
   if (terms > SUPINE_MODES_MADE_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "band %zu has %zu harmonics, but a basis holds at most %d functions: "
+                            "band %zu has %zu harmonics, but a basis file holds at most %d: "
                             "give --modes 16, or --band 7 or less",
                             projection->band, terms, SUPINE_MODES_MADE_MAX);
   }
@@ -98,7 +98,7 @@ void supine_projection_compression_truncate(supine_compression *compression, siz
   if (count < width) {
     keep_columns(compression->coefficients, compression->vertex_count, width, count, sizeof(float));
     keep_columns(compression->mix, rank, width, count, sizeof(double));
-    compression->mode_count = count; /* each mode is a row and keeps its place */
+    compression->mode_count = count; /* the rows of `modes` stay in place */
   }
 }
 

@@ -13,8 +13,9 @@
 
 enum { VERTICES_MAX = 4096 };
 
-/* Compute the scalar products gram [R, R] of the columns over evenly chosen vertices, with weights
- * |d|^2. For the field columns x w, w^T gram w is the sum of the squared displacements. */
+/* Compute the scalar products gram [R, R] of the columns over evenly chosen vertices. Each vertex
+ * has the weight |d|^2, where d is its direction of displacement. For a field columns x w, the sum
+ * of the squared displacements is then w^T gram w. */
 static void find_gram(const supine_truth *truth, size_t vertex_count, const double *directions,
                       double *gram) {
   const size_t rank = truth->rank;
@@ -27,7 +28,7 @@ static void find_gram(const supine_truth *truth, size_t vertex_count, const doub
   }
 }
 
-/* Compute w^T gram w for the coefficients w. */
+/* Compute w^T gram w, where w are the coefficients. */
 static double square_of(const double *gram, size_t rank, const double *coefficients) {
   double image[SUPINE_SPAN_MAX];
   cblas_dsymv(CblasRowMajor, CblasLower, (int)rank, 1.0, gram, (int)rank, coefficients, 1, 0.0,

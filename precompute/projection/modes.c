@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Find the best functions of orientation as singular vectors, by way of small Gram matrices. */
+/* Find the best functions of orientation as singular vectors of the coefficient matrix. Only small
+ * Gram matrices are decomposed. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -10,8 +11,8 @@
 #include "precompute/projection/projection.h"
 #include "sh/base/lapack.h"
 
-/* Singular values below this share of the largest are rounding errors, as the Gram matrix holds
- * their squares. */
+/* Singular values below this share of the largest are rounding errors, because the Gram matrix
+ * gives only their squares. */
 static const double rank_tolerance = 1e-7;
 
 /* Compute the lower triangle, by columns, of gram [R, R] = columns^T diag(weight) columns. */
@@ -69,13 +70,15 @@ supine_status supine_projection_leading_eigenpairs(size_t n, double *matrix, siz
   return status;
 }
 
-/* Find the singular values and right singular vectors of C = sqrt(W) columns x functions: the
- * squares [R] of the singular values, their sum, and the leading vectors, modes [count, (band +
- * 1)^2]. gram [R, R] is columns^T W columns, and is overwritten.
+/* Find the leading right singular vectors of the matrix C = sqrt(W) columns x functions, where W is
+ * the diagonal matrix of the weights of the vertices. Write them to modes [count, (band + 1)^2],
+ * the squares of all singular values to values [R], and the sum of these squares to `total`. gram
+ * [R, R] is columns^T W columns, and is overwritten.
  *
- * A = H functions has the same singular values and right singular vectors as C if H^T H = gram,
- * because then A^T A = C^T C. As A has only R rows, the eigenvalues sigma_k^2 and eigenvectors U_k
- * of the R x R matrix A A^T give them. */
+ * Let the rows of H be the eigenvectors of gram, times the roots of their eigenvalues. Then H^T H =
+ * gram, and A = H functions has the same singular values and right singular vectors as C, because
+ * A^T A = C^T C. As A has only R rows, the R x R matrix A A^T gives them: its eigenvalues are
+ * sigma_k^2, and with its eigenvectors U_k, mode k is A^T U_k / sigma_k. */
 static supine_status find_modes(const supine_projection *projection, double *gram, size_t count,
                                 double *values, double *modes, double *total) {
   const size_t rank = projection->rank;
@@ -90,7 +93,6 @@ static supine_status find_modes(const supine_projection *projection, double *gra
   if (status != SUPINE_OK) {
     goto cleanup;
   }
-  /* The rows of H are the eigenvectors of gram, times the roots of their eigenvalues. */
   for (size_t k = 0; k < rank; ++k) {
     cblas_dscal((int)rank, sqrt(fmax(values[k], 0.0)), vectors + k * rank, 1);
   }
@@ -103,7 +105,7 @@ static supine_status find_modes(const supine_projection *projection, double *gra
     *total += gram[r * rank + r];
   }
   status = supine_projection_leading_eigenpairs(rank, gram, rank, values, vectors);
-  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) { /* mode k is A^T U_k / sigma_k */
+  for (size_t k = 0; k < count && status == SUPINE_OK; ++k) {
     const double inverse = values[k] > 0.0 ? 1.0 / sqrt(values[k]) : 0.0;
     cblas_dgemv(CblasRowMajor, CblasTrans, (int)rank, (int)terms, inverse, reduced, (int)terms,
                 vectors + k * rank, 1, 0.0, modes + k * terms, 1);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Project the field over orientation: solve for a few directions, and transform their weights. */
+/* Expand the field of a model in harmonics of the direction of gravity: solve for a few directions,
+ * and expand the weights with which these solutions sum to the solution for any direction. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,7 +9,7 @@
 #include <supine/sh.h>
 
 enum {
-  LATITUDES_PER_BAND = 8, /* the grid has twice as many longitudes */
+  LATITUDES_PER_BAND = 8, /* the grid has twice as many longitudes as latitudes */
   LATITUDES_MIN = 32
 };
 
@@ -19,12 +20,13 @@ void supine_projection_free(supine_projection *projection) {
   *projection = (supine_projection){0};
 }
 
-/* Directions [count, 3] of the grid, and the smallest and largest height along each, mm. */
+/* Directions g [count, 3] of the grid, and the range of g.p over all vertices p for each, mm. */
 typedef struct grid_heights {
   double *directions, *minimum, *maximum;
 } grid_heights;
 
-/* Find the heights along half of the directions, and negate them for the opposite directions. */
+/* Find the range of g.p over all vertices p for half of the directions g. For the opposite
+ * directions, negate and swap its ends. */
 static supine_status find_heights(const supine_lungs *lungs, bool pair, const supine_sh_grid *grid,
                                   grid_heights *made) {
   const size_t width = grid->longitudes;
@@ -43,7 +45,8 @@ static supine_status find_heights(const supine_lungs *lungs, bool pair, const su
   return status;
 }
 
-/* Expand each weight of the span, a function of gravity, in harmonics: functions [R, harmonics]. */
+/* Expand the R weights of the span (span.h), which are functions of the direction of gravity, in
+ * harmonics: functions [R, (band + 1)^2]. */
 static supine_status transform(const supine_lungs *lungs, const supine_force_law *law, size_t band,
                                const supine_span *span, double *functions, supine_error *error) {
   const size_t least = LATITUDES_PER_BAND * (band + 1);
@@ -85,7 +88,7 @@ static supine_status transform(const supine_lungs *lungs, const supine_force_law
                                                 supine_status_string(status));
 }
 
-/* Solve for each direction of the span, into columns [N, R]. */
+/* Solve the physics for each of the R directions of made->span, into made->columns [N, R]. */
 static supine_status solve(const supine_lungs *lungs, const supine_model *model,
                            supine_projection *made, supine_error *error) {
   const size_t n = lungs->mesh.vertex_count;
@@ -118,7 +121,7 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
   }
   made.span = malloc(sizeof *made.span);
   supine_status status =
-      made.span == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force")
+      made.span == NULL ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the forces")
                         : supine_projection_span_create(lungs, &model->force, made.span, error);
   if (status == SUPINE_OK) {
     made.rank = made.span->rank;

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Project the field F_i of each vertex i over orientation on spherical harmonics:
+ * Expand the field F_i(g) of each vertex i, a function of the direction of gravity g, in spherical
+ * harmonics Y_lm:
  *
  *     C_i,lm = integral of F_i(g) Y_lm(g) over the sphere
  *
- * stored as C = columns x functions. The force for any direction is a weighted sum of the forces
- * for a few directions (span.h). As the transfer from force to field is linear and does not depend
- * on gravity, it is applied to these few forces alone, and only the weights are projected. */
+ * C is stored as a product, C = columns x functions. The force for any direction is a weighted sum
+ * of the forces for a few directions (span.h). The transfer from force to field is linear and does
+ * not depend on gravity. It is therefore applied to these few forces alone, and only their weights
+ * are expanded. */
 #ifndef SUPINE_PROJECTION_H
 #define SUPINE_PROJECTION_H
 
@@ -17,19 +19,19 @@
 typedef struct supine_projection {
   size_t vertex_count;
   size_t band;
-  supine_span *span; /**< directions of the columns, or NULL for another simulator's field */
-  size_t rank;       /**< R */
+  supine_span *span; /**< directions of the columns; NULL for another simulator's fields */
+  size_t rank;       /**< number R of columns */
   double *columns;   /**< [N, R] fields for R directions of gravity */
-  double *functions; /**< [R, (band + 1)^2] harmonics of the weights of the columns */
+  double *functions; /**< [R, (band + 1)^2] expansion of the weight of each column in harmonics */
 } supine_projection;
 
 void supine_projection_free(supine_projection *projection);
 
-/** Project the field. Release the projection with supine_projection_free. The weights of the span
- * have kinks where another vertex becomes the lowest or the highest. The grid has eight latitudes
- * for each degree of the harmonics, so that these kinks hardly alias.
+/** Expand the field of a physical model. Release the projection with supine_projection_free. The
+ * weights of the span (span.h) have kinks where another vertex becomes the lowest or the highest.
+ * The grid has eight latitudes for each degree of the harmonics, so that these kinks hardly alias.
  * @retval SUPINE_ERROR_ARGUMENT     softening that is too large or without a reach (model.h), a
- *             band above SUPINE_SH_BAND_MAX, invalid stiffness
+ *   band above SUPINE_SH_BAND_MAX, invalid stiffness
  * @retval SUPINE_ERROR_MEMORY, SUPINE_ERROR_NUMERICAL */
 supine_status supine_projection_create(const supine_lungs *lungs, const supine_model *model,
                                        size_t band, supine_projection *projection,
@@ -40,10 +42,10 @@ supine_status supine_projection_create(const supine_lungs *lungs, const supine_m
 typedef struct supine_compression {
   size_t vertex_count;
   size_t band;
-  size_t mode_count;   /**< K */
+  size_t mode_count;   /**< number K of modes */
   float *coefficients; /**< [N, K] */
-  double *modes;       /**< [K, (band + 1)^2] harmonics of each mode */
-  double *mix;         /**< [R, K], with coefficients = columns x mix */
+  double *modes;       /**< [K, (band + 1)^2] expansion of each mode in harmonics */
+  double *mix;         /**< [R, K], so that coefficients = columns x mix */
 } supine_compression;
 
 void supine_projection_compression_free(supine_compression *compression);
@@ -100,9 +102,9 @@ void supine_projection_compression_weights(const supine_compression *compression
 void supine_projection_compression_field(const supine_compression *compression,
                                          const double *weights, double *field);
 
-/** Find the volume forms of the coefficients as they are stored, in single precision.
- * @param share       [G] volume of each lung relative to healthy, or NULL for 1
- * @param directions  [N, 3] directions of displacement, mm, or NULL for a vector field */
+/** Find the volume forms of the coefficients in single precision, as they are stored.
+ * @param share       [G] volume of each lung divided by its healthy volume, or NULL for 1
+ * @param directions  [N, 3] directions of displacement, mm, or NULL if coefficients are vectors */
 supine_status supine_projection_compression_volume_forms(
     const supine_compression *compression, const supine_lungs *lungs, const double *share,
     const double *directions, supine_volume_forms *forms, supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Choose a few directions of gravity whose forces add up to the force for any direction. */
+/* Choose a few directions of gravity whose weighted forces sum to the force for any direction. */
 #include <cblas.h>
 #include <math.h>
 #include <stdlib.h>
@@ -12,14 +12,14 @@
 /* The cross approximation examines at most VERTICES vertices, in DIRECTIONS directions. */
 enum { VERTICES = 1024, DIRECTIONS = 512 };
 
-/* Largest accepted residual force, relative to the largest force: `tolerance` with softening, and
+/* Largest accepted residual force as a share of the largest force: `tolerance` with softening, and
  * `rounding` without. With `tolerance`, the RMS residual is 6e-5 of the RMS force, a hundredth of
  * the error of 16 modes. */
 static const double tolerance = 3e-4;
 static const double rounding = 1e-12;
 
-/* Eliminate the row and the column of entry `at` from force [vertices, DIRECTIONS]: subtract their
- * product, divided by that entry. */
+/* Make the row and the column of entry `at` of force [vertices, DIRECTIONS] zero: subtract the
+ * product of this column and this row, divided by that entry, from the matrix. */
 static void eliminate(double *force, size_t vertices, size_t at) {
   const double *column = force + at % DIRECTIONS;
   double row[DIRECTIONS];
@@ -41,11 +41,10 @@ static size_t largest_of(const double *force, size_t count) {
   return at;
 }
 
-/* Invert the matrix of the forces f_j(g_r) (span.h) in place. */
+/* Invert a matrix in place. Its storage order does not matter. */
 static supine_status invert(double *matrix, size_t rank) {
   lapack_int pivots[SUPINE_SPAN_MAX];
   const lapack_int n = (lapack_int)rank;
-  /* Column-major order inverts the transpose in place, and so the matrix itself. */
   const lapack_int info = LAPACKE_dgetrf(LAPACK_COL_MAJOR, n, n, matrix, n, pivots);
   return supine_lapack_status(info != 0 ? info
                                         : LAPACKE_dgetri(LAPACK_COL_MAJOR, n, matrix, n, pivots));
@@ -86,7 +85,7 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   if (force == NULL || residual == NULL ||
       supine_physics_height_range(lungs, law->pair, DIRECTIONS, directions, range,
                                   range + DIRECTIONS) != SUPINE_OK) {
-    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the force");
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for the forces");
     goto cleanup;
   }
   for (size_t k = 0; k < count; ++k) {
@@ -99,8 +98,7 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
               columns)) {
     status =
         supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                         "--soften %g takes more than %d functions of gravity: give at most 12",
-                         law->soften, SUPINE_SPAN_MAX);
+                         "--soften %g is too large for a basis file: give at most 12", law->soften);
     goto cleanup;
   }
   for (size_t r = 0; r < span->rank; ++r) {
@@ -112,7 +110,7 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   }
   status = span->rank == 0 ? SUPINE_ERROR_NUMERICAL : invert(span->inverse, span->rank);
   if (status == SUPINE_ERROR_MEMORY) {
-    (void)supine_error_set(error, status, "no memory for the force");
+    (void)supine_error_set(error, status, "no memory for the forces");
   } else if (status != SUPINE_OK) {
     status = supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                               "the force is zero everywhere: change --base or --gain");

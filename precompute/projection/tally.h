@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* A bin for each exponent and first 8 bits of the mantissa of a float; it is 0.2 to 0.4 % wide. */
+/* Number of bins: one for each exponent and first 8 mantissa bits of a float, 0.2 to 0.4 % wide. */
 enum { SUPINE_TALLY_BINS = 1 << 16 };
 
 typedef struct supine_tally {
