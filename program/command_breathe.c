@@ -39,21 +39,22 @@ static const char *const courses[] = {"cosine", "ramp", "flow", NULL};
 static const supine_option table[] = {
     {"output", 'o', "OUT",
      "NAME.vtp: one file of all frames for ParaView, which shows the index of a frame as its time. "
-     "It has normals, lungs, gravity and volumes; positions are rounded to 1/256 mm\n"
-     "NAME.safetensors: positions [T,N,3] in mm, triangles [M,3], time [T] in s, volume [T,G] in "
-     "mL and gravity [T,3], for T frames, N vertices, M triangles and G lungs",
+     "Each frame has displacements from the state of --from, normals, the lung of each point, "
+     "gravity and volumes; positions are rounded to 1/256 mm\nNAME.safetensors: positions [T,N,3] "
+     "in mm, triangles [M,3], time [T] in s, volume [T,G] in mL and gravity [T,3], for T frames, N "
+     "vertices, M triangles and G lungs",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".vtp or .safetensors"},
     {"turn", 0, "FROM:TO:SECONDS",
-     "turn gravity from one posture to another at constant speed, such as supine:left:10s. Between "
-     "opposite postures, such as supine and prone, gravity passes the left side; if it starts "
-     "along the body or at a side, it passes the back. The volume at rest changes with the posture",
+     "turn from one posture to another at constant speed: supine:left:10 takes 10 s. Between "
+     "opposite postures, the body turns through left (supine to prone) or through supine (upright "
+     "to inverted, left to right). The volume at rest changes with the posture",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(request, turns)},
     {.help = "The breath:"},
     {"tidal", 0, "ML",
-     "tidal volume of both lungs, in mL, added to the volume at rest in the posture or, if rest is "
-     "unknown, to the volume in the scan; default 500",
+     "tidal volume of both lungs, in mL, above rest in the posture, or above the scan if rest is "
+     "unknown; default 500",
      SUPINE_FILLS(request, breath.tidal), SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
@@ -61,21 +62,23 @@ static const supine_option table[] = {
      "share of the breath's duration that is spent inhaling, between 0 and 1; default 1/3",
      SUPINE_FILLS(request, breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
      .wants = "a share between 0 and 1", .more = true},
-    {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default: a normal adult's",
+    {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN},
-    {"rest-pressure", 0, "P", "pressure at the end of an exhalation, in cmH2O; default 5",
+    {"rest-pressure", 0, "P",
+     "pressure at the end of an exhalation, in cmH2O, of the kind that --pv relates to volume "
+     "(transpulmonary by default); default 5",
      SUPINE_FILLS(request, breath.rest_pressure), .wants = "a number of cmH2O", .more = true},
     {"course", 0, "NAME",
-     "cosine (default): pressure follows a cosine; ramp: pressure is linear in time; flow: inflow "
-     "and outflow are constant",
+     "cosine: pressure follows a cosine; ramp: pressure is linear in time; flow: inflow and "
+     "outflow are constant; default cosine",
      SUPINE_FILLS(request, breath.course), .choices = courses, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "The frames:"},
     {"fps", 0, "N", "frames per second", SUPINE_FILLS(request, fps), SUPINE_ABOVE_ZERO,
      .standard = "66.66"},
-    {"seconds", 0, "S", "duration in s; default: the duration of the turn, or of one breath",
+    {"seconds", 0, "S", "duration in s; default the duration of the turn, or of one breath",
      SUPINE_FILLS(request, duration), SUPINE_ABOVE_ZERO},
-    {.table = supine_options_from, SUPINE_FILLS(request, from)},
+    {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.name = NULL}};
@@ -382,17 +385,17 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_breathe = {
     name,
     "compute a breath, in one posture or during a turn",
-    .usage = "BASIS [--posture NAME | --turn FROM:TO:SECONDS] -o OUT [OPTIONS]",
+    .usage = "BASIS --posture NAME -o OUT [OPTIONS]\n"
+             "BASIS --turn FROM:TO:SECONDS -o OUT [OPTIONS]",
     .about = "Computes breathing lungs from a basis file, in one posture or during a turn, and "
-             "writes the surface of each frame. The volume follows the pressure-volume relation "
-             "and is exact in each frame. The printed compute time per frame must be below 15 ms "
-             "for a smooth display.",
+             "writes the surface of each frame. In each frame, the lungs have exactly the volume "
+             "that follows from the pressure-volume relation. The printed compute time per frame "
+             "must be below 15 ms for a smooth display.",
     .options = table,
-    .notes =
-        "Examples:\n"
-        "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
-        "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
-        "  supine breathe lungs.safetensors --posture supine --course flow -o flow.safetensors",
+    .notes = "Examples:\n"
+             "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
+             "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
+             "  supine breathe lungs.safetensors --posture supine --tidal 800 -o deep.safetensors",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .begin = begin,

@@ -38,8 +38,8 @@ typedef struct request {
 } request;
 
 static const supine_option table[] = {
-    {"postures", 0, "LIST", "postures to compare", SUPINE_FILLS(request, postures),
-     .standard = "supine,prone,left,right"},
+    {"postures", 0, "LIST", "postures to compare, separated by commas",
+     SUPINE_FILLS(request, postures), .standard = "supine,prone,left,right"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
@@ -47,7 +47,6 @@ static const supine_option table[] = {
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
      SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
-    {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
 typedef struct structures {
@@ -226,24 +225,24 @@ const supine_command supine_command_compare = {
     name,
     "compare postures: displacement, and ventilation by height",
     .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
-    .about =
-        "Reports displacements from supine at rest, or from the state of --from, to each posture, "
-        "the volume of each lung, and ventilation by height in a breath; then finds the direction "
-        "of gravity with the largest displacement from supine. For structures inside ('supine "
-        "embed'), reports the displacement of each named part between every two postures.",
+    .about = "For each posture, reports the displacement from supine at rest or from the state of "
+             "--from, the volume of each lung, and the ventilation by height in a breath. Then "
+             "finds the direction of gravity with the largest displacement from supine. If BASIS "
+             "was made by 'supine embed', reports only the displacement of each named part between "
+             "every two postures.",
     .options = table,
-    .notes =
-        "Statistics are weighted by the area of the surface; '95 %' is the 95th percentile. "
-        "Ventilation by height: the lungs before a breath are cut into ten slabs of equal "
-        "thickness across gravity. The gain of a slab is the volume that its part of the surface "
-        "and its two cut faces enclose after the breath, minus the volume that they enclose before "
-        "it. The gains sum to the volume of the breath. The regional expansion of a slab is its "
-        "gain divided by its volume before the breath. For structures inside, the displacement is "
-        "the mean over a part, in mm to the left, to the back and to the head.\n"
-        "\n"
-        "Examples:\n"
-        "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
-        "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
+    .notes = SUPINE_POSTURE_LIST_HELP
+    "\n\nStatistics are weighted by the area of the surface; '95 %' is the 95th percentile. "
+    "Ventilation by height: the lungs before a breath are cut into ten slabs of equal thickness, "
+    "perpendicular to gravity. The gain of a slab is the volume that its part of the surface and "
+    "its two cut faces enclose after the breath, minus the volume that they enclose before it. The "
+    "gains sum to the volume of the breath. The regional expansion of a slab is its gain divided "
+    "by its volume before the breath. For a basis of 'supine embed', the displacement is the mean "
+    "over a part, in mm to the left, to the back and to the head.\n"
+    "\n"
+    "Examples:\n"
+    "  supine compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8\n"
+    "  supine compare lungs.safetensors --volume rest --breath 800 -o report.html",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -31,19 +31,20 @@ typedef struct request {
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
-     SUPINE_MESH_ENDINGS
+     "file to write: " SUPINE_MESH_ENDINGS
      "; PLY and VTP files include displacements and expected errors. Embedded points can also be "
      "written as .csv, and moved images as .nrrd, .nii, .nii.gz or .mha",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS,
      .rivals = "output"},
     {"states", 0, "LIST",
      "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
-     "the image are read once for all states. An output is a surface, points, a field, or the "
-     "moved image of --image or --labels; its path is relative to the folder of LIST",
+     "the image are read once for all states. An output is a surface, points, a displacement "
+     "field, or the image of --image or --labels, moved; its path is relative to the folder of "
+     "LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN, .wants = "a CSV file",
      .rivals = "output"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
-    {.table = supine_options_from, SUPINE_FILLS(request, from)},
+    {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},

@@ -70,7 +70,7 @@ static const supine_option table[] = {
      .required = true, .file = SUPINE_FILE_OUT},
     {"grid", 0, "MM",
      "embed the nodes of a grid over the lungs, MM apart, for displacement fields. If CONTENT is "
-     "an image, the nodes are voxels of the image, and MM is rounded to a multiple of the distance "
+     "an image, every node is a voxel of it, and MM is rounded to a multiple of the distance "
      "between voxels",
      SUPINE_FILLS(request, grid_spacing), SUPINE_SAYS_GIVEN(request, has_grid), .standard = "4",
      SUPINE_ABOVE_ZERO, .wants = "millimetres"},
@@ -85,8 +85,8 @@ static const supine_option table[] = {
      "tumours; other parts deform",
      SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
-     "move structures outside the lungs like the nearest point of the surface; default: "
-     "extrapolate the motion from inside the lungs",
+     "move structures outside the lungs like the nearest point of the surface; by default the "
+     "motion inside the lungs is extrapolated",
      SUPINE_FILLS(request, clamp)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
@@ -252,15 +252,15 @@ const supine_command supine_command_embed = {
     "make points, meshes or a grid move with the lungs",
     .usage = "BASIS CONTENT... -o FILE\n"
              "BASIS --grid MM -o FILE",
-    .about =
-        "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json of 3D "
-        "Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, nodules), "
-        "the parts of a label map, or the nodes of a regular grid or of the voxels of an image "
-        "(.nrrd, .nii, .nii.gz). 'supine deform', 'breathe', 'compare', 'info' and 'stream' read "
-        "the file like any basis; 'render' and 'export' show it with --inside.\n"
-        "\n"
-        "Displacements inside are interpolated from the displacements of each lung's surface by "
-        "biharmonic splines, which are exact on the surface and for affine motion.",
+    .about = "Makes a basis of structures that move with the lungs of BASIS: points (.mrk.json of "
+             "3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
+             "nodules), the parts of a label map, or the nodes of a grid, which may be that of an "
+             "image (.nrrd, .nii, .nii.gz). 'supine deform', 'breathe', 'compare', 'info' and "
+             "'stream' read the file like any basis; 'render' and 'export' show it with "
+             "--inside.\n"
+             "\n"
+             "Displacements inside are interpolated from the displacements of each lung's surface "
+             "by biharmonic splines, which are exact on the surface and for affine motion.",
     .options = table,
     .notes = "Examples:\n"
              "  supine embed lungs.safetensors nodules.csv airways.ply -o inside.safetensors\n"

@@ -22,13 +22,13 @@ typedef struct request {
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
-     ".html: a page to explore the lungs in a browser, in one file that needs no network, for "
-     "bases of up to 16 modes\n.glb: glTF 2.0 morph targets, with which any engine deforms the "
-     "lungs",
+     ".html: a page to explore the lungs in a browser, in one file that needs no network. The "
+     "basis may have up to 16 modes\n.glb: glTF 2.0 morph targets, with which any engine deforms "
+     "the lungs",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
     {"breath", 0, "ML",
-     "tidal volume of the breath shown; up to this volume the weights of morph targets stay "
+     "tidal volume of the breath shown. Up to this volume, the weights of morph targets stay "
      "between 0 and 1",
      SUPINE_FILLS(request, glb.breath), .standard = "500", SUPINE_ABOVE_ZERO,
      .wants = "millilitres above 0"},
@@ -37,13 +37,13 @@ static const supine_option table[] = {
      "structures made by 'supine embed' from the same basis, shown inside transparent lungs; the "
      "page shows the name and displacement of each part at the pointer and in a table",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
-    {"title", 0, "TEXT", "title of the page; default: the name of the basis file",
+    {"title", 0, "TEXT", "title of the page; default the name of the basis file",
      SUPINE_FILLS(request, title)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {.help = "For glTF:"},
     {"plain", 0, NULL,
-     "write float32 without compression, for engines that support neither EXT_meshopt_compression "
-     "nor KHR_mesh_quantization",
+     "write float32 without compression, for engines that lack EXT_meshopt_compression or "
+     "KHR_mesh_quantization",
      SUPINE_FILLS(request, glb.plain), SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
      "add animations of breathing: one while gravity turns from supine over the left side to prone "

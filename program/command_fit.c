@@ -77,34 +77,37 @@ static const supine_option table[] = {
      FILLS(path), .file = SUPINE_FILE_OUT},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"rest", 0, "STATE",
-     "state of the first scan: POSTURE, VOLUME or POSTURE:VOLUME, where VOLUME is rest or full, "
-     "optionally with +ML or -ML, or the volume of both lungs measured in a CT, such as 2600mL",
+     "state of the first scan: POSTURE, VOLUME or POSTURE:VOLUME. VOLUME is rest or full, each "
+     "alone or with +ML or -ML, or the volume of both lungs measured in a CT, such as 2600mL",
      FILLS(first), .read = read_state, .standard = "supine:rest"},
     {"other", 0, "STATE",
-     "state of the second scan, in the same form; either scan may be the fuller one. If it has no "
-     "volume, the volume is taken from the surfaces",
+     "state of the second scan, in the same form; either scan may be the fuller one. A missing "
+     "volume is taken from the surfaces; with landmarks alone, the fuller scan then counts as full "
+     "inflation and the emptier one as rest",
      FILLS(second), .read = read_state, .standard = "supine"},
     {"law", 0, "LAW",
-     "deep (default): only the size of the displacement is fitted; paper, the law of Santhanam "
-     "2008: c1 to c9 are fitted. Kriging interpolates the residual of either law",
+     "constants that are fitted\ndeep: the size of the displacement; the other constants stay "
+     "close to those of the deep law of 'supine precompute'\npaper: all nine constants of "
+     "(15)-(18) of Santhanam 2008\nKriging interpolates the residual of either law. Default deep",
      FILLS(law), SUPINE_SAYS_GIVEN(request, has_law), .choices = supine_patient_law_names},
     {"name", 0, "TEXT",
-     "name of the person; default: the name of the file of landmarks, or of the second surface",
+     "name of the patient; default the name of the file of landmarks, or of the second surface",
      FILLS(name), .more = true},
     {"state", 0, "STATE:FILE",
-     "further state, with its surface or with landmarks (.csv) from the first scan to this state; "
-     "may be repeated, up to 8 times. If its posture differs from those of the two scans, it "
-     "determines the part of the force that depends on gravity (the gain); otherwise only the size "
-     "of its displacement is fitted. All other constants come from the two scans",
+     "further state: its surface, or landmarks (.csv) from the first scan to this state. May be "
+     "repeated, up to 8 times. A state in another posture determines the part of the force that "
+     "depends on gravity (the gain); for a state in the same posture, only the size of the "
+     "displacement is fitted. All other constants come from the two scans",
      .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
-    {"midline", 0, "X", "x of the plane between the lungs, mm; default: the middle of the points",
+    {"midline", 0, "X", "x of the plane between the lungs, in mm; default the middle of the points",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
      .wants = "a number of mm", .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"expandability", 0, NULL,
-     "for surfaces: instead of kriging, fit the expandability of regions about 45 mm wide, with "
-     "the paper law and the force of the deep law. The result is used only if it lowers the "
-     "held-out residual; regions that the scans do not determine are reported",
+     "for surfaces: instead of kriging, fit the expandability (the inverse of the stiffness) of "
+     "regions about 45 mm wide. The directions of displacement are fitted as with --law paper; the "
+     "force is that of the deep law. The result is used only if it lowers the held-out residual by "
+     "5 % or more",
      FILLS(expandability), .more = true},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -435,24 +438,24 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_fit = {
     name,
-    "fit a model to a person's scans and landmarks",
+    "fit a model to a patient's scans and landmarks",
     .usage = "--landmarks PAIRS.csv -o patient.json [OPTIONS]\n"
              "SCAN SCAN [--state STATE:FILE]... -o patient.json [OPTIONS]",
-    .about =
-        "Fits a model to one person's lungs in two scans: a displacement law, and its residual "
-        "interpolated by kriging. Reports the measured and the expected error at held-out "
-        "points. Landmarks determine the motion best; surfaces alone do not show sliding "
-        "along them, so their expected error includes the sliding seen in other patients. "
-        "'supine precompute --patient' makes a basis from the model and either scan.",
+    .about = "Fits a model of one patient's motion between two scans: a law with few constants "
+             "describes the motion, and kriging interpolates the residual of the law. SCAN is the "
+             "surface of the lungs; two files, one for each lung, are joined by a comma "
+             "(left.ply,right.ply). Landmarks determine the motion best. Surfaces alone do not "
+             "show how tissue slides along the surface; the expected error then includes the "
+             "sliding seen in other patients. 'supine precompute --patient' makes a basis from the "
+             "model and either scan.",
     .options = table,
     .notes =
         "Residuals are given for no motion, a translation, an affine map, the law, and the law "
         "corrected by kriging. Held-out residuals are from cross-validation: 5 folds of blocks of "
         "40 mm, repeated 3 times. A small distance between surfaces does not prove that the motion "
         "inside is right: points inside have been 14 mm off where the surfaces were 5 mm apart. "
-        "The applied force is computed from the displacement by the inverse of the elastic "
-        "operator; its residual is the part that equation (18) of Santhanam 2008 does not "
-        "explain.\n"
+        "For surfaces, the report also gives the force that the measured displacement implies, and "
+        "the part of it that equation (18) of Santhanam 2008 does not explain.\n"
         "\n"
         "Examples:\n"
         "  supine fit --landmarks pairs.csv --translation --rest supine:rest --other supine:full "

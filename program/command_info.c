@@ -191,15 +191,15 @@ const supine_command supine_command_info = {
     "info",
     "describe a basis file and its accuracy",
     .usage = "BASIS [--json]",
-    .about = "Describes a basis file: its lungs, its functions of orientation, the model it was "
+    .about = "Describes a basis file: its lungs, its basis functions (modes), the model it was "
              "made with, and its accuracy.",
     .options = table,
     .notes =
         "The compression error is the difference from the full solve on held-out directions, in "
-        "percent of the RMS displacement, and in mm at the stated volume. It is also listed as a "
-        "share of the RMS displacement, for the highest bands 0, 1, 2, ... and for the best 1, 2, "
-        "3, ... modes.\n"
-        "Triangles that turn over are counted in the worst of six postures.\n"
+        "percent of the RMS displacement, and in mm at the volume that is printed with it. It is "
+        "also listed, as a share of the RMS displacement, for a basis cut off at band 0, 1, 2, ... "
+        "and for the best 1, 2, 3, ... modes.\nTriangles that turn over are counted in the worst "
+        "of six postures.\n"
         "The expected error is given for the displacement from the scan: " SUPINE_EXPECTED_MEANING
         ". " SUPINE_EXPECTED_SUPPORT "\n"
         "Displacement by band is the share of the squared displacement, over the surface and all "

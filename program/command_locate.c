@@ -33,10 +33,11 @@ static const supine_option table[] = {
      "Positions are in the frame of the observations, and each has its expected error",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .required = true,
      .endings = ".vtp, .ply or .csv"},
-    {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP "; default: fitted to the points",
+    {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP ". By default, it is fitted to the points",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"rigid", 0, NULL,
-     "also fit a rotation, which needs at least three points; default: fit a translation only",
+     "also fit a rotation, which needs at least three points; by default only a translation is "
+     "fitted",
      SUPINE_FILLS(request, rigid)},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
      .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
@@ -410,15 +411,13 @@ const supine_command supine_command_locate = {
     name,
     "find the whole lung from a few observed points",
     .usage = "BASIS OBSERVED.csv --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
-    .about =
-        "Fits the lungs to a few points observed inside them, for example by a navigation system: "
-        "finds the volume, the translation between the frames of the scan and of the observations, "
-        "and the residual of the law near the points. OBSERVED.csv has the columns name,x,y,z, in "
-        "mm, with the names given to 'supine embed'. Each position has its expected error.",
+    .about = "Fits the lungs to a few points observed inside them, for example by a navigation "
+             "system. Finds the volume and the translation between the frames of the scan and of "
+             "the observations, and corrects the predicted positions near the points. OBSERVED.csv "
+             "has the columns name,x,y,z, in mm, with the names given to 'supine embed'.",
     .options = table,
     .notes =
-        "The expected error is the root mean square of the distance in 3-D: half of all points lie "
-        "within 0.9 times this distance, 95 % within 1.8 times. " SUPINE_EXPECTED_SUPPORT
+        "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT
         " A few points seldom determine the posture: give --posture. Without it, six postures are "
         "tried, and the error includes the differences between them.\n"
         "\n"

@@ -34,29 +34,28 @@ static supine_status read_modes(const char *text, void *field, supine_error *err
 static const supine_option table[] = {
     {"output", 'o', "FILE", "basis file to write (.safetensors)", SUPINE_FILLS(request, path),
      .required = true, .file = SUPINE_FILE_OUT},
-    {"band", 0, "L", "highest spherical-harmonic band, 0 to 64", SUPINE_FILLS(request, basis.band),
-     SUPINE_SAYS_GIVEN(request, has_band), .standard = "23", .range = {0.0, SUPINE_SH_BAND_MAX},
-     .more = true},
+    {"band", 0, "L", "highest band L of the spherical harmonics, 0 to 64",
+     SUPINE_FILLS(request, basis.band), SUPINE_SAYS_GIVEN(request, has_band), .standard = "23",
+     .range = {0.0, SUPINE_SH_BAND_MAX}, .more = true},
     {"modes", 0, "K|harmonics",
-     "functions of orientation; each costs a multiplication per vertex at run time. The best K (or "
-     "fewer, if fewer describe the displacement), or 'harmonics', all (L+1)^2 harmonics up to band "
-     "L; Santhanam 2008 used these with --band 3",
+     "basis functions to store\nharmonics: all (L+1)^2 spherical harmonics up to --band L, as in "
+     "Santhanam 2008 with --band 3\nK: the K functions (modes) that describe the displacement "
+     "best, or fewer if fewer suffice. More modes are more accurate, but each costs a "
+     "multiplication per vertex at run time",
      SUPINE_FILLS(request, basis.modes), .read = read_modes, .standard = "16",
      .wants = "1 to 64 or 'harmonics'", .more = true},
     {"held-out", 0, "N",
-     "number of held-out directions in which the error is measured; default: 1000; fewer for more "
-     "than 20000 vertices, but at least 100",
+     "number of held-out directions in which the error is measured; default 1000; fewer, but at "
+     "least 100, for more than 20000 vertices",
      SUPINE_FILLS(request, basis.held_out), .range = {1.0, 100000.0}, .more = true},
     {"patient", 0, "FILE",
-     "model of the patient, made by 'supine fit', to use instead of --law and its constants",
+     "model of the patient's motion, made by 'supine fit', to use instead of the built-in law",
      SUPINE_FILLS(request, patient), .file = SUPINE_FILE_IN, .rivals = "directions"},
-    {.help = "Displacements from another simulator, instead of the built-in physics:",
-     .more = true},
+    {.help = "Displacements from another simulator, instead of the built-in physics:"},
     {"fields", 0, "FILE",
      "safetensors file with two tensors: gravity [M,3], M directions; and displacement [M,N,3], "
-     "the displacement of each of N vertices for each direction, in mm. MESH is the reference "
-     "surface. Without --band, cross-validation chooses the band among those that the directions "
-     "determine",
+     "the displacement of each of the N vertices of MESH for each direction, in mm. Without "
+     "--band, cross-validation chooses the band, among those for which M directions are enough",
      SUPINE_FILLS(request, fields), .file = SUPINE_FILE_IN, .rivals = "directions", .more = true},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
     {.name = NULL}};
@@ -253,14 +252,14 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_precompute = {
     name,
-    "turn lung surfaces into a basis file (offline)",
+    "solve the physics once, and write a basis file for any posture",
     .usage = "MESH... -o FILE [OPTIONS]\n"
              "LABELS... -o FILE [OPTIONS]",
-    .about = "Solves the physics of one or two lungs for all directions of gravity and writes a "
-             "basis file, from which 'supine deform' and the run-time library compute deformed "
-             "lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, OFF, ...), "
-             "with both lungs in one file or a file for each; LABELS is the label map of a "
-             "segmentation (NRRD, NIfTI, MetaImage). Surfaces must be closed.",
+    .about = "Solves the physics of one or two lungs for all directions of gravity, and writes a "
+             "basis file. From this file, 'supine deform' and the run-time library compute "
+             "deformed lungs in real time. MESH is any surface that assimp reads (PLY, OBJ, STL, "
+             "OFF, ...), with both lungs in one file or a file for each; LABELS is the label map "
+             "of a segmentation (NRRD, NIfTI, MetaImage). Surfaces must be closed.",
     .options = table,
     .notes = "Examples:\n"
              "  supine precompute left.ply right.ply -o lungs.safetensors\n"

@@ -310,26 +310,26 @@ static supine_status read_views(const char *text, void *field, supine_error *err
 }
 
 static const supine_option table[] = {
-    {"posture", 0, "LIST", "postures to draw, up to 8", SUPINE_FILLS(request, postures)},
+    {"posture", 0, "LIST", "comma-separated postures, up to 8", SUPINE_FILLS(request, postures)},
     {"turn", 0, "FROM:TO:SECONDS",
-     "draw an animation instead, such as supine:left:5s: gravity turns from one posture to another "
-     "at constant speed, pauses for a second, and starts again",
+     "draw an animation instead: gravity turns from one posture to another at constant speed, "
+     "pauses for a second, and starts again. For example, supine:left:5 turns for 5 s",
      SUPINE_FILLS(request, turn), .read = supine_breath_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(request, turns)},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {"output", 'o', "FILE", ".png for --posture; .webp for --turn, an animation that browsers play",
      SUPINE_FILLS(request, output), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".png or .webp"},
-    {"size", 0, "WxH", "size in pixels; default: 440 x 480 for each posture and view, plus margins",
+    {"size", 0, "WxH", "size in pixels; default 440 x 480 for each posture and view, plus margins",
      .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
-     "anterior (default), posterior, left, right, lateral (from the left), head, feet, oblique; "
-     "several views are drawn one below another",
+     "views to draw, one below another, separated by commas: anterior, posterior, left (or "
+     "lateral), right, head, feet, oblique (from the front, left and above); default anterior",
      .read = read_views},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"largest", 0, "MM",
-     "end of the colour bar; default: the 95th percentile over the surface, rounded up. If values "
-     "exceed it, the bar has a pointed end",
+     "end of the colour bar. If values exceed it, the bar has a pointed end. Default the 95th "
+     "percentile over the surface, rounded up",
      SUPINE_FILLS(request, largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0",
      .more = true},
     {"inside", 0, "FILE",
@@ -337,10 +337,9 @@ static const supine_option table[] = {
      "their names and displacements",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"opacity", 0, "SHARE",
-     "opacity of the lungs, 0.05 to 1 (opaque); default 1, with --inside 0.35",
+     "opacity of the lungs, 0.05 to 1 (opaque); default 1, or 0.35 with --inside",
      SUPINE_FILLS(request, opacity), .range = {0.05, 1.0}, .wants = "a share from 0.05 to 1",
      .more = true},
-    {.help = SUPINE_POSTURE_LIST_HELP},
     {.name = NULL}};
 
 static supine_status check(const request *wanted, supine_posture_list *postures,
@@ -395,16 +394,16 @@ const supine_command supine_command_render = {
     .about = "Draws the lungs in each posture, side by side; no display is needed. Colours show "
              "the displacement, with contour lines at the ticks of the colour bar. A ball shows "
              "the body's axes (left, right, anterior, posterior, head, feet) and gravity: an "
-             "arrow, or a dot if it points towards you, or a cross if it points away from you.",
+             "arrow, a dot if it points towards you, or a cross if it points away from you.",
     .options = table,
-    .notes =
-        "Examples:\n"
-        "  supine render lungs.safetensors --posture supine,prone,left,right -o postures.png\n"
-        "  supine render lungs.safetensors --turn supine:left:5s -o turn.webp\n"
-        "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone \\\n"
-        "      -o inside.png\n"
-        "  supine render lungs.safetensors --posture prone --from supine:rest \\\n"
-        "      --view anterior,lateral,posterior -o prone.png",
+    .notes = SUPINE_POSTURE_LIST_HELP
+    "\n\nExamples:\n"
+    "  supine render lungs.safetensors --posture supine,prone,left,right -o postures.png\n"
+    "  supine render lungs.safetensors --turn supine:left:5s -o turn.webp\n"
+    "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,prone \\\n"
+    "      -o inside.png\n"
+    "  supine render lungs.safetensors --posture prone --from supine:rest \\\n"
+    "      --view anterior,lateral,posterior -o prone.png",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .begin = begin,

@@ -26,18 +26,18 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT},
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
-     ". Default: rest; if rest is unknown, gain 1, which moves each vertex by F d, in mm: F is the "
-     "force on the vertex after spreading, and d is its direction of displacement",
+     ". Default rest; if rest is unknown (--scanned none, --law paper), the solved displacement, "
+     "without scaling to a volume",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"unit-force", 0, "VERTEX",
      "instead of a posture: write a CSV file of the response of every vertex to a unit force on "
-     "this vertex (numbered from 0), which is a column of the transfer matrix T",
+     "this vertex (numbered from 0)",
      SUPINE_FILLS(request, vertex), SUPINE_SAYS_GIVEN(request, has_vertex),
      .wants = "the number of a vertex", .more = true},
     {"pitcher-catcher", 0, NULL,
-     "iterate as Santhanam 2008 does, always from the node with the largest remaining force; print "
-     "the share of the force that remains, and the largest difference from the direct solve. Slow: "
-     "use it for small meshes. Needs --law paper",
+     "solve by the iteration of Santhanam 2008, which always distributes the force of the node "
+     "with the largest remaining force. Print the share of the force that remains, and the largest "
+     "difference from the direct solve. Use it for small meshes, as it is slow. Needs --law paper",
      SUPINE_FILLS(request, pitcher_catcher), .more = true},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_model_options, SUPINE_FILLS(request, model)},
@@ -293,11 +293,12 @@ const supine_command supine_command_solve = {
     .usage = "MESH... --posture NAME -o FILE [OPTIONS]\n"
              "LABELS... --posture NAME -o FILE [OPTIONS]",
     .about = "Solves the full physics for one direction of gravity, without harmonics, and writes "
-             "the deformed surface: the reference against which a basis is measured.",
+             "the deformed surface: the reference against which a basis is measured. MESH and "
+             "LABELS are as for 'supine precompute'.",
     .options = table,
     .notes = "Examples:\n"
              "  supine solve left.ply right.ply --posture prone --volume rest+500 -o prone.vtp\n"
-             "  supine solve lungs.ply --unit-force 0 -o column.csv",
+             "  supine solve lungs.nii.gz --posture left -o left.vtp",
     SUPINE_SURFACES,
     .request_size = sizeof(request),
     .begin = begin,

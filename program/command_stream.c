@@ -41,13 +41,13 @@ static const char *const spaces[] = {"lps", "ras", NULL};
 static const supine_option table[] = {
     {"listen", 0, "[ADDRESS:]PORT",
      "address at which to wait for peers. A port without an address can be reached from this "
-     "machine only; port 0 is any free port. Default: 18944, the port of OpenIGTLink, unless "
+     "machine only; port 0 is any free port. Default 18944, the port of OpenIGTLink, unless "
      "--connect is given",
      SUPINE_FILLS(request, options.listen)},
     {"connect", 0, "HOST:PORT",
      "connect to a peer that listens, such as a tracker server or 3D Slicer",
      SUPINE_FILLS(request, options.connect)},
-    {"device", 0, "NAME", "device whose poses are followed; default: any",
+    {"device", 0, "NAME", "device whose poses are followed; default any",
      SUPINE_FILLS(request, options.device)},
     {.help = "Direction of gravity:"},
     {"world-down", 0, "X,Y,Z", "direction of gravity in the tracker's world",
@@ -81,13 +81,14 @@ static const supine_option table[] = {
      SUPINE_ABOVE_ZERO},
     {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, breath.rate),
      SUPINE_ABOVE_ZERO},
-    {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default: a normal adult's",
+    {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
      SUPINE_FILLS(request, pv), .file = SUPINE_FILE_IN, .more = true},
     {.help = "Output:"},
     {"send", 0, "WHAT",
-     "what a peer receives: weights, an NDARRAY of the K weights and the three gains of each lung; "
-     "surface, a POLYDATA of points and triangle strips; or points, a POLYDATA whose triangles are "
-     "sent once. A peer can change this by a STRING of device SEND with one of these words",
+     "what a peer receives\nweights: an NDARRAY of the weights of the modes, then the factors of "
+     "each lung's displacement along x, y and z, from which the peer computes the surface\n"
+     "surface: a POLYDATA of points and triangle strips\npoints: a POLYDATA whose triangles are "
+     "sent once\nA peer can change this by a STRING of device SEND with one of these words",
      SUPINE_FILLS(request, options.content), .choices = supine_stream_content_names,
      .standard = "weights"},
     {"space", 0, "NAME", "axes of the points: lps (left, back, head), or ras as in 3D Slicer",
@@ -100,8 +101,8 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, options.peers), .range = {1.0, 1000.0}, .standard = "64", .more = true},
     {.help = "A live page:"},
     {"web", 0, "[ADDRESS:]PORT",
-     "serve a page that shows the lungs live, to any number of viewers; a phone that shows it can "
-     "send its own tilt. A port without an address can be reached from this machine only",
+     "serve a page that shows the lungs live. A phone on which the page is open can send its own "
+     "tilt. A port without an address can be reached from this machine only",
      SUPINE_FILLS(request, web)},
     {.table = supine_options_from, SUPINE_FILLS(request, from)},
     {"certificate", 0, "PEM",
@@ -117,7 +118,7 @@ static const supine_option table[] = {
      "follow recorded poses instead of a tracker, starting when the first peer or viewer connects, "
      "and stop at their end",
      SUPINE_FILLS(request, replay), .file = SUPINE_FILE_IN},
-    {"seconds", 0, "S", "duration of the run in s; default: until interrupted",
+    {"seconds", 0, "S", "duration of the run in s; default until interrupted",
      SUPINE_FILLS(request, options.seconds), SUPINE_ABOVE_ZERO, .more = true},
     {.name = NULL}};
 
@@ -369,7 +370,7 @@ const supine_command supine_command_stream = {
     "follow a tracked patient live, over OpenIGTLink",
     .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
     .about = "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
-             "and sends the lungs in that pose to any number of peers. A pose is a TRANSFORM, "
+             "and sends the lungs in that pose to every connected peer. A pose is a TRANSFORM, "
              "QTDATA or POSITION message, or an NDARRAY of three numbers, the direction of gravity "
              "that a tilt sensor measures. Only the newest pose counts: a slow peer misses frames "
              "without delaying the others. At the end the command prints the time from receiving a "

@@ -56,23 +56,22 @@ static supine_status append_state(const char *text, void *field, supine_error *e
 static const supine_option table[] = {
     {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
      "surface of the same lungs in another state; its mesh may differ from that of the basis. May "
-     "be repeated, up to 8 times. Several states also show whether the displacement is linear in "
-     "volume",
+     "be repeated, up to 8 times. The landmarks belong to the first --state",
      .read = append_state,
      .wants = "SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE (at most 8 times)"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
-     "state that the motion starts from, in which the first landmarks were placed; default: the "
-     "scan",
+     "state that the motion starts from, the first state of the landmarks; default the scan",
      FILLS(from), .read = read_state, .wants = "a state, such as supine:rest"},
     {"to", 0, "POSTURE[:VOLUME]",
-     "without --state: state of the second landmarks. With --state: posture and volume of the "
-     "surfaces for which --state gives none; default: supine, and the volume of the surface",
+     "state of the second landmarks, if --state is not given; with --state, the posture and volume "
+     "of each --state that names none; default supine, with the volume of the surface",
      FILLS(to), .read = read_state, .wants = "a state, such as prone:rest+500"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"output", 'o', "FILE",
-     "local errors. .png: a picture of every state; .ply or .vtp: the predicted surface of the "
-     "first state, with its displacement from the nearest points of the scanned surface, in mm",
+     "file of local errors to write. .png: a picture of every state; .ply or .vtp: the predicted "
+     "surface of the first state, with its displacement from the nearest points of the scanned "
+     "surface, in mm",
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
     {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
@@ -229,29 +228,31 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_validate = {
     name,
-    "compare a basis with another scan of the person",
-    .usage = "BASIS --state [POSTURE:]SURFACE [--landmarks PAIRS.csv] [OPTIONS]\n"
+    "compare a basis with another scan of the patient",
+    .usage = "BASIS --state [POSTURE[:VOLUME]:]SURFACE [--landmarks PAIRS.csv] [OPTIONS]\n"
              "BASIS --landmarks PAIRS.csv --to POSTURE:VOLUME [OPTIONS]",
-    .about = "Compares a basis with other states of the same person. Reports the distances between "
-             "the surfaces and between landmarks, and how much of the motion is explained, in "
-             "comparison with no motion, a translation and an affine map. With several states, "
+    .about = "Compares a basis with other states of the same patient. Reports the distances "
+             "between the surfaces and between landmarks, and how much of the motion is explained, "
+             "in comparison with no motion, a translation and an affine map. With several states, "
              "reports whether the displacement is linear in volume.",
     .options = table,
-    .notes = "Distances between surfaces are measured in both directions; the largest is the "
-             "Hausdorff distance. The translation and the affine map are fitted to the other "
-             "state. 'explained' is 1 minus the ratio of the mean squared distances with and "
-             "without the motion. A small distance between surfaces does not prove that the motion "
-             "inside is right; landmarks measure that. Santhanam 2008 reported surfaces 2 mm "
-             "apart, and constants recovered within 1 %.\n"
-             "With several states, the displacement is also scaled to come nearest to each "
-             "surface. For states in the same posture as the first state, a straight line through "
-             "the start of motion is fitted to these scales as a function of volume; the largest "
-             "deviation from the line is given in percent of the largest scale.\n"
-             "\n"
-             "Examples:\n"
-             "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
-             "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
-             "      --state supine:full:full.ply --landmarks pairs.csv",
+    .notes =
+        "POSTURE is a name such as prone or supine+15, or a direction of gravity such as "
+        "0.6:0:-0.8. VOLUME is " SUPINE_VOLUME_HELP
+        ".\nDistances between surfaces are measured in both directions; the largest is the "
+        "Hausdorff distance. The translation and the affine map are fitted to the other state. "
+        "'explained' is 1 minus the ratio of the mean squared distances with and without the "
+        "motion. A small distance between surfaces does not prove that the motion inside is right; "
+        "landmarks measure that. Santhanam 2008 reported surfaces 2 mm apart in smaller "
+        "breaths, and constants recovered within 1 %.\nWith several states, each displacement is "
+        "also scaled to come nearest to its surface. A straight line through the start of motion "
+        "is fitted to these scales against volume, for the states in the posture of the first "
+        "state. The largest deviation from the line is given in percent of the largest scale.\n"
+        "\n"
+        "Examples:\n"
+        "  supine validate lungs.safetensors --state prone:prone.ply -o errors.png\n"
+        "  supine validate lungs.safetensors --from supine:rest --state supine:mid.ply \\\n"
+        "      --state supine:full:full.ply --landmarks pairs.csv",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

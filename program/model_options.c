@@ -102,11 +102,11 @@ static const char *const sexes[] = {"unknown", "female", "male", NULL};
 
 /* Parts of help texts: a line that describes each law, and the default constants of each law. */
 #define LAW_HELP(id, name, base, gain, box, constants, bend, reach, pair, what) name ": " what "\n"
-#define LAW_BASE(id, name, base, ...) "; default for " name ": " #base
-#define LAW_GAIN(id, name, base, gain, ...) "; default for " name ": " #gain
-#define LAW_BOX(id, name, base, gain, box, ...) "; default for " name ": " #box
+#define LAW_BASE(id, name, base, ...) "; default " #base " for " name
+#define LAW_GAIN(id, name, base, gain, ...) "; default " #gain " for " name
+#define LAW_BOX(id, name, base, gain, box, ...) "; default " #box " for " name
 #define LAW_CONSTANTS(id, name, base, gain, box, constants, ...)                                   \
-  "; default for " name ": " #constants
+  "; default " #constants " for " name
 
 #define FILLS(member) SUPINE_FILLS(supine_model_options, member)
 
@@ -114,7 +114,7 @@ const supine_option supine_command_model_options[] = {
     {.help = "Surfaces:"},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"midline", 0, "X",
-     "x of the sagittal plane between the lungs, mm; default: the middle of the bounding box of "
+     "x of the sagittal plane between the lungs, in mm; default the middle of the bounding box of "
      "two lungs, or the medial side of a single lung",
      FILLS(source.midline), SUPINE_SAYS_GIVEN(supine_model_options, source.has_midline),
      .wants = "a number of mm", .more = true},
@@ -124,7 +124,7 @@ const supine_option supine_command_model_options[] = {
      "labels of the lungs: lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), "
      "totalsegmentator (10 to 14), totalsegmentator-v1 (13 to 17), one (every label but 0 is lung; "
      "left and right are separated), or a list such as left=10+11,right=12+13+14, or left=2 for "
-     "one lung. Default: recognised from the labels present, if they are unambiguous",
+     "one lung. By default, the labels in the map decide, if they are unambiguous",
      FILLS(source.labels.labels)},
     {"edge", 0, "MM", "edge length of the surface's triangles; default 2",
      FILLS(source.labels.edge), .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
@@ -134,81 +134,83 @@ const supine_option supine_command_model_options[] = {
     {"surfaces-out", 0, "FILE", "also write the surfaces: " SUPINE_MESH_ENDINGS,
      FILLS(source.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS,
      .more = true},
-    {.help = "The scan and the law:"},
+    {.help = "The scan:"},
     {"scanned", 0, "STATE",
-     "state of the lungs in the scan: full (TLC, a breath-hold at full inflation; the default), "
-     "POSTURE:rest (FRC, the end of a quiet expiration), each optionally with +ML or -ML for both "
-     "lungs together (supine:rest+300, full-2000), or none (unknown: breaths are added to the "
-     "scan, and a change of posture alone does not deform it). The model starts from full "
-     "inflation, where the shape is the same in every posture; if the scan is in another state, "
-     "the shape at full inflation is computed first",
+     "state of the lungs in the scan\nfull: a breath-hold at full inflation (TLC)\nPOSTURE:rest: "
+     "the end of a quiet expiration (FRC). POSTURE is supine, prone, left or right (lying on that "
+     "side), upright or inverted\nnone: unknown. Breaths are added to the shape in the scan, and a "
+     "change of posture alone does not deform it\nfull and rest may have +ML or -ML, for both "
+     "lungs together: supine:rest+300, full-2000. Default full",
      FILLS(choice), .read = read_scan,
      .wants = "full or POSTURE:rest, optionally with +ML or -ML, or none"},
-    {"law", 0, "LAW", SUPINE_LAWS(LAW_HELP) "The options below change single constants of the law",
-     FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
     {"resting", 0, "LIST",
-     "patient's volume at rest (FRC), for one posture or several: POSTURE=2600mL, gas and tissue "
-     "of both lungs, as measured in a CT at rest; POSTURE=0.43, a share of the volume at full "
-     "inflation; or POSTURE=0.42/0.44, shares for the left and the right lung. The volumes of "
-     "other postures keep the default proportions to these. A lung-function test gives the gas "
-     "alone, seated: add about 0.9 L of tissue, and give the sum as upright. Default, from healthy "
-     "people: supine 0.418/0.440, prone 0.464/0.475, left 0.413/0.546, right 0.563/0.435, upright "
-     "0.481/0.506, inverted as supine",
+     "volume of the patient's lungs at rest (FRC), for one posture or several, separated by "
+     "commas\nPOSTURE=2600mL: gas and tissue of both lungs, as measured in a CT at rest\n"
+     "POSTURE=0.43: a share of the volume at full inflation\nPOSTURE=0.42/0.44: shares for the "
+     "left and the right lung\nThe volumes of other postures keep the default proportions to "
+     "these. A lung-function test gives the gas alone, seated: add about 0.9 L of tissue, and give "
+     "the sum as upright. Default, from healthy people: supine 0.418/0.440, prone 0.464/0.475, "
+     "left 0.413/0.546, right 0.563/0.435, upright 0.481/0.506, inverted as supine",
      FILLS(choice), .read = read_resting, .wants = "POSTURE=2600mL or POSTURE=SHARE,..."},
     {"height", 0, "CM",
-     "height of the person. With --sex it gives the volume expected at TLC (ECSC 1993, less 10 % "
-     "for lying, plus 0.86 L of tissue), which is reported with the scan's volume; default: the "
-     "range of adults",
+     "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
+     "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
+     "them, the range of adults is printed",
      FILLS(choice.person.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm", .more = true},
     {"sex", 0, "SEX", "female or male", FILLS(choice.person.sex), .choices = sexes, .more = true},
-    {.help = "Force on a vertex, f = base + gain h + cx X + cy Y + cz Z: h is its height along "
-             "gravity (0 uppermost, 1 lowermost); X, Y, Z are its coordinates in the bounding box "
-             "(0 to 1, from the midline outwards, from the back, from the apex):",
+    {.help = "Law of motion. The force on a vertex is base + gain h + cx X + cy Y + cz Z. The "
+             "depth h along gravity is 0 at the uppermost vertex and 1 at the lowermost. X, Y and "
+             "Z are coordinates in the bounding box, from 0 to 1: X from the midline outwards, Y "
+             "from back to front, Z from apex to base."},
+    {"law", 0, "LAW",
+     "how gravity and volume move the surface\n" SUPINE_LAWS(
+         LAW_HELP) "--base to --reach change the constants of the law. Default deep",
+     FILLS(choice.law), .choices = supine_physics_law_names, .more = true},
+    {"base", 0, "B", "part of the force that is equal everywhere" SUPINE_LAWS(LAW_BASE),
+     FILLS(choice.model.force.base), .more = true},
+    {"gain", 0, "G", "factor of the depth h" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain),
      .more = true},
-    {"base", 0, "B", "base" SUPINE_LAWS(LAW_BASE), FILLS(choice.model.force.base), .more = true},
-    {"gain", 0, "G", "gain" SUPINE_LAWS(LAW_GAIN), FILLS(choice.model.force.gain), .more = true},
-    {"box-force", 0, "X,Y,Z", "cx, cy and cz, fixed to the body" SUPINE_LAWS(LAW_BOX),
+    {"box-force", 0, "X,Y,Z",
+     "cx, cy and cz, the parts of the force that are fixed to the body" SUPINE_LAWS(LAW_BOX),
      FILLS(choice.model.force.box), .wants = "three numbers, CX,CY,CZ", .more = true},
     {"soften", 0, "S",
-     "make dependent tissue more expandable: its expandability is multiplied by exp(S (h - mean "
-     "h)); default 0. With the paper law, give --reach too",
+     "multiply the expandability of the tissue by exp(S (h - mean h)), so that lower tissue "
+     "expands more. With --law paper, --reach must be given too. Default 0",
      FILLS(choice.model.force.soften), .more = true},
-    {.help = "Direction of displacement:", .more = true},
     {"constants", 0, "C1,...,C6",
-     "constants of the box model" SUPINE_LAWS(
-         LAW_CONSTANTS) ". The constants for paper are fitted to landmarks in ten 4-D CTs "
-                        "(DIR-Lab), as the original ones are lost; the constants for deep are "
-                        "fitted to landmarks in ten full breaths (DIR-Lab COPDgene)",
+     "constants of the direction of displacement, (15)-(17) of Santhanam 2008: C1 X^C2 outwards, "
+     "C3 Y^C4 to the front and C5 Z^C6 to the feet, in mm. Those of deep are fitted to landmarks "
+     "in ten full breaths (DIR-Lab COPDgene). Those of paper are fitted to "
+     "landmarks in ten 4-D CTs (DIR-Lab), as the original ones are lost" SUPINE_LAWS(LAW_CONSTANTS),
      FILLS(choice.model.direction.c), .wants = "six numbers, C1,C2,C3,C4,C5,C6", .more = true},
-    {.help = "Tissue. Its expandability a is the inverse of its stiffness E. Only the ratios "
-             "between parts of the lungs count: doubling a everywhere changes nothing."},
+    {"reach", 0, "MM",
+     "distance over which a force spreads along the surface: the force falls with the distance r "
+     "about as exp(-r/MM). Without --reach, the paper law spreads it over a few links of the mesh; "
+     "a finer mesh has shorter links, and its surface may tear. Default 10 for deep",
+     FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
+    {.help = "Tissue. Expandability is the inverse of stiffness. Only its ratios between parts of "
+             "the lungs count: doubling it everywhere changes nothing."},
     {"expandability", 0, "WHAT",
-     "uniform (default)\n"
-     "linear:AXIS:FROM:TO, exp:AXIS:FROM:TO: a changes from FROM to TO linearly or exponentially "
-     "along AXIS: x from the midline outwards, y from back to front, z from apex to base; "
-     "linear:z:0.5:1.5 expands most at the base\n"
-     "FILE: CSV with the expandability of every vertex: a column expandability, in the vertex "
-     "order of 'supine solve' (left lung first); or the columns vertex,expandability, with "
-     "vertices numbered from 0",
+     "uniform: the same everywhere\nlinear:AXIS:FROM:TO, exp:AXIS:FROM:TO: it changes from FROM to "
+     "TO, linearly or exponentially, along AXIS: x from the midline outwards, y from back to "
+     "front, z from apex to base. With linear:z:0.5:1.5 the base expands most\nFILE: CSV with the "
+     "expandability of every vertex: a column expandability, in the vertex order of 'supine solve' "
+     "(left lung first); or the columns vertex,expandability, with vertices numbered from 0\n"
+     "Default uniform",
      FILLS(choice), .read = read_expandability, .file = SUPINE_FILE_IN,
      .wants = "uniform, linear:AXIS:FROM:TO or exp:AXIS:FROM:TO with AXIS x, y or z and both ends "
               "above 0, or a file",
      .more = true},
     {"lesion", 0, "X,Y,Z,RADIUS,FACTOR",
-     "lesion at X,Y,Z (mm, LPS): E is multiplied by FACTOR within half of RADIUS (mm); from there "
-     "to RADIUS the multiplier changes smoothly to 1. A FACTOR above 1 stiffens the tissue, which "
-     "then moves less. May be repeated, up to 64 times",
+     "lesion with its centre at X,Y,Z (mm, LPS). Within half of RADIUS (mm), the stiffness is "
+     "multiplied by FACTOR; from there to RADIUS the multiplier changes smoothly to 1. A FACTOR "
+     "above 1 stiffens the tissue, which then moves less. May be repeated, up to 64 times",
      FILLS(choice), .read = read_lesion,
      .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",
-     "collapsed lung (pneumothorax), left or right: its volume at rest and its share of a breath "
-     "are multiplied by SHARE (0 to 1); the other lung takes the remainder of the breath",
+     "collapsed lung (pneumothorax), left or right: SHARE, above 0 and at most 1, multiplies its "
+     "volume in every state. The other lung takes the remainder of a breath",
      FILLS(choice), .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
-    {"reach", 0, "MM",
-     "length over which a force spreads along the surface: at distance r it is about exp(-r/MM); "
-     "default 10. The paper law spreads it over a few links of the mesh instead: a finer mesh has "
-     "shorter links, and its surface may tear",
-     FILLS(choice.model.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0", .more = true},
     {.name = NULL}};
 
 static void print_map(const char *path, const supine_source *source) {

@@ -27,10 +27,10 @@
  * ventilation of the lowest to the uppermost quarter, prone, from 1.4 to 1.6 (expected: 1). */
 #define SUPINE_LAWS(LAW)                                                                           \
   LAW(DEEP, "deep", 0.9, 0.4, (0, -0.2, 0), (6, 2.6, 15, 1, 16, 1.3), (0, -0.45, 0.45), 10, true,  \
-      "postures and breaths between full inflation, rest and beyond (default)")                    \
+      "displacement from full inflation, for any posture and volume")                              \
   LAW(PAPER, "paper", 0, 1, (0, 0, 0), (2, 1.5, 1.5, 1, 16, 1.4), (0, 0, 0), 0, false,             \
-      "Santhanam 2008 as published: breaths are added to the scan as it is (implies --scanned "    \
-      "none)")
+      "as Santhanam 2008 published it: displacement from the shape in the scan (implies "          \
+      "--scanned none)")
 /* clang-format on */
 typedef enum supine_law {
 #define SUPINE_LAW_ENUM(id, ...) SUPINE_LAW_##id,

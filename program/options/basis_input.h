@@ -43,7 +43,8 @@ double *supine_options_basis_positions(const supine_basis *basis, const supine_p
 supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *mesh);
 
 #define SUPINE_EXPECTED_MEANING                                                                    \
-  "3-D RMS; half of all points lie within 0.9 times this distance, 95 % within 1.8 times"
+  "3-D RMS; half of all points lie within 0.9 times this distance of their true position, 95 % "   \
+  "within 1.8 times"
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
   "It was measured on full breaths in one posture; for a change of posture it is an "              \
   "extrapolation."

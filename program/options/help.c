@@ -59,7 +59,8 @@ void supine_options_visit(const supine_option *options, size_t base, supine_opti
 typedef struct printing {
   FILE *file;
   bool all;
-  size_t hidden; /* number of options that only --help-all shows */
+  size_t hidden;       /* number of options that only --help-all shows */
+  const char *heading; /* heading to print before the next option; NULL if none */
 } printing;
 
 static void print_row(void *context, const supine_option *option, size_t base) {
@@ -67,14 +68,18 @@ static void print_row(void *context, const supine_option *option, size_t base) {
   FILE *file = p->file;
   char text[2048];
   (void)base;
-  if (option->more && !p->all) {
-    p->hidden += option->name != NULL;
+  if (option->name == NULL) {
+    p->heading = option->help;
     return;
   }
-  if (option->name == NULL) {
-    (void)fputc('\n', file);
-    print_text(option->help, 0, 0, file);
+  if (option->more && !p->all) {
+    ++p->hidden;
     return;
+  }
+  if (p->heading != NULL) {
+    (void)fputc('\n', file);
+    print_text(p->heading, 0, 0, file);
+    p->heading = NULL;
   }
   const char letter[] = {'-', option->letter, ',', ' ', '\0'};
   const int used = fprintf(file, "  %s--%s%s%s", option->letter != 0 ? letter : "", option->name,
@@ -89,7 +94,7 @@ static void print_row(void *context, const supine_option *option, size_t base) {
 }
 
 void supine_options_print_help(const supine_command *command, bool all, FILE *file) {
-  printing p = {file, all, 0};
+  printing p = {file, all, 0, NULL};
   const char *lead = "Usage:";
   for (const char *usage = command->usage; *usage != '\0'; lead = "      ") {
     const size_t length = strcspn(usage, "\n");

@@ -49,14 +49,14 @@ static const char *const postures[] = {"supine",  "prone",    "left", "right",
 
 const supine_option supine_options_orientation[] = {
     {"posture", 0, "POSTURE",
-     "supine, prone, left or right (left or right lateral decubitus), upright, inverted (head "
-     "down), or a DICOM patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. "
-     "+DEGREES turns gravity about the left-right axis, from the back towards the head: supine+15 "
-     "is Trendelenburg",
+     "supine, prone, left or right (lying on that side), upright, inverted (head down), or a DICOM "
+     "patient position: HFS, FFS, HFP, FFP, HFDL, FFDL, HFDR, FFDR. +DEGREES or -DEGREES turns "
+     "gravity about the left-right axis, from the back towards the head: supine+15 and prone-15 "
+     "lower the head (Trendelenburg)",
      GRAVITY, .read = read_posture, .choices = postures},
     {"gravity", 0, "X,Y,Z",
-     "instead of a posture, the direction of gravity in body axes: x to the left, y to the back, z "
-     "to the head; supine is 0,1,0",
+     "direction of gravity in body axes, instead of a posture: x to the left, y to the back, z to "
+     "the head; 0,1,0 is supine",
      GRAVITY, .read = read_gravity, .wants = "three finite numbers, X,Y,Z"},
     {.name = NULL}};
 
@@ -121,20 +121,24 @@ const supine_option supine_options_folds[] = {
 const supine_option supine_options_volume[] = {
     {"volume", 0, "VOLUME",
      SUPINE_VOLUME_HELP
-     "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung\nDefault: rest; if rest "
-     "is unknown, scan+500, or for a basis made with --fields the displacements given there",
+     "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung\nDefault rest; for a "
+     "basis made with --scanned none or --law paper, scan+500; for one made with --fields, the "
+     "displacements given there",
      SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
      .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
     {.name = NULL}};
 
-const supine_option supine_options_from[] = {
-    {"from", 0, "STATE",
-     "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME, such as "
-     "supine:rest or scan; default: the scan for 'deform' and 'breathe'; supine:rest for other "
-     "commands, or the scan if rest is unknown",
-     SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from},
-    {.name = NULL}};
+#define FROM(standard)                                                                             \
+  {                                                                                                \
+    "from", 0, "STATE",                                                                            \
+        "state that displacements are measured from: POSTURE, VOLUME or POSTURE:VOLUME, such as "  \
+        "supine:rest or scan; default " standard,                                                  \
+        SUPINE_FILLS(supine_from, state), SUPINE_SAYS_GIVEN(supine_from, given), .read = read_from \
+  }
+const supine_option supine_options_from[] = {FROM("supine:rest, or the scan if rest is unknown"),
+                                             {.name = NULL}};
+const supine_option supine_options_from_scan[] = {FROM("scan"), {.name = NULL}};
 
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
                                        bool compares, supine_reference_pose *reference,

@@ -41,7 +41,7 @@ typedef struct supine_posture_list {
 #define SUPINE_POSTURE_LIST_HELP                                                                   \
   "A posture is a name (supine, prone, left, right, upright, inverted, or a DICOM patient "        \
   "position), a name with degrees by which gravity turns from the back towards the head "          \
-  "(supine+15: Trendelenburg), or a gravity in body axes, X:Y:Z (0.6:0:-0.8)."
+  "(supine+15: Trendelenburg), or a direction of gravity in body axes, X:Y:Z (0.6:0:-0.8)."
 
 /* Parse a list of postures, such as "supine,prone,supine+15,0.6:0:-0.8".
  * @retval SUPINE_ERROR_ARGUMENT */
@@ -67,11 +67,11 @@ typedef struct supine_volume_options {
 
 #define SUPINE_VOLUME_HELP                                                                         \
   "rest (FRC, the end of a quiet expiration in the posture), full (TLC, full inflation) or scan "  \
-  "(the volume scanned), each with +ML or -ML added, such as rest+500; or the absolute volume of " \
-  "gas and tissue in all lungs, as measured in a CT: 2600mL"
+  "(the volume in the scan), each alone or with +ML or -ML, such as rest+500; or the absolute "    \
+  "volume of gas and tissue in all lungs, as measured in a CT, such as 2600mL"
 
-/* Table of --from, which fills a supine_from. */
-extern const supine_option supine_options_from[];
+/* Tables of --from, which fill a supine_from: the default is supine at rest, or the scan. */
+extern const supine_option supine_options_from[], supine_options_from_scan[];
 
 typedef struct supine_from {
   bool given;

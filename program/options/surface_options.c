@@ -26,11 +26,12 @@ const supine_option supine_options_surface_frame[] = {
     {"axes", 0, "ABC",
      "axes of the files' coordinates: three letters, the directions in which x, y and z grow (L or "
      "R, P or A, S or I): LPS in DICOM, RAS in 3D Slicer and nibabel. ITK names the opposite "
-     "directions: its RAI is LPS here. Default: the axes that the file states, else LPS",
+     "directions: its RAI is LPS here. Default the axes that the file states, else LPS",
      SUPINE_FILLS(supine_mesh_load_options, axes), .read = read_axes,
      .wants = "three letters, one each of L or R, P or A, S or I, such as LPS"},
     {"units", 0, "UNIT",
-     "unit of the coordinates: mm, cm, m, um, in, or a number of millimetres; default mm",
+     "unit of the coordinates: mm, cm, m, um, in, or the length of the unit in mm, such as 25.4; "
+     "default mm",
      SUPINE_FILLS(supine_mesh_load_options, millimetres_per_unit), .read = read_units,
      .wants = "mm, cm, m, um, in, or a number of millimetres"},
     {.name = NULL}};
@@ -39,15 +40,15 @@ const supine_option supine_options_surface_frame[] = {
 
 const supine_option supine_options_landmarks[] = {
     {"landmarks", 0, "FILE",
-     "matched points, in mm and LPS: CSV with the columns x,y,z,to_x,to_y,to_z (first state, "
-     "other state), or im1_x,im1_y,im1_z,im2_x,im2_y,im2_z (image 1 inhaled, image 2 exhaled; "
-     "the motion is from image 2 to image 1). If there are several states, the points belong to "
-     "the first",
+     "matched points, in mm and LPS: CSV with the columns x,y,z (a point in the first state) and "
+     "to_x,to_y,to_z (the same point in the second state); or im1_x,im1_y,im1_z (image 1, inhaled) "
+     "and im2_x,im2_y,im2_z (image 2, exhaled), of which image 2 is the first state",
      FILLS(path), .file = SUPINE_FILE_IN},
     {"reverse", 0, NULL, "exchange the two states of the landmarks", FILLS(reverse)},
     {"translation", 0, NULL, "also fit a translation between the frames of the scans",
      FILLS(translation), .rivals = "motion"},
-    {"rigid", 0, NULL, "also fit a translation and a small rotation", FILLS(rigid),
+    {"rigid", 0, NULL,
+     "also fit a translation and a small rotation between the frames of the scans", FILLS(rigid),
      .rivals = "motion"},
     {.name = NULL}};
 
