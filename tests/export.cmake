@@ -20,3 +20,4 @@ foreach(what colour glb pages) # pages.mjs runs all tests in a browser, in one p
   set_tests_properties(export_${what}_node PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
 endforeach()
+set_tests_properties(export_pages_node PROPERTIES COST 1000) # the longest test starts first

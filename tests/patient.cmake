@@ -4,7 +4,7 @@ supine_test(patient_surface supine_patient supine_lungs supine_mesh_io supine_ba
 supine_test(patient_expand supine_patient supine_lungs supine_mesh_io supine_base supine_gsl)
 add_test(NAME patient_command COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_patient_command.sh
   $<TARGET_FILE:supine>)
-set_tests_properties(patient_command PROPERTIES TIMEOUT 900)
+set_tests_properties(patient_command PROPERTIES TIMEOUT 900 COST 500)
 add_test(NAME patient_refused COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_patient_refused.sh
   $<TARGET_FILE:supine>)
 set_tests_properties(patient_refused PROPERTIES TIMEOUT 900)
