@@ -42,22 +42,22 @@ changed() {
   awk -F, -v OFS=, "NR == 1 { print; next } { $2; print }" good.csv >"$1.csv"
 }
 changed apart '$4 += 150; $5 += 150; $6 += 150'
-refused 2 'mm apart: give both in one frame, or fit the motion between the scans with --translation' --landmarks apart.csv
+refused 2 'mm apart: give all points in one coordinate frame, or fit the motion between the scans with --translation' --landmarks apart.csv
 "$supine" fit --landmarks apart.csv --translation >/dev/null || fail "fit --translation refuses shifted landmarks"
 changed beyond '$6 += 5000'
-refused 2 'mm apart: give both in one frame' --landmarks beyond.csv
+refused 2 'mm apart: give all points in one coordinate frame' --landmarks beyond.csv
 changed centimetres '$4 /= 10; $5 /= 10; $6 /= 10'
-refused 2 'as if in cm: give landmarks in mm' --landmarks centimetres.csv
+refused 2 'the unit may be cm: give landmarks in mm' --landmarks centimetres.csv
 changed both '$1 /= 10; $2 /= 10; $3 /= 10; $4 /= 10; $5 /= 10; $6 /= 10'
-refused 2 'as if in cm: give landmarks in mm' --landmarks both.csv
+refused 2 'the unit may be cm: give landmarks in mm' --landmarks both.csv
 changed sides '$4 = -$4'
 refused 2 'differ by a reflection' --landmarks sides.csv
 changed ras '$4 = -$4; $5 = -$5'
 refused 2 'give both in LPS axes' --landmarks ras.csv --translation
 changed same '$4 = $1; $5 = $2; $6 = $3'
-refused 2 'the two states are the same' --landmarks same.csv
+refused 2 'the points do not move between the states' --landmarks same.csv
 changed shifted '$4 = $1; $5 = $2; $6 = $3 + 5'
-refused 2 'give a state in which the lungs have moved' --landmarks shifted.csv --translation
+refused 2 'mm RMS after a translation): give two different states' --landmarks shifted.csv --translation
 changed flat '$2 = 17 + 0.3 * $1; $5 = $2 - 3'
 refused 2 'points lie in one plane' --landmarks flat.csv
 awk -F, -v OFS=, 'NR == 1 { print; next } { from[NR] = $1 OFS $2 OFS $3; to[NR] = $4 OFS $5 OFS $6 }
@@ -68,7 +68,7 @@ refused 2 'nan.csv:20: to_z "nan" is not a finite number' --landmarks nan.csv
 sed '30s/.*/1,2,3,4,5/' good.csv >short.csv
 refused 2 'short.csv:30' --landmarks short.csv
 head -12 good.csv >eleven.csv
-refused 2 'pairs of points: 11, where a law needs at least 12' --landmarks eleven.csv
+refused 2 'pairs of points: 11, but at least 12 are needed' --landmarks eleven.csv
 refused 2 'pairs of points: 11' --landmarks good.csv --state prone:rest:eleven.csv
 head -15 good.csv >few.csv
 refused 2 'points: 14, fewer than the 15 unknowns of the paper law' --landmarks few.csv --law paper --rigid
@@ -104,15 +104,15 @@ moved state 'y *= 1.05; z *= 1.08'
 "$supine" fit rest.obj state.obj -o good.json >/dev/null || fail "fit refuses good surfaces"
 refused 2 'the two surfaces are the same' rest.obj rest.obj
 moved far 'z += 400'
-refused 2 'do not overlap along z' rest.obj far.obj
-refused 2 'do not overlap along x' rest.obj other.obj
+refused 2 'overlap too little along z' rest.obj far.obj
+refused 2 'overlap too little along x' rest.obj other.obj
 moved cm 'x /= 10; y /= 10; z /= 10'
 refused 2 'add --units mm' rest.obj cm.obj
 refused 2 'add --units mm' cm.obj rest.obj
 moved turned 'x = -x; y = -y'
-refused 2 'do not overlap along' rest.obj turned.obj
+refused 2 'overlap too little along' rest.obj turned.obj
 moved left 'x = -x'
-refused 2 'do not overlap along x' rest.obj left.obj
+refused 2 'overlap too little along x' rest.obj left.obj
 # changed_pair NAME AWK: write NAME.obj from pair.obj with each vertex changed by an awk statement.
 changed_pair() {
   awk "/^v / { x = \$2; y = \$3; z = \$4; $2; print \"v\", x, y, z; next } { print }" pair.obj >"$1.obj"
@@ -125,6 +125,6 @@ refused 2 'No such file' rest.obj absent.obj
 refused 2 'give each lung once' rest.obj,rest.obj state.obj
 refused 1 'more than two surfaces' rest.obj,other.obj,state.obj state.obj
 refused 1 'nothing to fit to' --state prone:state.obj
-refused 2 'faces the same way on the surface of the other state' rest.obj state.obj --state prone:far.obj
+refused 2 'the nearest point of the other surface faces the same way for only' rest.obj state.obj --state prone:far.obj
 refused 2 'mm apart' --landmarks apart.csv rest.obj state.obj
 echo passed

@@ -354,15 +354,15 @@ TEST(test_fit_surface_wrong_frame_unit_or_side_refused) {
   for (size_t i = 0; i < n; ++i) {
     moved.vertices[i] = 0.1 * rest.mesh.vertices[i];
   }
-  refused(&rest, &moved, "do not overlap along");
+  refused(&rest, &moved, "overlap too little along");
   for (size_t i = 0; i < n; ++i) {
     moved.vertices[i] = rest.mesh.vertices[i] + (i % 3 == 2 ? 400.0 : 0.0);
   }
-  refused(&rest, &moved, "do not overlap along z");
+  refused(&rest, &moved, "overlap too little along z");
   for (size_t i = 0; i < n; ++i) { /* move to the other side of the chest */
     moved.vertices[i] = rest.mesh.vertices[i] - (i % 3 == 0 ? 150.0 : 0.0);
   }
-  refused(&rest, &moved, "do not overlap along x");
+  refused(&rest, &moved, "overlap too little along x");
   uint32_t *inwards = malloc(3 * moved.triangle_count * sizeof *inwards);
   for (size_t t = 0; t < moved.triangle_count; ++t) {
     inwards[3 * t] = moved.triangles[3 * t];

@@ -278,7 +278,7 @@ TEST(test_fit_bad_samples_message_names_line) {
     expect_format(count, p, v, "s.csv:105", "repeats the one before");
     model_sample(count, p, v);
     p[5] = p[3];
-    expect_format(count, p, v, "s.csv:105", "turns back");
+    expect_format(count, p, v, "s.csv:105", "changes direction");
     model_sample(count, p, v);
     v[5] = v[4] - 0.12 * (v[count - 1] - v[0]);
     expect_format(count, p, v, "s.csv:105", "volume must rise");

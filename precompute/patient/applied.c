@@ -13,19 +13,20 @@
 
 enum { COLUMNS = SUPINE_PATIENT_COLUMNS, HEIGHT = COLUMNS, FORCE, ALL };
 
-/* The force along directions shorter than this share of their RMS length is damped. */
-static const double damped_below = 0.1;
+static const double damping_per_rms_direction = 0.1;
 
-/* Compute the spread force [N] of the law, corrected by the remaining distance of each match. */
+/* Compute the force of the displacement law at every vertex [N], plus the force that would move the
+ * displaced vertex onto the other surface. */
 static void find_spread_force(supine_patient_matching *m, const supine_patient *patient,
                               double *spread) {
   supine_patient law = *patient;
-  double damping = 0.0; /* added to squared lengths of directions, mm^2 */
+  double damping = 0.0; /* mm^2 */
   double d[3];
   law.centre_count = 0;
   for (size_t v = 0; v < m->count; ++v) {
     supine_patient_direction(&law.power, &m->rows[v].place, 1.0, d);
-    damping += damped_below * damped_below * supine_dot(d, d) / (double)m->count;
+    damping +=
+        damping_per_rms_direction * damping_per_rms_direction * supine_dot(d, d) / (double)m->count;
   }
   (void)supine_patient_matching_place(m, &law);
   supine_patient_matching_find(m);
@@ -38,14 +39,14 @@ static void find_spread_force(supine_patient_matching *m, const supine_patient *
   }
 }
 
-/* Compute the means over each block of the terms of (18), of the height along gravity and of the
- * force. Sum the products of the means over all blocks, weighted by area. */
+/* Average the terms of the force, the height along gravity and the force over each block of
+ * vertices. Sum the products of every two averages over all blocks. Areas are the weights. */
 static void add_blocks(const supine_patient_matching *m, const double *force,
                        const double gravity[3], const double *vertex_area, size_t blocks,
                        double *means, double products[ALL * ALL]) {
   memset(means, 0, (ALL + 1) * blocks * sizeof *means);
   for (size_t v = 0; v < m->count; ++v) {
-    double *mean = means + (ALL + 1) * m->rows[v].block; /* the last element is the area */
+    double *mean = means + (ALL + 1) * m->rows[v].block;
     const supine_patient_place place = supine_patient_find_vertex(m->rest, v);
     cblas_daxpy(COLUMNS, vertex_area[v], place.force, 1, mean, 1);
     mean[HEIGHT] += vertex_area[v] * supine_dot(gravity, m->rest->mesh.vertices + 3 * v);
@@ -59,12 +60,12 @@ static void add_blocks(const supine_patient_matching *m, const double *force,
   }
 }
 
-/* Compute the covariance of quantities a and b; quantity 0 is the constant 1. */
+/* Compute the covariance of quantities a and b from sums of products; quantity 0 is always 1. */
 static double covariance(const double products[ALL * ALL], size_t a, size_t b) {
   return (products[a * ALL + b] - products[a] * products[b] / products[0]) / products[0];
 }
 
-/* Fit (18) to the force of the blocks. Return false if the blocks do not determine (18). */
+/* Fit the slopes of the force along X, Y and Z to the block averages; return false on failure. */
 static bool fit_blocks(const double products[ALL * ALL], supine_patient_applied *applied) {
   double matrix[ALL * ALL];
   double k[COLUMNS];
@@ -115,8 +116,8 @@ supine_status supine_patient_applied_find(supine_patient_matching *matching,
     if (!fit_blocks(products, applied)) {
       status = supine_error_set(
           error, SUPINE_ERROR_NUMERICAL,
-          "the displacement along the law's directions does not determine the force: check that "
-          "both surfaces show the same lungs, and none is cut off");
+          "the displacement between the two surfaces does not determine the applied force: check "
+          "that both surfaces show the same lungs, and that neither surface is cut off");
     }
   }
   free(spread);

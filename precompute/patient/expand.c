@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit the expandability of regions, and test if it improves the prediction of held-out blocks. */
+/* Fit the expandability of each region of the lungs, and test it on held-out vertices. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,30 +8,31 @@
 
 #include "sh/base/vec3.h"
 
-/* Largest distance of a vertex from the nearest centre of a region, mm. */
-static const double distance_most = 35.0;
+static const double vertex_to_centre_most = 35.0; /* mm */
 static const double radius_over_distance = 1.5;
 
 enum {
-  CANDIDATES = 8192, /* largest number of vertices tried as centres */
-  LANES = 16,        /* number of regions solved for together */
+  CANDIDATES = 8192, /* largest number of vertices tried as centres of regions */
+  LANES = 16,        /* number of regions for each call of the equilibrium solver */
   ROUNDS = 5         /* rounds of fitting and matching */
 };
 
-/* Prior standard deviations of the expandability a: of a_i - a_j for neighbours, and of a_i - 1. */
+/* Prior standard deviation of the difference in expandability of two neighbouring regions. */
 static const double neighbour_deviation = 0.3;
+/* Prior standard deviation of the expandability of one region; the prior mean is 1. */
 static const double region_deviation = 1.0;
 
-static const double noise_least = 0.3;     /* lower bound on the noise of a row, mm */
-static const double rows_per_error = 10.0; /* number of nearby rows that share one error */
+static const double noise_least = 0.3;     /* lower bound on the noise of a distance, mm */
+static const double rows_per_error = 10.0; /* number of nearby vertices that share one error */
 
-/* Largest distance of neighbouring centres, as a multiple of the smallest distance of centres. */
+/* Two regions are neighbours if their centres are closer than this multiple of the smallest
+ * distance between any two centres. */
 static const double neighbour_ratio = 1.7;
 
-/* Regions are kept if their held-out error is below this share of the error with uniform tissue. */
+/* Largest held-out error with regions / held-out error without, at which regions are kept. */
 static const double kept_ratio = 0.95;
 
-/* Find the vertex of one lung that is farthest from all centres, and its distance, mm. */
+/* Find the vertex of one lung that is farthest from its nearest region centre. */
 static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness *stiffness,
                        int side, double *distance) {
   size_t found = 0;
@@ -53,14 +54,15 @@ static size_t farthest(const supine_lungs *lungs, const supine_patient_stiffness
   return found;
 }
 
-/* Distribute regions over the surface, with centres about 45 mm apart and expandability 1. */
+/* Add regions of expandability 1 until every vertex is near the centre of a region. */
 static void place_regions(const supine_lungs *lungs, supine_patient_stiffness *stiffness) {
   *stiffness = (supine_patient_stiffness){0};
   for (int side = 1; side >= -1; side -= 2) {
     const size_t first = stiffness->count;
     double distance;
     size_t vertex = farthest(lungs, stiffness, side, &distance);
-    while (distance > distance_most && stiffness->count - first < SUPINE_PATIENT_REGIONS_MAX / 2) {
+    while (distance > vertex_to_centre_most &&
+           stiffness->count - first < SUPINE_PATIENT_REGIONS_MAX / 2) {
       supine_patient_region *region = &stiffness->region[stiffness->count++];
       *region = (supine_patient_region){.side = side, .value = 1.0};
       memcpy(region->centre, lungs->mesh.vertices + 3 * vertex, sizeof region->centre);
@@ -72,8 +74,7 @@ static void place_regions(const supine_lungs *lungs, supine_patient_stiffness *s
   }
 }
 
-/* Compute the prior precision [count, count] of the expandability of the regions. */
-static void find_precision(const supine_patient_stiffness *regions, double *precision) {
+static void find_prior_precision(const supine_patient_stiffness *regions, double *precision) {
   const supine_patient_region *region = regions->region;
   const size_t n = regions->count;
   double nearest = INFINITY;
@@ -93,7 +94,8 @@ static void find_precision(const supine_patient_stiffness *regions, double *prec
   }
 }
 
-/* Solve for response [rows, regions]: the spread force due to each region of expandability 1. */
+/* Compute response [m->count, regions->count]: the force that reaches a chosen vertex from one
+ * region, if the expandability of that region is 1. */
 static supine_status find_responses(const supine_patient_matching *m,
                                     const supine_patient_stiffness *regions,
                                     const double gravity[3], double *response,
@@ -137,7 +139,7 @@ cleanup:
   return status;
 }
 
-/* Set the force at each row from the expandability a [count] of the regions; NULL counts as 1. */
+/* Set the force on each chosen vertex from the expandabilities a [count], or from 1 if NULL. */
 static void set_forces(supine_patient_matching *m, size_t count, const double *response,
                        const double *a) {
   for (size_t i = 0; i < m->count; ++i) {
@@ -150,7 +152,7 @@ static void set_forces(supine_patient_matching *m, size_t count, const double *r
   }
 }
 
-/* Alternate between fit and matching, without robust weights: large residuals show the regions. */
+/* Fit the expandabilities and match the surfaces in turn, without robust weights. */
 static supine_status iterate(supine_patient_matching *m, const double *response,
                              supine_patient_fit_options *options, supine_patient *patient,
                              supine_patient_stiffness *regions, supine_error *error) {
@@ -197,7 +199,7 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
           ? supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu regions", n)
           : find_responses(m, stiffness, options->gravity, response, error);
   if (status == SUPINE_OK) {
-    find_precision(stiffness, precision);
+    find_prior_precision(stiffness, precision);
     region_options.region_count = n;
     region_options.precision = precision;
     status = iterate(m, response, &region_options, patient, stiffness, error);

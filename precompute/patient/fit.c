@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a law and its correction, and measure its error on held-out blocks. */
+/* Fit a displacement law with a correction, and measure the error on held-out points. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 #include "sh/base/vec3.h"
 
 enum {
-  EXPECTED_MAX = 200, /* approximate number of points at which the expected error is found */
+  EXPECTED_MAX = 200, /* largest number of points at which the expected error is computed */
   FOLDS = 5,          /* number of folds; the blocks of a fold are held out together */
   SEEDS = 3,          /* number of random divisions into blocks and folds */
   AFFINE = 12,        /* number of constants of an affine map */
@@ -22,31 +22,31 @@ enum {
   SCORES = SUPINE_PATIENT_SCORES
 };
 
-/* Half width of the 95 % band in units of the expected error, for a 3-D point and a component. */
+/* Half-width of the 95 % band / expected error: of a 3-D position, and of one component of it. */
 static const double band_point = 1.8;
 static const double band_component = 1.96;
 
-/* Ratio of the error within 8 mm of the surface to the expected error, measured in ten patients. */
+/* Measured error / expected error of points within 8 mm of the surface, in ten patients. */
 static const double near_surface = 1.3;
 
 typedef struct squares {
   double residual[SCORES]; /* sums of weighted squared residuals, mm^2 */
   double expected;         /* sum of weighted expected variances, mm^2 */
-  double weight;           /* sum of weights */
-  double points, within;   /* number of points, and of points within the 95 % band */
-
+  double weight;
+  double points, within; /* number of points, and of points within the 95 % band */
 } squares;
 
 typedef struct study {
   supine_patient_fit_options options;
   const supine_patient_row *rows;
   size_t row_count, components;
-  size_t *fold;            /* [SEEDS, row_count] fold of each row */
+  size_t *fold;            /* [SEEDS, row_count] index of each row's fold */
   squares held_out[ITEMS]; /* sums over each held-out fold */
   supine_status failed[ITEMS];
 } study;
 
-/* Compute derivatives x of axis . (t + M p) with respect to t and M, where p = offset / 100 mm. */
+/* Compute the derivatives x of a . (t + M p) with respect to the 12 elements of t and M, where a is
+ * the row's axis and p is the row's offset in units of 100 mm. */
 static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   for (size_t a = 0; a < 3; ++a) {
     x[a] = row->axis[a];
@@ -56,7 +56,7 @@ static void affine_design(const supine_patient_row *row, double x[AFFINE]) {
   }
 }
 
-/* Fit the displacement t or t + M p to rows. `map` becomes t and M, or zeros if the fit fails. */
+/* Fit a translation t, or t + M p (affine_design). `map` becomes t and M, or zeros on failure. */
 static void affine_fit(const supine_patient_row *rows, size_t count, bool translation,
                        double map[AFFINE]) {
   double matrix[AFFINE * AFFINE] = {0.0};
@@ -78,15 +78,14 @@ static void affine_fit(const supine_patient_row *rows, size_t count, bool transl
   }
 }
 
-/* Return the displacement by the map along a row's axis, minus the measured displacement, mm. */
 static double affine_residual(const double map[AFFINE], const supine_patient_row *row) {
   double x[AFFINE];
   affine_design(row, x);
   return cblas_ddot(AFFINE, x, 1, map, 1) - row->value;
 }
 
-/* Assign each row to a block and each block at random to a fold; write the fold [count] of each
- * row. Return the number of blocks, or 0 if out of memory. */
+/* Assign each row to a block, and each block at random to a fold. Write the index of each row's
+ * fold into fold [count]. Return the number of blocks, or 0 if out of memory. */
 static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row *rows,
                            size_t count, unsigned long seed, size_t *fold) {
   const size_t blocks = supine_patient_rows_block(frame, rows, count, seed + 1);
@@ -95,7 +94,7 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   const bool able = fold_of != NULL && random != NULL;
   if (able) {
     gsl_rng_set(random, 1000 + seed);
-    for (size_t b = 0; b < blocks; ++b) { /* shuffle the folds of the blocks */
+    for (size_t b = 0; b < blocks; ++b) {
       const size_t other = gsl_rng_uniform_int(random, b + 1);
       fold_of[b] = fold_of[other];
       fold_of[other] = b % FOLDS;
@@ -109,7 +108,7 @@ static size_t assign_folds(const supine_patient_frame *frame, supine_patient_row
   return able ? blocks : 0;
 }
 
-/* Predict rows by a fit, and by maps fitted to the same data; add the squared residuals to sums. */
+/* Predict each row by all predictors, fitted to krige->rows; add the squared residuals to sums. */
 static void add_residuals(const study *s, const supine_patient_row *rows, size_t count,
                           supine_patient_krige *krige, squares *sums) {
   const double band = s->components == 3 ? band_point : band_component;
@@ -194,8 +193,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
   return SUPINE_OK;
 }
 
-/* Compute the expected error that `krige` predicts for points near a surface, in three dimensions,
- * RMS in mm; 0 for landmarks. Return the mean displacement of the points by `law`, mm. */
+/* Write the 3-D RMS error, mm, that `krige` predicts for points near the surface into `expected`;
+ * for landmarks, write 0. Return the mean length of the displacement of the points by `law`, mm. */
 static double find_expected_error(const study *s, const supine_patient_power *law,
                                   supine_patient_krige *krige, double *expected) {
   const size_t step = s->components * (1 + s->row_count / (s->components * EXPECTED_MAX));
@@ -225,8 +224,8 @@ static supine_patient_score baseline_of(const study *s) {
                                                         : SUPINE_PATIENT_SCORE_NONE;
 }
 
-/* Convert sums to RMS errors. Return by how many percent the squared error is below that of the
- * baseline. */
+/* Convert sums of squared residuals to the RMS error of each predictor. Return by how many percent
+ * the squared error of the corrected law is below that of the baseline. */
 static double find_rms(const study *s, const squares *sums, double score[SCORES]) {
   for (size_t k = 0; k < SCORES; ++k) {
     score[k] = sqrt(sums->residual[k] * (double)s->components / sums->weight);
@@ -234,7 +233,7 @@ static double find_rms(const study *s, const squares *sums, double score[SCORES]
   return 100.0 * (1.0 - pow(score[SUPINE_PATIENT_SCORE_CORRECTED] / score[baseline_of(s)], 2.0));
 }
 
-/* Fit all rows, then repeat the fit without each fold. */
+/* Fit all rows, then fit again without each fold in turn. */
 static supine_status run(study *s, size_t triples, supine_patient *patient,
                          supine_patient_fit_report *report, supine_error *error) {
   squares fitted = {.points = 0};
@@ -242,7 +241,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
   double mean_displacement = 0.0;
   supine_patient_krige krige = {0};
   const bool sliding_unseen = triples == 0 && s->options.region_count == 0;
-  supine_patient_krige population = {0}; /* fitted with the covariance of other patients */
+  supine_patient_krige population = {0}; /* fit with the covariance found in other patients */
   supine_status status =
       supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error);
   if (status == SUPINE_OK) {
@@ -252,7 +251,7 @@ static supine_status run(study *s, size_t triples, supine_patient *patient,
     supine_patient_krige_errors(&krige, report->error);
     supine_patient_krige_copy_law(&krige, patient);
   }
-  if (status == SUPINE_OK && sliding_unseen) { /* the rows do not show sliding */
+  if (status == SUPINE_OK && sliding_unseen) {
     supine_patient_fit_options options = s->options;
     options.sill = 1.0;
     options.noise = krige.noise;
@@ -297,11 +296,10 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
   *report = (supine_patient_fit_report){.points = (double)(single > 0 ? count : triples)};
   patient->law = options->law;
   if (single + triples < needed) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_FORMAT,
-                         "points: %zu, fewer than the %zu unknowns of the %s law: give more, or "
-                         "use --law deep",
-                         single + triples, needed, supine_patient_law_names[options->law]);
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "points: %zu, fewer than the %zu unknowns of the %s law: give more "
+                              "points, or use --law deep",
+                              single + triples, needed, supine_patient_law_names[options->law]);
   }
   for (size_t seed = 0; seed < SEEDS && status == SUPINE_OK; ++seed) {
     const size_t blocks =

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit the gain to scans in other postures. */
+/* Fit the gain, the factor of gravity in the force on the lungs, to scans in other postures. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,31 +11,32 @@
 #include "sh/base/vec3.h"
 
 static const double gain_least = 0.01, gain_most = 2.0; /* range of accepted gains */
-static const double same_posture = 0.05;  /* distance of two unit vectors 3 degrees apart */
-static const double converged = 1e-4;     /* change of scales and gain below which rounds end */
-static const double not_converged = 1e-2; /* change in the last round above which the fit fails */
-static const double force_least = 0.2;    /* lower bound on the fitted force */
+static const double same_posture = 0.05;  /* distance between unit vectors 3 degrees apart */
+static const double converged = 1e-4;     /* change of scales and gain below which the fit ends */
+static const double not_converged = 1e-2; /* change of scales and gain above which the fit fails */
+static const double force_least = 0.2;    /* lower bound on a force that is divided by */
 enum { ROUNDS = 100, VERTICES_MAX = 2000, EIGHTHS = 8, GAIN = 5, UNKNOWNS = 6 };
 
-/* The fitted law at a row. */
 typedef struct field {
   double u[3];         /* displacement from full inflation to rest, mm */
-  double force_change; /* relative change of the force with posture, at a gain of 1 */
+  double force_change; /* relative change of the force with posture, if the gain is 1 */
 } field;
 
-/* The fit of axis . (s (1 + gain force_change) u + t) = value to the rows of a further state. Each
- * lung has its own scale s, because it has its own volume in the further posture. */
+/* Fit to a scan in a further state. The displacement from full inflation along the axis of a row is
+ * axis . (s (1 + gain force_change) u + t), with u and force_change of `field`. Unknown are a scale
+ * s for each lung, the gain, and the translation t between the scans. */
 typedef struct work {
   const supine_patient_record *record;
   bool fits_translation;
   double gains[2][3]; /* gains of the fuller and the emptier state (supine_patient_path) */
-  supine_patient_matching matching; /* matches and rows; blocks are eighths of the lungs */
-  field *field;                     /* [rows] fitted law at each row */
-  double x[UNKNOWNS];               /* scales s of the left and the right lung, t, gain */
+  supine_patient_matching matching; /* each row's block is one of 8 eighths of the lungs */
+  field *field;                     /* [matching.count] */
+  double x[UNKNOWNS]; /* scales of the left and right lung, translation t (x, y, z; mm), gain */
 } work;
 
-/* Fit the unknowns by linear least squares about the present scales. Return the RMS residual, mm.
- * @param without  eighth of the lungs to leave out, or EIGHTHS to leave out none */
+/* Fit the unknowns w->x by linear least squares. In the product of scale and gain, the scale keeps
+ * its previous value. Return the RMS residual, mm.
+ * @param without  block of rows to leave out, or EIGHTHS to use all rows */
 static double fit(work *w, bool fits_gain, size_t without) {
   double matrix[UNKNOWNS * UNKNOWNS] = {0.0};
   double right[UNKNOWNS] = {0.0};
@@ -61,7 +62,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
     weights += weight;
   }
   memcpy(w->x, right, sizeof right);
-  for (size_t t = 0; t < UNKNOWNS; ++t) { /* unknowns that are not fitted become 0 */
+  for (size_t t = 0; t < UNKNOWNS; ++t) { /* an unknown that is not fitted becomes 0 */
     matrix[t * UNKNOWNS + t] += matrix[t * UNKNOWNS + t] == 0.0 ? 1.0 : 0.0;
   }
   if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'U', UNKNOWNS, 1, matrix, UNKNOWNS, w->x, UNKNOWNS) != 0) {
@@ -71,7 +72,7 @@ static double fit(work *w, bool fits_gain, size_t without) {
   return sqrt(squares * (w->matching.state == NULL ? 3.0 : 1.0) / weights);
 }
 
-/* Compute the height along gravity, 0 to 1 in the box, from the terms of the force at a place. */
+/* Compute the height of a place along gravity: 0 at the top, 1 at the bottom of the box. */
 static double height_at(const supine_patient_frame *frame, const supine_patient_place *place,
                         const double gravity[3]) {
   const double outer = place->side > 0.0 ? frame->maximum[0] : frame->minimum[0];
@@ -88,7 +89,8 @@ static double height_at(const supine_patient_frame *frame, const supine_patient_
   return height / range;
 }
 
-/* Make three rows for each pair, or match a surface, with one row for each chosen vertex. */
+/* Make three rows for each pair of points or, if `pairs` is NULL, one row for each chosen vertex of
+ * the surface `rest`. */
 static supine_status make_rows(work *w, const supine_lungs *rest, const supine_patient_pairs *pairs,
                                const supine_mesh *surface, supine_error *error) {
   supine_status status = SUPINE_OK;
@@ -108,7 +110,7 @@ static supine_status make_rows(work *w, const supine_lungs *rest, const supine_p
   return status;
 }
 
-/* Compute the fitted displacement and the change of force at each row; assign rows to eighths. */
+/* Compute w->field, and assign each row to one of four blocks in its lung. */
 static void find_motion(work *w, const double gravity[3]) {
   supine_patient_matching *m = &w->matching;
   const supine_patient *patient = &w->record->patient;
@@ -123,18 +125,18 @@ static void find_motion(work *w, const double gravity[3]) {
     m->rows[i].block = (place.side > 0.0 ? 4U : 0U) + (place.box[1] > 0.5 ? 2U : 0U) +
                        (place.box[2] > 0.5 ? 1U : 0U);
     if (m->state != NULL && !w->record->from_surface) {
-      /* The law was fitted in the box of landmarks, which differs from the box of the surface. */
+      /* The displacement law was fitted in the box of the landmarks, not in that of the surface. */
       place = supine_patient_find(&patient->frame, m->rest->mesh.vertices + 3 * m->match[i].vertex,
                                   place.side);
     }
     supine_patient_displacement(patient, &place, 1.0, w->field[i].u);
-    for (size_t k = 0; k < 3; ++k) { /* scale to the path from full inflation to rest */
+    for (size_t k = 0; k < 3; ++k) {
       w->field[i].u[k] /= w->gains[1][k] - w->gains[0][k];
     }
   }
 }
 
-/* Match the surface to vertices displaced by the present unknowns. */
+/* Displace the chosen vertices by the unknowns w->x, and match them to the other surface. */
 static supine_status match_surface(work *w, supine_error *error) {
   supine_patient_matching *m = &w->matching;
   for (size_t i = 0; i < m->count; ++i) {
@@ -149,7 +151,8 @@ static supine_status match_surface(work *w, supine_error *error) {
   return supine_patient_matching_weigh(m, 0.0, error);
 }
 
-/* Alternate between matching and the fit, then estimate the standard error of the gain. */
+/* Match and fit in turn until the unknowns hardly change. Then estimate the standard error of the
+ * gain by the jackknife: each fit leaves one of the 8 blocks out. */
 static supine_status iterate(work *w, supine_patient_further *further, supine_error *error) {
   supine_status status = SUPINE_OK;
   double change = INFINITY;
@@ -167,9 +170,9 @@ static supine_status iterate(work *w, supine_patient_further *further, supine_er
   }
   if (change >= not_converged) {
     return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the fit to a further state does not converge: after %d rounds the "
-                            "scales of the lungs and the gain still change by %.2g: check that "
-                            "axes and person are the same",
+                            "the fit to a scan in another state does not converge (after %d "
+                            "rounds, scales and gain still change by %.2g): check that all scans "
+                            "have the same axes and show the same person",
                             ROUNDS, change);
   }
   memcpy(further->scale, w->x, sizeof further->scale);

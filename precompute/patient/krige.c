@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a law together with the kriging of its residual. */
+/* Fit a displacement law together with the kriging of its residual. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,21 +13,21 @@
 
 enum {
   TERMS = SUPINE_PATIENT_TERMS,
-  MOTION = SUPINE_PATIENT_CONSTANTS, /* first term of the motion */
-  SCALE = TERMS - 1,                 /* term of the law's relative size */
+  MOTION = SUPINE_PATIENT_CONSTANTS, /* index of the first term of the motion between the scans */
+  SCALE = TERMS - 1,                 /* index of the term that scales the whole displacement law */
   TERMS_MAX = TERMS + SUPINE_PATIENT_REGIONS_MAX,
   STEPS = 60
 };
 
-static const double size_deviation = 0.3; /* prior standard deviation of the law's relative size */
-static const double converged = 1e-10;    /* relative decrease of the squares at which a fit ends */
-static const double damping_most = 1e10;  /* damping above which a fit ends */
+static const double size_deviation = 0.3; /* prior standard deviation of the term SCALE */
+static const double converged = 1e-10;    /* relative decrease of k->squares that ends a fit */
+static const double damping_most = 1e10;  /* damping of steps above which a fit ends */
 static const double expandability_least = 0.02;
 
-/* Bounds of the exponents c2, c4, c6, and of the absolute slopes c7 to c9. */
+/* Bounds of the law's constants c2, c4 and c6 (exponents), and of |c7|, |c8| and |c9| (slopes). */
 static const double exponent_least = 0.5, exponent_most = 4.0, slope_most = 2.5;
 
-/* Prior standard deviations of c1, c3, c5 (relative); of log c2, log c4, log c6; of c7 to c9. */
+/* Prior standard deviations by law: of c1, c3, c5 / mean; log c2, log c4, log c6; c7, c8, c9. */
 static const double law_deviation[SUPINE_PATIENT_LAW_COUNT][3] = {{0.3, 0.3, 0.3}, {3.0, 1.0, 1.0}};
 
 static supine_patient_centre centre_of(const supine_patient_power *law,
@@ -44,7 +44,7 @@ static bool shape_is_fixed(const supine_patient_krige *k) {
   return k->options.size_only || (k->options.law == SUPINE_PATIENT_DEEP && k->sill >= 1.0);
 }
 
-/* Return the prior standard deviation of a term: 0 if it is known, INFINITY if it is free. */
+/* Return a term's prior standard deviation: 0 if it is not fitted, INFINITY if it has no prior. */
 static double prior_deviation(const supine_patient_krige *k, size_t term) {
   const double unit = term < 3 ? fabs(k->mean.c[2 * term]) : 1.0;
   const bool shape_fixed = shape_is_fixed(k);
@@ -78,7 +78,7 @@ static supine_patient_power take_step(const supine_patient_power *law, const dou
   return stepped;
 }
 
-/* Call supine_patient_power_design, and add derivatives with respect to the expandabilities. */
+/* Extend supine_patient_power_design by derivatives with respect to k->region. */
 static double design_row(const supine_patient_krige *k, const supine_patient_row *row, double *x) {
   if (k->options.region_count == 0) {
     return supine_patient_power_design(&k->law, row, x);
@@ -96,10 +96,10 @@ static double noise_of(const supine_patient_krige *k, const supine_patient_row *
   return k->noise * row->noise / sqrt(fmin(1.0, fmax(1e-12, row->weight)));
 }
 
-/* Factorise the covariance of the rows: that of the noise plus that of the correction. If only the
- * size of the law is fitted, the covariance of the correction is that at the prior mean of the
- * size.
- * @return half the logarithm of the determinant; NAN if it is not positive definite */
+/* Factorise the covariance matrix of the rows: the sum of the covariance of the noise and the
+ * covariance of the correction, which grows with the displacement. If only a factor on the whole
+ * displacement law is fitted, the covariance of the correction does not depend on that factor.
+ * @return half the logarithm of the determinant; NAN if the matrix is not positive definite */
 static double factor(supine_patient_krige *k) {
   const size_t n = k->count;
   double logarithm = 0.0;
@@ -131,7 +131,7 @@ static void add_prior(supine_patient_krige *k) {
   const size_t terms = k->terms;
   for (size_t t = 0; t < TERMS; ++t) {
     const double deviation = prior_deviation(k, t);
-    if (deviation == 0.0) { /* a known term: replace its equation by the identity */
+    if (deviation == 0.0) { /* a term that is not fitted: its step becomes 0 */
       k->right_side[t] = 0.0;
       for (size_t s = 0; s < terms; ++s) {
         k->normal[s < t ? t * terms + s : s * terms + t] = s == t ? 1.0 : 0.0;
@@ -154,11 +154,11 @@ static void add_prior(supine_patient_krige *k) {
   }
 }
 
-/* Compute the normal equations and the squared residual at the present law. */
+/* Compute the normal equations and k->squares at the present k->law and k->region. */
 static void linearise(supine_patient_krige *k) {
   const int n = (int)k->count;
   const int terms = (int)k->terms;
-  const int width = terms + 1; /* a column for each term, and one for the residual */
+  const int width = terms + 1; /* one column for each term, and one for the residual */
   for (size_t i = 0; i < k->count; ++i) {
     double *row = k->design + (size_t)width * i;
     row[terms] = -design_row(k, &k->rows[i], row);
@@ -178,7 +178,7 @@ static void linearise(supine_patient_krige *k) {
   add_prior(k);
 }
 
-/* Solve for a damped step of the terms. Return false if the matrix is singular. */
+/* Solve the damped normal equations for a step of all terms. Return false on failure. */
 static bool find_step(const supine_patient_krige *k, double damping, double step[TERMS_MAX]) {
   const lapack_int terms = (lapack_int)k->terms;
   double *matrix = k->normal + k->terms * k->terms;
@@ -195,7 +195,7 @@ static bool factor_terms(supine_patient_krige *k) {
   return LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', terms, k->normal, terms) == 0;
 }
 
-/* Minimise the sum of squares. Return false if the rows do not determine the terms. */
+/* Minimise k->squares over all terms. Return false if the rows do not determine the terms. */
 static bool descend(supine_patient_krige *k) {
   double damping = 0.0;
   linearise(k);
@@ -227,7 +227,7 @@ static bool descend(supine_patient_krige *k) {
   return true;
 }
 
-/* Compute the restricted log likelihood of the rows, without its constant term. */
+/* Return the restricted log likelihood of the rows for these factors, without its constant. */
 static double likelihood_of(supine_patient_krige *k, double sill, double noise) {
   const supine_patient_power before = k->law;
   k->sill = sill;
@@ -245,7 +245,7 @@ static double likelihood_of(supine_patient_krige *k, double sill, double noise) 
   return likelihood - 0.5 * k->squares;
 }
 
-/* Choose the most likely sill, then noise, then sill again. Keep those that the options give. */
+/* Choose the most likely k->sill, k->noise and again k->sill. Keep a factor in `options`. */
 static void choose_factors(supine_patient_krige *k, const supine_patient_fit_options *options) {
   static const double choices[2][5] = {{1.0, 0.03, 0.003, 0.0}, {1.0, 0.5, 0.25, 1.5, 2.0}};
   static const size_t count[2] = {4, 5};
@@ -271,7 +271,6 @@ static void choose_factors(supine_patient_krige *k, const supine_patient_fit_opt
   k->noise = best[1];
 }
 
-/* Fit the law without a correction, starting from the prior mean. */
 static bool fit_uncorrected(supine_patient_krige *k, bool size_only) {
   k->sill = 0.0;
   k->noise = 1.0;
@@ -322,8 +321,8 @@ void supine_patient_krige_free(supine_patient_krige *krige) {
 
 static supine_status undetermined(supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "the points do not determine the law: give finite points spread over "
-                          "the lungs, not in one plane");
+                          "the points do not determine the displacement law: give points that are "
+                          "spread over the lungs and do not lie in one plane");
 }
 
 supine_status supine_patient_krige_fit(const supine_patient_fit_options *options,
@@ -346,7 +345,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   }
   k->law = k->mean;
   choose_factors(k, options);
-  /* Scale the correction to the fitted law, then compute the weights of the kernels. */
+  /* Factorise again after the fit, because the covariance depends on the fitted displacement. */
   determined = !isnan(factor(k)) && descend(k) && !isnan(factor(k));
   linearise(k);
   if (!determined || !factor_terms(k)) {
@@ -359,7 +358,7 @@ supine_status supine_patient_krige_fit(const supine_patient_fit_options *options
   return SUPINE_OK;
 }
 
-/* Compute the variance of the scalar product of x and the terms. x is overwritten. */
+/* Return x^T C x, where C is the posterior covariance matrix of the fitted terms. Overwrite x. */
 static double variance_of(const supine_patient_krige *k, double x[TERMS_MAX]) {
   const int terms = (int)k->terms;
   cblas_dtrsv(CblasRowMajor, CblasLower, CblasNoTrans, CblasNonUnit, terms, k->normal, terms, x, 1);
@@ -425,7 +424,7 @@ void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_pat
     if (krige->rows[i].weight <= 0.0) {
       continue;
     }
-    /* The rows of a landmark share a centre. */
+    /* The three rows of a landmark share one kernel. */
     if ((patient->centre_count == 0 ||
          memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) &&
         patient->centre_count < SUPINE_PATIENT_CENTRES_MAX) {

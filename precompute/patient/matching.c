@@ -15,10 +15,10 @@
 
 enum { GRAIN = 64 };
 
-static const double compatible = 0.5; /* smallest cosine between normals that match: 60 degrees */
+static const double compatible = 0.5; /* smallest cosine between the normals of a match */
 static const double biweight = 4.685; /* cutoff of Tukey's biweight, in units of the robust scale */
-static const double surface_noise = 0.5; /* standard deviation of the noise of a row, mm */
-static const double scale_least = 0.02;  /* lower bound on the robust scale, mm */
+static const double surface_noise = 0.5; /* noise of a measured distance, mm */
+static const double scale_least = 0.02;  /* lower bound on the robust scale of the distances, mm */
 static const double matched_least = 0.3; /* smallest accepted share of vertices with a match */
 
 static void match_range(void *context, size_t begin, size_t end, size_t thread) {
@@ -67,9 +67,9 @@ supine_status supine_patient_matching_weigh(supine_patient_matching *matching, d
   matching->matched = (double)count / (double)matching->count;
   if (matching->matched < matched_least) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "only %.0f %% of the vertices find a point that faces the same way on "
-                            "the surface of the other state: check that axes and person are the "
-                            "same, and that no triangles face inwards",
+                            "the nearest point of the other surface faces the same way for only "
+                            "%.0f %% of the vertices: check that both surfaces have the same axes "
+                            "and show the same person, and that no triangles face inwards",
                             100.0 * matching->matched);
   }
   gsl_sort(matching->space, 1, count);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Match vertices of the reference surface to nearest points of the surface in another state. */
+/* Match vertices of the reference surface to the surface of the lungs in another state. */
 #ifndef SUPINE_PATIENT_MATCHING_H
 #define SUPINE_PATIENT_MATCHING_H
 
@@ -10,8 +10,8 @@
 /* A chosen vertex of the reference surface and its match on the other surface. */
 typedef struct supine_patient_match {
   size_t vertex;      /* index in the reference surface */
-  double position[3]; /* position displaced by the present law, mm */
-  double distance;    /* distance of `position` from the other surface along its normal, mm */
+  double position[3]; /* position after the latest displacement, mm */
+  double distance;    /* signed distance from `position` to `nearest` along the normal, mm */
   supine_inside_place nearest; /* nearest point of the other surface */
 } supine_patient_match;
 
@@ -21,22 +21,22 @@ typedef struct supine_patient_matching {
   supine_patient_frame frame;
   supine_inside_surface *tree;
   supine_equilibrium *equilibrium;
-  double *spread;                /* [N, COLUMNS] spread terms of (18) */
+  double *spread;                /* [N, COLUMNS] terms of the force, spread over the surface */
   double *rest_normals;          /* [N, 3] unit vectors */
   double *state_normals;         /* [state->vertex_count, 3] unit vectors */
   size_t count;                  /* number of chosen vertices */
   supine_patient_match *match;   /* [count] chosen vertices and their matches */
-  supine_patient_row *rows;      /* [count + landmark_row_count] rows of the fit */
+  supine_patient_row *rows;      /* [count + landmark_row_count] */
   double *space;                 /* [count] */
-  double matched;                /* share of the vertices whose match has a compatible normal */
+  double matched;                /* share of the vertices with a match that faces the same way */
   double rms;                    /* weighted RMS distance of the matches, mm */
-  const supine_patient *patient; /* law that last displaced the vertices */
+  const supine_patient *patient; /* displacement law that last displaced the vertices */
   size_t landmark_row_count;     /* three for each landmark */
 } supine_patient_matching;
 
-/* Spread the terms of (18), choose at most `limit` vertices of the reference surface, and allocate
- * rows for them and for `landmarks` landmarks. Call supine_patient_matching_free also after a
- * failure.
+/* Spread the terms of the force over the surface `rest`, choose at most `limit` vertices of it, and
+ * allocate rows for these vertices and for `landmarks` landmarks. Call supine_patient_matching_free
+ * also after a failure.
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
 supine_status supine_patient_matching_create(const supine_lungs *rest, const supine_mesh *state,
                                              const supine_patient_stiffness *stiffness,
@@ -45,32 +45,34 @@ supine_status supine_patient_matching_create(const supine_lungs *rest, const sup
                                              supine_error *error);
 void supine_patient_matching_free(supine_patient_matching *matching);
 
-/* Choose at most `limit` vertices at even steps of the index, and initialise their matches and
+/* Choose at most `limit` vertices with evenly spaced indices, and initialise their matches and
  * rows. Rows of landmarks are dropped. */
 void supine_patient_matching_choose(supine_patient_matching *matching, size_t limit);
 
-/* Spread the terms of (18) through tissue of the given stiffness, into `spread` and the rows.
+/* Spread the terms of the force through tissue of the given stiffness, and write them into
+ * matching->spread and the rows.
  * @retval SUPINE_ERROR_MEMORY, those of supine_physics_equilibrium_solve */
 supine_status supine_patient_matching_solve(supine_patient_matching *matching,
                                             const supine_patient_stiffness *stiffness,
                                             supine_error *error);
 
-/* Displace the chosen vertices by a fitted law. Return the RMS change of their positions, mm. */
+/* Displace the chosen vertices by a displacement law. Return the RMS change of position, mm. */
 double supine_patient_matching_place(supine_patient_matching *matching,
                                      const supine_patient *patient);
 
-/* Match each displaced vertex to the nearest point of the other surface. Its row becomes the
- * displacement along the normal at that point. The weight is 1, or 0 for incompatible normals. */
+/* Match each displaced vertex to the nearest point of the other surface. The vertex's row becomes
+ * the displacement along the normal there, with weight 1, or 0 if the normals differ by over 60
+ * degrees. */
 void supine_patient_matching_find(supine_patient_matching *matching);
 
 /* Weight the rows by Tukey's biweight, which is 0 beyond 4.7 times a robust scale of the distances.
- * Find the matched share and the RMS distance.
+ * Compute matching->matched and matching->rms.
  * @param scale  lower bound on the robust scale, mm; INFINITY keeps the weights as they are
  * @retval SUPINE_ERROR_MESH  less than 30 % of the vertices match */
 supine_status supine_patient_matching_weigh(supine_patient_matching *matching, double scale,
                                             supine_error *error);
 
-/** Compute the weights [stiffness->count] of the regions at a vertex, with sum 1. */
+/** Compute the weight of each region at a vertex into shares [stiffness->count], with sum 1. */
 void supine_patient_stiffness_shares(const supine_patient_stiffness *stiffness,
                                      const supine_lungs *lungs, size_t vertex, double *shares);
 
@@ -81,13 +83,14 @@ void supine_patient_stiffness_of(const supine_patient_stiffness *stiffness,
 /** Find the expandability a of each region of the lungs from the displacement between two surfaces
  * ([Santhanam2008] VI).
  *
- * The displacement depends only on the product a f of expandability and force, so f is fixed to the
- * force of the deep law. The spread force F is then linear in the values a_k of the regions: F =
- * sum over k of a_k F_k, where F_k is the spread force of region k by itself. The values are fitted
- * together with the constants of the paper's law and the motion between the scans (krige.h), under
- * a prior that a is near 1 and similar in neighbouring regions. Fits alternate with matching.
+ * The displacement depends only on the product a f of expandability and force, so f is set to the
+ * force of the deep law. The spread force F (equilibrium.h) is then linear in the expandabilities
+ * a_k of the regions: F = sum over k of a_k F_k, where F_k is the spread force if only region k has
+ * force and its expandability is 1. The a_k are fitted together with the constants of the paper's
+ * law and the motion between the scans (krige.h), under a prior that a is near 1 and similar in
+ * neighbouring regions. After each fit, the surfaces are matched again.
  *
- * The regions are kept only if they predict held-out blocks of 40 mm better than uniform tissue.
+ * The regions are kept only if they reduce the error on held-out blocks of 40 mm.
  * @param matching   without landmarks; on return its force is spread by the stiffness found
  * @param options    the paper's law, and gravity in the other state
  * @param patient    in: the frame; out: the fitted law
@@ -98,12 +101,12 @@ supine_status supine_patient_expand(supine_patient_matching *matching,
                                     supine_patient *patient, supine_patient_stiffness *stiffness,
                                     supine_patient_expand_report *report, supine_error *error);
 
-/** Find the force that the displacement to the other surface implies, averaged over blocks, and fit
- * (18) to it.
+/** Compute the applied force that the displacement to the other surface implies, average it over
+ * blocks, and fit its slopes along X, Y and Z (c7 to c9).
  * @param matching  created with the patient's stiffness; on return all vertices are matched
  * @param patient   law fitted to the matching; its correction is not used
  * @param gravity   unit vector in the other state
- * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine (18)
+ * @retval SUPINE_ERROR_NUMERICAL  the blocks do not determine the slopes
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_patient_applied_find(supine_patient_matching *matching,
                                           const supine_patient *patient, const double gravity[3],

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make a model of a patient's law, and find the state of a scan. */
+/* Make a physical model from a patient's displacement law, and find the state that a scan shows. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,20 +12,22 @@
 
 enum { GRAIN = 64 };
 
-/* Largest distance between the faces of a surface's box and those of a fitted state's box, relative
- * to the width of the state's box: [0] if the state was given by landmarks, [1] if by a surface. */
+/* Largest accepted distance between a face of a surface's box and the same face of the box of a
+ * fitted state, relative to the width of the state's box. [0] applies to boxes of landmarks, [1] to
+ * boxes of surfaces. */
 static const double apart_most[2] = {0.45, 0.2};
 
 /* Lower bound on a force that a displacement is divided by; the mean force is 1. */
 static const double force_least = 0.2;
 
-/* Two states that are nearer than this on the path count as full inflation and rest. */
+/* If the patient's two scanned states are closer than this share of the path from full inflation to
+ * rest, the fuller state counts as full inflation and the emptier one as rest. */
 static const double part_least = 0.02;
 
-/* Plausible range of the ratio of the volume at rest to the full volume. */
+/* Plausible range of the volume at rest divided by the volume at full inflation. */
 static const double share_least = 0.15, share_most = 0.95;
 
-/* Compute the full volume implied by one of the two states, mL; 0 if unknown. */
+/* Compute the volume at full inflation, mL, from that of one scanned state; 0 if unknown. */
 static double full_volume(const supine_patient_record *record, size_t state,
                           const supine_resting *resting) {
   const supine_state *shown = &record->state[state];
@@ -45,7 +47,7 @@ static double either_full_volume(const supine_patient_record *record,
   return full > 0.0 ? full : full_volume(record, 1, resting);
 }
 
-/* Find the part of the path from full inflation (0) to rest (1) at which each state is. */
+/* Find where the two scanned states lie on the path from full inflation (0) to rest (1). */
 static void find_parts(const supine_patient_record *record, double part[2]) {
   supine_resting resting = supine_reference_resting_default();
   supine_patient_resting(record, &resting);
@@ -65,7 +67,8 @@ static void find_parts(const supine_patient_record *record, double part[2]) {
   }
 }
 
-/* Compute the gains along x, y and z at two parts of the path. */
+/* Compute the gains along x, y and z at two points of the path from full inflation (0) to rest (1).
+ * A gain is a multiple of the displacement at rest. */
 static void find_gains(const double part[2], double gains[2][3]) {
   const supine_model deep = supine_physics_model(SUPINE_LAW_DEEP);
   supine_volume_bend(deep.bend, part[0], gains[0]);
@@ -82,11 +85,12 @@ typedef struct work {
   const supine_patient_record *record;
   supine_lungs lungs;   /* estimate of the lungs in the fuller state */
   const double *scan;   /* [N, 3] vertices of a scan in the emptier state, or NULL */
-  double *ratio;        /* [N] spread force divided by the force (18) */
-  double *displacement; /* [N, 3] displacement between the states, mm */
+  double *ratio;        /* [N] force after spreading over the surface / force before */
+  double *displacement; /* [N, 3] from the fuller to the emptier state, mm */
 } work;
 
-/* Compute the displacement of vertices between the states, and positions in the fuller state. */
+/* Compute the displacement of each vertex from the fuller to the emptier state. If the scan shows
+ * the emptier state, also compute the position in the fuller state. */
 static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   (void)thread;
   const work *w = context;
@@ -105,13 +109,12 @@ static void move_range(void *context, size_t begin, size_t end, size_t thread) {
   }
 }
 
-/* Update displacements, positions and the box. */
 static void move(work *w) {
   supine_parallel_for(w->lungs.mesh.vertex_count, GRAIN, 0, move_range, w);
   supine_mesh_box(&w->lungs.mesh, w->lungs.minimum, w->lungs.maximum);
 }
 
-/* Compute the ratio [N] of the spread force to the force (18), in the fitted posture. */
+/* Compute w->ratio and stiffness [N], in the posture to which the displacement law was fitted. */
 static supine_status find_ratio(const work *w, double *stiffness, supine_error *error) {
   const supine_patient_record *record = w->record;
   supine_model model = supine_physics_model(SUPINE_LAW_DEEP);
@@ -130,8 +133,8 @@ static supine_status find_ratio(const work *w, double *stiffness, supine_error *
   return status;
 }
 
-/* Compute the volume gained, mL, from the fuller state to full inflation (end 0) or to rest (end 1)
- * along the displacement between the states. */
+/* Compute the change of volume, mL, from the fuller state to full inflation (end 0) or to rest (end
+ * 1), if the displacement between the two states is scaled to lead there. */
 static double volume_to_end(const supine_volume_form *form, const double part[2], size_t end) {
   double gains[2][3];
   double towards[3];
@@ -142,8 +145,8 @@ static double volume_to_end(const supine_volume_form *form, const double part[2]
   return supine_volume_form_at(form, towards);
 }
 
-/* Find the difference between the gains of the two states, along x, y and z. It must be such that
- * the ends of the path have the volumes of full inflation and of rest.
+/* Find the gains of the emptier state minus those of the fuller state, along x, y and z. With them,
+ * the ends of the path must have the volumes of full inflation and of rest.
  * @param ones  [N] 1 for each vertex */
 static void find_path_span(const work *w, const supine_resting *resting, const double *ones,
                            double path_span[3]) {
@@ -242,15 +245,16 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   const int only_side = lungs->lung_count == 1 ? lungs->side[0] : 0;
   const double *low[2] = {frame->minimum, record->emptier[0]};
   const double *high[2] = {frame->maximum, record->emptier[1]};
-  double off[2] = {0.0, 0.0}; /* largest distance from the faces of each state's box */
+  double off[2] = {0.0, 0.0}; /* [state] largest distance of faces / width of the box */
   size_t axis[2] = {0};
   if (frame->only_side != 0 && frame->only_side != only_side) {
     return supine_error_set(
         error, SUPINE_ERROR_MESH,
-        "the patient's law was fitted to the %s lung alone: give that lung, or fit both",
+        "the patient's law was fitted to the %s lung alone: give that lung, or fit "
+        "the law to both lungs",
         frame->only_side > 0 ? "left" : "right");
   }
-  for (size_t s = 0; s < 2; ++s) { /* x is not compared if only one of two lungs is given */
+  for (size_t s = 0; s < 2; ++s) { /* if one of two fitted lungs is missing, x is not compared */
     for (size_t k = only_side != frame->only_side ? 1 : 0; k < 3; ++k) {
       const double apart =
           fmax(fabs(lungs->minimum[k] - low[s][k]), fabs(lungs->maximum[k] - high[s][k])) /
@@ -264,9 +268,9 @@ supine_status supine_patient_check_place(const supine_patient_record *record,
   return off[*state] <= apart_most[record->from_surface]
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_MESH,
-                                "the patient's law was fitted between %c = %.0f and %.0f mm, but "
-                                "the surface reaches from %.0f to %.0f: check that frame, unit "
-                                "and person are the same",
+                                "the patient's law was fitted to lungs from %c = %.0f to %.0f mm, "
+                                "but this surface extends from %.0f to %.0f mm: check that it has "
+                                "the same coordinate frame and unit, and shows the same person",
                                 "xyz"[k], low[*state][k], high[*state][k], lungs -> minimum[k],
                                 lungs -> maximum[k]);
 }

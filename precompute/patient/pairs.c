@@ -19,20 +19,21 @@ enum {
 };
 
 static const double flat_least = 1.0; /* smallest RMS distance of points from a plane, mm */
-static const double displacement_least = 0.05; /* smallest RMS displacement, mm */
+static const double displacement_least = 0.05; /* smallest accepted RMS displacement, mm */
 static const double rotation_most = 25.0;      /* largest rotation between two scans, degrees */
-static const double apart_most = 0.5;        /* largest translation, as a fraction of the spread */
-static const double box_overlap_least = 0.5; /* smallest overlap, as a fraction of the larger box */
-static const double residual_most = 0.7; /* largest affine residual, as a fraction of the spread */
+static const double box_overlap_least = 0.5;   /* smallest overlap / side of the larger box */
+/* Largest translation, and largest residual of an affine map, divided by the RMS distance of the
+ * points from their mean. */
+static const double apart_most = 0.5, residual_most = 0.7;
 
 static const char *const columns[COLUMNS] = {"x",     "y",     "z",     "to_x",  "to_y",  "to_z",
                                              "im1_x", "im1_y", "im1_z", "im2_x", "im2_y", "im2_z"};
 
-/* Find the columns of the point in the first state, then those of the second state. */
+/* Find six columns: x, y, z of a point in the first state, then x, y, z in the second state. */
 static supine_status find_columns(const supine_csv *csv, bool reverse, size_t column[COORDINATES],
                                   supine_error *error) {
   const size_t first = supine_csv_text(csv, 0) != NULL ? 0 : COORDINATES;
-  const bool swap = (first == COORDINATES) != reverse; /* image 2 is the first state */
+  const bool swap = (first == COORDINATES) != reverse; /* the im1 columns are the second state */
   for (size_t k = 0; k < COORDINATES; ++k) {
     column[k] = first + (swap ? (k + 3) % COORDINATES : k);
     if (supine_csv_text(csv, first + k) == NULL) {
@@ -71,7 +72,7 @@ static supine_status read_rows(supine_csv *csv, bool reverse, supine_patient_pai
   }
   return status == SUPINE_OK && pairs->count == 0
              ? supine_error_set(error, SUPINE_ERROR_FORMAT,
-                                "%s: no pairs of points: give one in each line", csv->path)
+                                "%s: no pairs of points: give one pair in each line", csv->path)
              : status;
 }
 
@@ -106,8 +107,8 @@ void supine_patient_map_apply(const supine_patient_affinity *map, const double f
 bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double *from,
                             const double *to, supine_patient_affinity *map) {
   double mean[2][3] = {{0.0}};
-  double cross[3][3] = {{0.0}};   /* sum over points of from_a to_b, both minus their mean */
-  double scatter[3][3] = {{0.0}}; /* sum over points of from_a from_b, both minus their mean */
+  double cross[3][3] = {{0.0}};   /* [a][b] count times the covariance of from[a], to[b] */
+  double scatter[3][3] = {{0.0}}; /* [a][b] count times the covariance of from[a], from[b] */
   double mapped[3];
   bool determined = true;
   *map = (supine_patient_affinity){.m = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
@@ -128,12 +129,12 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
   if (kind == SUPINE_PATIENT_MAP_RIGID) {
     supine_rigid_rotation((const double(*)[3])cross, map->m);
   } else if (kind == SUPINE_PATIENT_MAP_AFFINE) {
-    for (size_t k = 0; k < 9; ++k) { /* by columns, because LAPACKE would copy a matrix by rows */
+    for (size_t k = 0; k < 9; ++k) { /* column-major: LAPACKE copies row-major matrices */
       map->m[k] = cross[k % 3][k / 3];
     }
     determined = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', 3, 3, scatter[0], 3, map->m, 3) == 0;
-    /* Element (k, k) of the factor is sqrt(count) times the RMS residual of coordinate k after a
-     * linear fit to coordinates 0 to k - 1. */
+    /* Element (k, k) of the Cholesky factor is sqrt(count) times the RMS residual of coordinate k
+     * after a linear fit to coordinates 0 to k - 1. */
     for (size_t k = 0; k < 3; ++k) {
       determined = determined && scatter[k][k] >= flat_least * sqrt((double)count);
     }
@@ -157,11 +158,11 @@ typedef struct summary {
   double spread[2];    /* RMS distance of each state's points from their mean, mm */
   double size[2];      /* longest side of each state's box, mm */
   double translation;  /* distance between the means of the two states, mm */
-  double rotation;     /* angle of the best rotation, degrees */
+  double rotation;     /* angle of the best-fitting rotation, degrees */
   bool flat;           /* whether the points of the first state lie in a plane */
-  double growth;       /* determinant of the best affine map, negative for a reflection */
-  double residual;     /* RMS residual of the affine map, mm */
-  double displacement; /* RMS displacement, mm; about the mean if the scans moved */
+  double growth;       /* determinant of the best-fitting affine map, negative for a reflection */
+  double residual;     /* RMS residual of this affine map, mm */
+  double displacement; /* RMS displacement, or its standard deviation if the scans moved, mm */
 } summary;
 
 static summary measure(const supine_patient_pairs *pairs, bool scans_moved) {
@@ -203,8 +204,8 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                                          supine_error *error) {
   if (pairs->count < PAIRS_LEAST) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "pairs of points: %zu, where a law needs at least %d, spread over both "
-                            "lungs: add more",
+                            "pairs of points: %zu, but at least %d are needed, spread over the "
+                            "lungs: add more pairs",
                             pairs->count, PAIRS_LEAST);
   }
   const summary s = measure(pairs, scans_moved);
@@ -212,10 +213,10 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
     const char *unit = NULL;
     if (!supine_mesh_unit_is_likely(s.size[state], &unit)) {
       return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                              "the points %s extend over %.3g, too small or large for lungs in "
-                              "mm%s%s: give landmarks in mm, spread over the lungs",
+                              "the points %s extend over %.3g mm, which is too small or too large "
+                              "for lungs%s%s: give landmarks in mm, spread over the lungs",
                               state == 0 ? "of the first state" : "of the second state",
-                              s.size[state], unit == NULL ? "" : ", as if in ",
+                              s.size[state], unit == NULL ? "" : "; the unit may be ",
                               unit == NULL ? "" : unit);
     }
   }
@@ -225,8 +226,8 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
   }
   if (s.residual > residual_most * s.spread[1]) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the pairs do not match: the best affine map has a residual of %.0f mm "
-                            "RMS; check that both lists are in the same order",
+                            "the points of the two states do not match (%.0f mm RMS remain after "
+                            "an affine map): check that both lists are in the same order",
                             s.residual);
   }
   if (s.growth < 0.0 || s.rotation > rotation_most) {
@@ -236,16 +237,17 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                             s.growth < 0.0 ? "a reflection and " : "", s.rotation);
   }
   if (!scans_moved && s.translation > apart_most * s.spread[0]) {
-    return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the two states are %.0f mm apart: give both in one frame, or fit the "
-                            "motion between the scans with --translation or --rigid",
-                            s.translation);
+    return supine_error_set(
+        error, SUPINE_ERROR_FORMAT,
+        "the centres of the two states are %.0f mm apart: give all points in one coordinate "
+        "frame, or fit the motion between the scans with --translation or --rigid",
+        s.translation);
   }
   if (s.displacement < displacement_least) {
     return supine_error_set(
         error, SUPINE_ERROR_FORMAT,
-        "the two states are the same (%.2g mm RMS%s): give a state in which the lungs have moved",
-        s.displacement, scans_moved ? " apart from a translation" : "");
+        "the points do not move between the states (%.2g mm RMS%s): give two different states",
+        s.displacement, scans_moved ? " after a translation" : "");
   }
   return SUPINE_OK;
 }
@@ -260,10 +262,11 @@ supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_m
     const double larger = fmax(high[0][k] - low[0][k], high[1][k] - low[1][k]);
     const double overlap = fmin(high[0][k], high[1][k]) - fmax(low[0][k], low[1][k]);
     if (!(overlap >= box_overlap_least * larger)) {
-      return supine_error_set(error, SUPINE_ERROR_MESH,
-                              "the two surfaces do not overlap along %c (%.0f to %.0f and %.0f to "
-                              "%.0f mm): check that frames, units and sides are the same",
-                              "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
+      return supine_error_set(
+          error, SUPINE_ERROR_MESH,
+          "the two surfaces overlap too little along %c (%.0f to %.0f and %.0f to %.0f mm): check "
+          "that both show the same lungs in one coordinate frame and unit",
+          "xyz"[k], low[0][k], high[0][k], low[1][k], high[1][k]);
     }
   }
   return SUPINE_OK;

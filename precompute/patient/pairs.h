@@ -14,7 +14,7 @@ typedef struct supine_patient_pairs {
   size_t count;
   double *from; /**< [count, 3] in the first state */
   double *to;   /**< [count, 3] in the second state */
-  double *side; /**< [count] +1 left lung, -1 right lung; NULL to let the midline decide */
+  double *side; /**< [count] +1 left lung, -1 right lung; NULL if the midline decides */
 } supine_patient_pairs;
 
 /** Read pairs of points from a CSV file with the columns x,y,z,to_x,to_y,to_z (first and second
@@ -30,20 +30,20 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
                                         supine_error *error);
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
 
-/** Compute the ratio of the volumes of the second and the first state: the determinant of the best
- * affine map.
+/** Estimate the volume of the second state divided by that of the first: the determinant of the
+ * best-fitting affine map.
  * @return 1 if the points do not determine a map, or if the map is a reflection */
 double supine_patient_pairs_growth(const supine_patient_pairs *pairs);
 
-/** Check by the best affine map that the pairs can be two states of one chest.
+/** Check that the pairs can be two states of one chest.
  * @param scans_moved  the body may have moved between the scans
  * @retval SUPINE_ERROR_FORMAT  fewer than 12 pairs, points in one plane, units other than mm, sides
  *   or axes that differ, frames that do not overlap (unless scans_moved), or no displacement */
 supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool scans_moved,
                                          supine_error *error);
 
-/** Maps from one state to the other: the prediction of a law, its baselines, and a rotation with
- * translation, which is no baseline. */
+/** Maps from one state to the other: the prediction of a displacement law, three baselines to
+ * compare it with, and a rotation with translation. */
 typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_PREDICTED = 0,
   SUPINE_PATIENT_MAP_NONE,
@@ -53,7 +53,7 @@ typedef enum supine_patient_map {
   SUPINE_PATIENT_MAP_RIGID = SUPINE_PATIENT_MAP_COUNT
 } supine_patient_map;
 
-/** The map x -> m x + t, with m by rows. */
+/** The map x -> m x + t, with the matrix m in row-major order. */
 typedef struct supine_patient_affinity {
   double m[9], t[3];
 } supine_patient_affinity;
@@ -65,7 +65,7 @@ bool supine_patient_map_fit(supine_patient_map kind, size_t count, const double 
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],
                               double to[3]);
 
-/** Check by their boxes that two surfaces can be two states of the same lungs.
+/** Check that two surfaces can be two states of the same lungs, by the overlap of their boxes.
  * @retval SUPINE_ERROR_MESH  along an axis, less than half of the larger box overlaps the other */
 supine_status supine_patient_check_boxes(const supine_mesh *rest, const supine_mesh *state,
                                          supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Evaluate a patient's law. */
+/* Evaluate a patient's displacement law. */
 #include <math.h>
 #include <string.h>
 
@@ -75,7 +75,7 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double p
   for (size_t k = 0; k < 3; ++k) {
     law.c[2 * k] = model.direction.c[2 * k] * (supine_length(path_span) > 0.0 ? path_span[k] : 1.0);
     law.c[2 * k + 1] = model.direction.c[2 * k + 1];
-    /* Heights fall along Y if gravity is along +y, and along Z if it is along +z (lungs.h). */
+    /* Y and Z decrease along +y and +z (lungs.h), hence the minus sign. */
     law.c[6 + k] = model.force.box[k] - (k > 0 ? model.force.gain * g[k] : 0.0);
   }
   return law;
@@ -83,12 +83,12 @@ supine_patient_power supine_patient_deep(const double gravity[3], const double p
 
 double supine_patient_force_at(const supine_patient_power *power,
                                const supine_patient_place *place) {
-  return place->force[0] + supine_dot(power->c + 6, place->force + 1); /* (18) */
+  return place->force[0] + supine_dot(power->c + 6, place->force + 1); /* [Santhanam2008] (18) */
 }
 
 void supine_patient_direction(const supine_patient_power *power, const supine_patient_place *place,
                               double force, double d[3]) {
-  for (int k = 0; k < 3; ++k) { /* (15)-(17) */
+  for (int k = 0; k < 3; ++k) { /* [Santhanam2008] (15)-(17) */
     d[k] = force * (k == 0 ? place->side : -1.0) * power->c[2 * k] *
            pow(clamp_to_box(place->box[k]), power->c[2 * k + 1]);
   }
@@ -174,7 +174,7 @@ supine_force_law supine_patient_force(const supine_patient_power *power, double 
                                       const double gravity[3]) {
   supine_force_law law = {.gain = gain, .pair = true};
   const double *slope = power->c + 6;
-  /* No term of X: with gravity along x, heights grow along X in one lung and fall in the other. */
+  /* Gravity along x gives no slope: heights grow with X in one lung and fall in the other. */
   law.box[0] = slope[0];
   law.box[1] = slope[1] + gain * gravity[1];
   law.box[2] = slope[2] + gain * gravity[2];

@@ -18,13 +18,13 @@ enum {
   REGION = sizeof(supine_patient_region) / sizeof(double)
 };
 
-/* A number or an array of numbers in a record and in its file. */
+/* Place of a number, or of an array of numbers, in a record and in its file. */
 typedef struct numbers {
   const char *group; /* key of the enclosing object, or NULL for the root */
   const char *key;
   size_t count;  /* 1 for a number, more for an array */
   size_t offset; /* position in the record, bytes */
-  bool optional; /* may be missing, and is left out if all numbers are 0 */
+  bool optional; /* may be missing in the file; not written if all numbers are 0 */
 } numbers;
 
 #define AT(member) offsetof(supine_patient_record, member)
@@ -82,7 +82,7 @@ static json_t *array_of(const double *values, size_t count) {
   return array;
 }
 
-/* Return the object `key` of the root, added if it is missing, or the root if `key` is NULL. */
+/* Return the root if `key` is NULL, otherwise its member `key`, added if it is missing. */
 static json_t *group_of(json_t *root, const char *key) {
   if (key != NULL && json_object_get(root, key) == NULL) {
     (void)json_object_set_new(root, key, json_object());
@@ -98,7 +98,6 @@ static json_t *state_text(const supine_state *state) {
 
 static const char *const sides[3] = {"right", "both", "left"};
 
-/* Encode `count` arrays of `width` numbers. */
 static json_t *list_of(const void *values, size_t width, size_t count) {
   json_t *all = json_array();
   for (size_t i = 0; i < count; ++i) {
@@ -149,11 +148,11 @@ json_t *supine_patient_encode(const supine_patient_record *record, const char *m
   (void)json_object_set_new(group_of(root, "force"), "gain_from",
                             json_string(record->gain_undetermined
                                             ? "the deep law: the states in other postures do not "
-                                              "determine it"
+                                              "determine the gain"
                                         : record->gain_error > 0.0
                                             ? "the states in other postures"
                                             : "the deep law: scans in one posture do not determine "
-                                              "it; give --state in another posture"));
+                                              "the gain; give --state in another posture"));
   return root;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Make rows of landmarks, group rows into blocks, and compute a law at a row. */
+/* Make rows from landmarks, group rows into blocks, and evaluate a displacement law at a row. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -14,7 +14,7 @@
  * seem too small. */
 static const double block_side = 40.0;
 
-/* Standard deviation of a landmark along each axis, mm. */
+/* Standard deviation of a landmark's measured displacement along each axis, mm. */
 static const double landmark_noise = 2.0;
 
 void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
@@ -32,7 +32,7 @@ void supine_patient_rows_of_pairs(const supine_patient_frame *frame,
 
 size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patient_row *rows,
                                  size_t count, unsigned long seed) {
-  enum { CELLS = 64 }; /* number of cells along each axis, 2.5 m in all */
+  enum { CELLS = 64 }; /* number of cells along each axis */
   size_t blocks = 0;
   double origin[3] = {0.0};
   /* For each cell, 1 plus the index of its block, or 0 if it has no block yet. */
@@ -63,7 +63,7 @@ size_t supine_patient_rows_block(const supine_patient_frame *frame, supine_patie
 double supine_patient_power_design(const supine_patient_power *law, const supine_patient_row *row,
                                    double x[SUPINE_PATIENT_TERMS]) {
   const double force = supine_patient_force_at(law, &row->place);
-  double along[3]; /* displacement if the force is 1 and c1, c3, c5 are 1 mm */
+  double along[3]; /* derivatives of unit_force with respect to c1, c3 and c5 */
   double motion[3];
   double turned[3];
   double unit_force = 0.0; /* displacement along the row's axis if the force is 1, mm */

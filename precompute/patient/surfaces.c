@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit a law to surfaces by iterated nearest points (point to plane) with robust weights. */
+/* Fit a displacement law to two surfaces by iterative closest points with robust weights. */
 #include <math.h>
 
 #include <gsl/gsl_statistics.h>
@@ -7,20 +7,19 @@
 #include "precompute/patient/matching.h"
 
 enum {
-  VERTICES_MAX = 600,  /* number of matched vertices, enough for a correlation length of 90 mm */
-  EXPANDED_MAX = 2000, /* number of matched vertices if regions, 45 mm apart, are fitted */
+  VERTICES_MAX = 600,  /* number of matched vertices */
+  EXPANDED_MAX = 2000, /* number of matched vertices if the expandability is fitted */
   ROUNDS_MAX = 60
 };
 
-/* RMS change in a round, mm, below which the fit ends; then that for a fit of the size alone. */
-static const double converged = 2e-3;
-static const double size_converged = 0.5;
+static const double converged = 2e-3;     /* RMS movement below which the fit ends, mm */
+static const double size_converged = 0.5; /* RMS movement below which the first rounds end, mm */
 
-/* Lower bound on the robust scale, mm. Smaller residuals are left to kriging. */
+/* Lower bound on the robust scale of the distances, mm. Kriging fits smaller distances. */
 static const double scale_least = 1.0;
-static const double same_state = 0.02; /* RMS distance below which surfaces are equal, mm */
+static const double same_state = 0.02; /* RMS distance below which surfaces count as equal, mm */
 
-/* Initialise the rows by mapping the box of the lungs to the box of the other state. */
+/* Set each row to the displacement that maps the reference surface's box onto the other box. */
 static void start_rows(supine_patient_matching *m) {
   const double *low = m->rest->minimum;
   double to[2][3];
@@ -37,7 +36,7 @@ static void start_rows(supine_patient_matching *m) {
   }
 }
 
-/* Fit only the size of the deep law, or the law and its correction if `shaped`. */
+/* If `shaped`, fit the law and its correction; if not, only a factor on the whole deep law. */
 static supine_status refit(const supine_patient_matching *m, bool shaped,
                            supine_patient_fit_options *options, supine_patient *patient,
                            supine_error *error) {
@@ -57,8 +56,8 @@ static supine_status refit(const supine_patient_matching *m, bool shaped,
   return status;
 }
 
-/* Alternate between matching and the fit. Fit only the size first, so that the displacement along
- * the surfaces, which is not observed, starts from that of the deep law. */
+/* Fit the law and match the surfaces in turn. The first rounds fit only a factor on the whole deep
+ * law. Displacement along the surface, which matches do not show, then starts from that law. */
 static supine_status iterate(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                              supine_patient *patient, supine_patient_surface_report *report,
                              supine_error *error) {
@@ -82,7 +81,6 @@ static supine_status iterate(supine_patient_matching *m, const supine_patient_fi
   return status;
 }
 
-/* Measure the distance of the surfaces before the fit, and check that they are not equal. */
 static supine_status check_apart(supine_patient_matching *m, supine_patient_surface_report *report,
                                  supine_error *error) {
   report->vertices = (double)m->count;
@@ -98,7 +96,6 @@ static supine_status check_apart(supine_patient_matching *m, supine_patient_surf
                    report->before);
 }
 
-/* Fit the law, measure its held-out error, and compute the applied force. */
 static supine_status measure(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                              supine_patient_record *record, supine_error *error) {
   supine_patient_fit_report *report = &record->report;
@@ -113,7 +110,6 @@ static supine_status measure(supine_patient_matching *m, const supine_patient_fi
                              : status;
 }
 
-/* Match the surfaces, then fit the law and measure its error. */
 static supine_status run(supine_patient_matching *m, const supine_patient_fit_options *wanted,
                          bool expandability, supine_patient_record *record, supine_error *error) {
   record->patient = (supine_patient){.law = wanted->law, .frame = m->frame};
@@ -124,7 +120,7 @@ static supine_status run(supine_patient_matching *m, const supine_patient_fit_op
   if (status == SUPINE_OK && expandability) {
     status = supine_patient_expand(m, wanted, &record->patient, &record->stiffness, &record->expand,
                                    error);
-    if (status == SUPINE_OK) { /* the new stiffness changes the spread force */
+    if (status == SUPINE_OK) { /* the fitted stiffness changes how the force spreads */
       status = iterate(m, wanted, &record->patient, &record->surface, error);
     }
   }
@@ -139,7 +135,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   const size_t landmark_count = expandability ? 0 : landmarks->count;
   supine_patient_matching m = {0};
   supine_patient_fit_options wanted = *options;
-  if (expandability) { /* regions take the place of the correction */
+  if (expandability) { /* regions of expandability replace the correction */
     wanted.law = SUPINE_PATIENT_PAPER;
     wanted.uncorrected = true;
   }
@@ -153,7 +149,7 @@ supine_status supine_patient_fit_surface(const supine_lungs *rest, const supine_
   if (status == SUPINE_OK && landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
     m.landmark_row_count = 3 * landmark_count;
-    /* All landmarks together weigh as much as the surface. */
+    /* All landmarks together have the same weight as all matched vertices. */
     for (size_t i = 0; i < m.landmark_row_count; ++i) {
       m.rows[m.count + i].weight = (double)m.count / (double)m.landmark_row_count;
     }

@@ -38,8 +38,8 @@ supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
        !supine_options_parse_number(unit, &save->millimetres_per_unit) ||
        !(save->millimetres_per_unit > 0.0) || !supine_mesh_axes_parse(axes, &save->axes))) {
     return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                            "the basis does not state the axes and units of its scan: leave "
-                            "--as-scanned out, or make the basis again from the scan");
+                            "the basis does not state the axes and units of its scan: leave out "
+                            "--as-scanned, or make the basis again from the scan");
   }
   return SUPINE_OK;
 }
@@ -54,7 +54,6 @@ double supine_options_basis_volume(const supine_basis *basis, const supine_pose 
   return sum;
 }
 
-/* Return positions [N, 3] as doubles, or NULL if out of memory. */
 static double *to_doubles(const supine_basis *basis, const float *xyz) {
   const size_t count = 3 * supine_basis_get_info(basis)->vertex_count;
   double *converted = malloc(count * sizeof *converted);

@@ -15,8 +15,8 @@
 /* Table of the option --as-scanned, which sets a bool. */
 extern const supine_option supine_options_as_scanned[];
 
-/* Open a basis of a closed surface without its stored normals: commands compute normals from the
- * triangles. The caller must close the basis even if this fails.
+/* Open a basis without its stored normals, and check that its surface is closed. The caller must
+ * close the basis even after a failure.
  * @retval SUPINE_ERROR_OPEN_SURFACE  the surface encloses no volume
  * @retval any status of supine_basis_open_with */
 supine_status supine_options_basis_open(const char *path, supine_storage storage,
@@ -27,7 +27,7 @@ supine_status supine_options_basis_open(const char *path, supine_storage storage
 supine_status supine_options_basis_closed(const supine_basis *basis, const char *path,
                                           supine_error *error);
 
-/* If `wanted`, set the axes and the unit of `save` to those of the scan.
+/* If `wanted` is true, set the axes and the unit of `save` to those of the scan.
  * @retval SUPINE_ERROR_FORMAT  the basis does not state the axes and the unit of its scan */
 supine_status supine_options_basis_frame(const supine_basis *basis, bool wanted,
                                          supine_mesh_save_options *save, supine_error *error);
@@ -46,14 +46,14 @@ supine_status supine_options_basis_mesh(const supine_basis *basis, supine_mesh *
   "3-D RMS; half of all points lie within 0.9 times this distance of their true position, 95 % "   \
   "within 1.8 times"
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
-  "It was measured on full breaths in one posture; for a change of posture it is an "              \
-  "extrapolation."
+  "The expected error was measured on full breaths in one posture; for a change of posture it is " \
+  "an extrapolation."
 
 /* Expected errors. Initialise with zeros, and release with supine_options_expected_free. */
 typedef struct supine_expected {
   float *sigma;        /* [N] expected error of each displacement, mm; NULL if unknown */
   double rms, largest; /* RMS and maximum of `sigma` over the vertices, mm */
-  bool turned;         /* the posture changes between the two states */
+  bool turned;         /* whether the two states differ in posture */
 } supine_expected;
 
 /* Compute the expected errors of the displacements from one state to another. They are unknown for
@@ -64,7 +64,7 @@ supine_status supine_options_expected_find(const supine_basis *basis, const supi
                                            supine_error *error);
 void supine_options_expected_free(supine_expected *expected);
 
-/* Print the RMS and the largest of the errors in one line, or nothing if they are unknown. */
+/* Print the RMS and the largest expected error in one line; if unknown, print nothing. */
 void supine_options_expected_print(const supine_expected *expected, FILE *file);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the direction of gravity while the body turns, and make the state for a volume. */
+/* Compute the direction of gravity while the body turns, and make a state of a given volume. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

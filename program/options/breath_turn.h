@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Compute the direction of gravity while the body turns, and make the state for a volume. */
+/* Compute the direction of gravity while the body turns, and make a state of a given volume. */
 #ifndef SUPINE_BREATH_TURN_H
 #define SUPINE_BREATH_TURN_H
 
@@ -12,9 +12,9 @@ typedef struct breath_turn {
   double seconds;        /* duration, s; gravity then stays at `to` */
 } breath_turn;
 
-/* Compute the direction of gravity at a time, s, on the shorter arc from `from` to `to`. Between
- * opposite directions the body turns over its left side, but over its back if gravity begins within
- * 60 degrees of the long axis or exactly on a side. */
+/* Compute the direction of gravity at a time, s, on the shorter arc from turn->from to turn->to.
+ * Between opposite directions, the body turns over its left side; but if gravity begins within 60
+ * degrees of the long axis of the body, or exactly along x, the body turns over its back. */
 void supine_breath_turn_gravity(const breath_turn *turn, double time, double gravity[3]);
 
 /* Read a text such as "supine:left:10s" into the breath_turn `turn`. */

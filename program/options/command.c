@@ -109,7 +109,7 @@ bool supine_options_parse_count(const char *text, size_t *value) {
 
 const char *supine_options_suggest(const char *text, const char *const *candidates, size_t count) {
   const char *best = NULL;
-  size_t fewest = 1 + strlen(text) / 2; /* candidates with more edits are not suggested */
+  size_t fewest = 1 + strlen(text) / 2; /* candidates that need more edits are not suggested */
   for (size_t i = 0; i < count; ++i) {
     const size_t edits = supine_words_distance(text, candidates[i]);
     if (edits < fewest || (edits == fewest && best == NULL)) {
@@ -120,18 +120,19 @@ const char *supine_options_suggest(const char *text, const char *const *candidat
   return best;
 }
 
-static volatile sig_atomic_t stops_by_itself, interrupted;
+static volatile sig_atomic_t command_polls, interrupted;
 static volatile time_t interrupted_at; /* s since 1970 */
 
-/* If the command stops by itself, ask it to stop; otherwise end the program. A second signal also
- * ends the program, unless it comes within a second: timeout(1) sends each signal twice. */
+/* Handle a signal. A command that polls supine_options_interrupted is told to stop; any other
+ * command ends at once. A later signal always ends the program, except within about a second,
+ * because timeout(1) sends each signal twice. */
 static void on_signal(int number) {
   const time_t now = time(NULL);
-  if (stops_by_itself != 0 && interrupted == 0) {
+  if (command_polls != 0 && interrupted == 0) {
     interrupted = 1;
     interrupted_at = now;
   }
-  if (stops_by_itself != 0 && now - interrupted_at < 2) {
+  if (command_polls != 0 && now - interrupted_at < 2) {
     return;
   }
   supine_output_abandon_all();
@@ -144,11 +145,11 @@ void supine_options_signals_catch(bool orderly_end) {
   struct sigaction action = {0};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
-  stops_by_itself = orderly_end ? 1 : 0;
+  command_polls = orderly_end ? 1 : 0;
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     (void)sigaction(numbers[i], &action, NULL);
   }
-  (void)signal(SIGXFSZ, SIG_IGN); /* then a write beyond the file size limit fails */
+  (void)signal(SIGXFSZ, SIG_IGN); /* makes a write beyond the file size limit fail */
 }
 
 bool supine_options_interrupted(void) {

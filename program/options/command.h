@@ -39,8 +39,9 @@ int supine_options_fail(const char *command, supine_status status, const supine_
 /* Flush standard output; return SUPINE_EXIT_OUTPUT if the disk is full or the pipe is closed. */
 int supine_options_finish(const char *command);
 
-/* Print a JSON object or a list of objects to standard output, and release it. As text, each member
- * is one line, and each list of objects is a table. supine_options_finish reports failed writes. */
+/* Print a JSON object or a list of objects to standard output, and release it. If `json` is false,
+ * print text: one line for each member, and a table for each list of objects. supine_options_finish
+ * reports failed writes. */
 void supine_options_print(json_t *value, bool json);
 
 /* Return a text such as a file name as a JSON string; replace bytes that are not UTF-8 by "?". */

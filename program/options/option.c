@@ -10,7 +10,7 @@
 
 #include "program/options/command.h"
 
-enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* row i has the getopt() code FIRST_LONG + i */
+enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG }; /* getopt() returns FIRST_LONG + i for row i */
 
 typedef struct row {
   const supine_option *option;
@@ -24,7 +24,7 @@ typedef struct reading {
   char *request;
   size_t count;
   row rows[ROWS_MAX];
-  char standard_output[16]; /* the output name "-" with an ending, such as "-.ply" */
+  char standard_output[16]; /* output name "-" followed by an ending, such as "-.ply" */
   int help;                 /* 'h' or HELP_ALL to print help; 0 to run the command */
 } reading;
 
@@ -54,7 +54,7 @@ static supine_status read_choice(const supine_option *option, const char *text, 
   return SUPINE_ERROR_ARGUMENT;
 }
 
-/* Read the value of an option into its field. Statuses as supine_option_reader. */
+/* Read the value of an option into `field`. Statuses as supine_option_reader. */
 static supine_status read_value(const supine_option *option, const char *text, void *field,
                                 supine_error *error) {
   if (option->read != NULL) {
@@ -143,7 +143,6 @@ static supine_status read_given(reading *r, row *target, const char *text, supin
   return read_row(target, text, error);
 }
 
-/* Report an unknown option, or an option without its value. */
 static supine_status refuse_unknown(const reading *r, int got, const char *given,
                                     supine_error *error) {
   const char *names[ROWS_MAX + 1];
@@ -161,7 +160,6 @@ static supine_status refuse_unknown(const reading *r, int got, const char *given
                           nearest != NULL ? nearest : "", nearest != NULL ? "'?" : "");
 }
 
-/* Read argv into the request; stop at --help. */
 static supine_status read_options(reading *r, int argc, char **argv, supine_error *error) {
   struct option names[ROWS_MAX + 3] = {{0}};
   char letters[2 * ROWS_MAX + 4] = ":h";

@@ -49,9 +49,10 @@ typedef enum supine_option_file {
   SUPINE_FILE_OUT
 } supine_option_file;
 
-/* Read `text` into `field`: the option's field, or if it has none, the struct that the table fills.
- * @retval SUPINE_ERROR_ARGUMENT  the text is invalid. The user sees "--NAME: MESSAGE", or without a
- *                                message, "--NAME takes WANTS, not 'TEXT'" */
+/* Read `text` into the field of an option or, if the option has no field, into the struct that its
+ * table fills.
+ * @retval SUPINE_ERROR_ARGUMENT  the text is invalid. The user sees "--NAME: MESSAGE" or, if the
+ *   message is empty, "--NAME takes WANTS, not 'TEXT'" */
 typedef supine_status supine_option_reader(const char *text, void *field, supine_error *error);
 static inline supine_status supine_options_fits(bool fits) {
   return fits ? SUPINE_OK : SUPINE_ERROR_ARGUMENT;
@@ -69,10 +70,10 @@ typedef struct supine_option {
   supine_option_reader *read;
   const char *standard; /* default, as the user would write it; NULL if none */
   double range[2];      /* limits of numbers and counts; {0, 0} if there are none */
-  bool open;            /* true if the limits themselves are invalid */
+  bool open;            /* true if values equal to a limit are invalid */
   const char *wants;    /* description of valid values; NULL to derive it from kind and range */
   const char *const *choices; /* valid words, then NULL; if `read` is set, for completion only */
-  const char *rivals;         /* name of a group of options; only one of them may be given, once */
+  const char *rivals;         /* name of a group; at most one of its options may be given, once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
@@ -111,7 +112,7 @@ typedef struct supine_command {
   size_t operands_least, operands_most;
   const char *operands_missing; /* message if the number of operands is wrong */
   size_t request_size;
-  void (*begin)(void *request); /* sets defaults that rows cannot express; may be NULL */
+  void (*begin)(void *request); /* sets defaults that table rows cannot express; may be NULL */
   supine_status (*run)(void *request, const supine_arguments *given, supine_error *error);
 } supine_command;
 

@@ -70,7 +70,7 @@ static bool is_row(json_t *object) {
   return json_is_object(object);
 }
 
-/* Labels of members. `parent` is the key of the object with the member, or NULL for any object. */
+/* Labels of JSON members. `parent` is the key of the enclosing object, or NULL for any object. */
 static const struct {
   const char *parent, *key, *label;
 } labels[] = {{NULL, "additions", "additions per vertex"},
@@ -158,7 +158,7 @@ static const struct {
               {NULL, "volume_interval_mL", "  confidence interval, +- mL"},
               {NULL, "volume_mL", "volume, from and to, mL"}};
 
-/* Write the label of a member. If the table has none, write the key with spaces for underscores and
+/* Write the label of a member. If `labels` has none, write the key with spaces for underscores and
  * with a comma before the unit. */
 static void write_label(const char *parent, const char *key, char text[TEXT_MAX]) {
   static const char *const units[][2] = {{"_mm", ", mm"},   {"_mm2", ", mm2"},
@@ -218,7 +218,7 @@ static void print_table(const json_t *rows) {
 
 static void print_object(const char *parent, json_t *object, int indent);
 
-/* Print a member as one line, as a table if it is a list of rows, or else object by object. */
+/* Print a member: rows as a table, other objects one by one, any other value in one line. */
 static void print_member(const char *parent, const char *name, json_t *value, int indent) {
   char text[TEXT_MAX];
   char heading[TEXT_MAX];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
  * Fit a lung's pressure-volume relation (supine/breath.h) to samples; read its parameters. The
- * functions are thread-safe. Before any call, turn off GSL's default error handler: it aborts. */
+ * functions are thread-safe. Before any call, turn off GSL's error handler: it ends the program. */
 #ifndef SUPINE_PV_H
 #define SUPINE_PV_H
 
@@ -9,7 +9,7 @@
 
 #include <supine/breath.h>
 
-/** Unknowns of a fit: the control parameters, and the volumes at the two ends of the curve. */
+/** Number of unknowns of a fit: control parameters, and the volume at each end of the curve. */
 enum { SUPINE_PV_UNKNOWNS = SUPINE_PV_CONTROLS + 2 };
 
 typedef struct supine_pv_sample {
@@ -20,24 +20,24 @@ typedef struct supine_pv_sample {
 
 /** Quality of the fit of one limb. */
 typedef struct supine_pv_report {
-  size_t samples; /**< number of samples; 0 if the limb takes the other limb's curve */
+  size_t samples; /**< number of samples; 0 if the curve was copied from the other limb */
   double control_interval[SUPINE_PV_CONTROLS]; /**< half-width of each confidence interval */
-  double volume_interval[2];                   /**< half-widths for the volumes at both ends, mL */
+  double volume_interval[2];                   /**< half-width of the interval of each volume, mL */
   double rms;                                  /**< root mean square residual, mL */
   double rms_percent; /**< rms as a percentage of the samples' range of volumes */
 } supine_pv_report;
 
-/** Fit the curve V of a limb to samples (P_j, V_j) by Levenberg-Marquardt:
+/** Fit the curve V of one limb (inhale or exhale) to samples (P_j, V_j) by Levenberg-Marquardt:
  *
  *     minimise over c, V_low, V_high:  sum of (V(P_j) - V_j)^2
  *
  * The curve has the control parameters c, covers the range of the samples' pressures, and rises
  * from V_low to V_high. Confidence intervals use Student's t and the covariance at the minimum. If
  * the curve is nearly flat over much of its range, the samples determine some parameters poorly;
- * these stay within +-SUPINE_PV_CONTROL_MAX and have wide intervals.
+ * these parameters stay within +-SUPINE_PV_CONTROL_MAX and have wide intervals.
  *
  * Pressures must keep rising or keep falling. Volumes must rise with pressure, except for noise: a
- * volume may be less than one at a lower pressure by at most 10 % of the range of volumes.
+ * volume may be less than the volume at a lower pressure by at most 10 % of the range of volumes.
  *
  * @param name        the samples' file, for messages
  * @param count       at least SUPINE_PV_UNKNOWNS + 1

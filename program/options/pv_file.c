@@ -10,7 +10,7 @@
 
 #include "program/options/pv.h"
 
-/* Read the limb of a row; it is inhale if the file has no column "limb". */
+/* Read the limb of a row; if the file has no column "limb", the limb is inhale. */
 static supine_status read_limb(const supine_csv *csv, supine_pv_limb *limb, supine_error *error) {
   const char *text = supine_csv_text(csv, 2);
   for (int i = 0; i < SUPINE_PV_LIMB_COUNT; ++i) {
@@ -24,7 +24,6 @@ static supine_status read_limb(const supine_csv *csv, supine_pv_limb *limb, supi
                           csv->line, text);
 }
 
-/* Samples of a limb, in the order of the file. */
 typedef struct samples {
   size_t count;
   supine_pv_sample *sample;

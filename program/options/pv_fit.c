@@ -17,7 +17,6 @@ enum {
   HIGH
 };
 
-/* Sorted samples of a limb, and the workspace of their fit. */
 typedef struct problem {
   const char *name;
   size_t count;
@@ -59,8 +58,8 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
     }
     if (j > 0 && (step > 0.0) != (samples[1].pressure > samples[0].pressure)) {
       return refuse(limb, &samples[j],
-                    "pressure turns back: within a limb it must keep rising or keep falling; sort "
-                    "the samples, or name the limbs in a column \"limb\"",
+                    "the pressure changes direction: within a limb it must only rise or only fall; "
+                    "sort the samples, or name the limbs in a column \"limb\"",
                     error);
     }
     sorted[falling ? count - 1 - j : j] = samples[j];
@@ -70,7 +69,7 @@ static supine_status sort(problem *limb, const supine_pv_sample *samples, supine
              : refuse_fall(limb, &sorted[count - 1], sorted[0].volume, error);
 }
 
-/* Refuse a volume that is less than a volume at a lower pressure by more than noise explains. */
+/* Refuse a volume that is less than one at a lower pressure by more than noise explains. */
 static supine_status check_falls(const problem *limb, double span, supine_error *error) {
   static const double allowed = 0.1; /* largest fall, as a fraction of the range of volumes */
   double peak = limb->sample[0].volume;
@@ -84,16 +83,16 @@ static supine_status check_falls(const problem *limb, double span, supine_error 
   return SUPINE_OK;
 }
 
-/* Compute the curve at the samples, from 0 to 1; return false if a parameter is out of bounds. */
+/* Compute the curve, from 0 to 1, at the samples. Return false if a parameter is out of bounds. */
 static bool find_shape(const problem *limb, const double *control, double *q) {
   supine_pv_curve curve = {{-1.0, 1.0}, {0.0, 1.0}, {0.0}};
   memcpy(curve.control, control, sizeof curve.control);
   return supine_breath_curve_evaluate(&curve, limb->count, limb->x, q, NULL, NULL) == SUPINE_OK;
 }
 
-/* Compute the residuals: the curve (1 - q) V_low + q V_high less the samples' volumes. */
+/* Compute the residuals (1 - q) V_low + q V_high - v for the curve q and the samples' volumes v. */
 static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector *residual) {
-  static const double wall = 1e6; /* residual outside the bounds, too large to be accepted */
+  static const double wall = 1e6; /* residual for parameters that are out of bounds */
   const problem *limb = context;
   if (!find_shape(limb, unknowns->data, limb->q)) {
     gsl_vector_set_all(residual, wall);
@@ -107,8 +106,8 @@ static int find_residuals(const gsl_vector *unknowns, void *context, gsl_vector 
   return GSL_SUCCESS;
 }
 
-/* Compute the derivatives of V: with respect to the control parameters by central differences,
- * accurate to about 1e-10; with respect to V_low and V_high exactly. */
+/* Compute the derivatives of the residuals: with respect to the control parameters by central
+ * differences, accurate to about 1e-10; with respect to V_low and V_high exactly. */
 static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *jacobian) {
   static const double step = 1e-5;
   const problem *limb = context;
@@ -136,7 +135,6 @@ static int find_jacobian(const gsl_vector *unknowns, void *context, gsl_matrix *
   return GSL_SUCCESS;
 }
 
-/* Compute the report at the minimum. */
 static void describe(const problem *limb, double span, double confidence,
                      supine_pv_report *report) {
   const gsl_matrix *jacobian = gsl_multifit_nlinear_jac(limb->work);
@@ -156,7 +154,7 @@ static void describe(const problem *limb, double span, double confidence,
   }
 }
 
-/* Minimise by Levenberg-Marquardt, starting from the line between the first and last samples. */
+/* Minimise by Levenberg-Marquardt, starting from the line from the first to the last sample. */
 static supine_status minimise(problem *limb) {
   enum { STEPS_MAX = 300 };
   static const double tolerance = 1e-13;

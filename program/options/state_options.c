@@ -149,8 +149,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     const double *g = from->state.gravity;
     const bool posed = g[0] != 0.0 || g[1] != 0.0 || g[2] != 0.0;
     state = from->state;
-    if (!posed) { /* no posture was given: take the scan's for the volume of the scan, else supine
-                   */
+    if (!posed) { /* the volume `scan` implies the posture of the scan; other volumes, supine */
       const bool own = state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_SCAN;
       const supine_state in = supine_basis_scan(basis);
       const double supine[3] = {0.0, 1.0, 0.0};

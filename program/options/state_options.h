@@ -27,7 +27,7 @@ supine_status supine_options_gravity(const supine_orientation *orientation, doub
 
 enum { SUPINE_POSTURE_NAME_MAX = 48, SUPINE_POSTURE_LIST_MAX = 32 };
 
-/* A posture as the user wrote it, and its unit vector along gravity. */
+/* A posture as the user wrote it, and the unit vector along gravity in this posture. */
 typedef struct supine_posture_item {
   char name[SUPINE_POSTURE_NAME_MAX];
   double gravity[3];
@@ -78,23 +78,23 @@ typedef struct supine_from {
   supine_state state;
 } supine_from;
 
-/* State that displacements are measured from, its pose, and its name in words. */
+/* State that displacements are measured from, with its pose and its name in words. */
 typedef struct supine_reference_pose {
   supine_state state;
   supine_pose pose;
   char name[96]; /* such as "the scan" or "supine at rest" */
 } supine_reference_pose;
 
-/* Choose the state that displacements are measured from: --from if it is given; else supine at rest
- * if the command compares postures and rest is known; else the scan. Statuses as
- * supine_basis_pose. */
+/* Choose the state that displacements are measured from. If --from is given, use its state. If not,
+ * use supine at rest if the command compares postures and rest is known; otherwise, use the scan.
+ * Statuses as supine_basis_pose. */
 supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
                                        bool compares, supine_reference_pose *reference,
                                        supine_error *error);
 
 /* Check that a pose is plausible: its surface must not fold, and if rest is known, its volume must
- * be 10 % to 120 % of full inflation. If a pose is implausible, return SUPINE_ERROR_NUMERICAL if
- * rest is known and folds are not allowed; otherwise print a warning. */
+ * be 10 % to 120 % of full inflation. An implausible pose is an error (SUPINE_ERROR_NUMERICAL) if
+ * rest is known and `allow_folds` is false; if not, only a warning is printed. */
 supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
                                         bool allow_folds, const supine_pose *pose,
                                         supine_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Declare options of commands that read surfaces: axes and units, landmarks. */
+/* Declare the options for axes, units and landmarks, of commands that read surfaces. */
 #include <ctype.h>
 #include <string.h>
 
