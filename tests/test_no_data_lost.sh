@@ -4,11 +4,11 @@
 #
 # An output that is also an input is refused under any name. A missing folder is reported before the inputs are read.
 # A full disk, a size limit or a signal leaves no incomplete file. Each of the SIGNALS (default KILL TERM INT) ends each
-# command that writes a file at KILLS (default 2) random moments.
+# command that writes a file at KILLS (default 1) random moments.
 set -u
 export SOURCE_DATE_EPOCH=0 # so that a report made again is the same, even after midnight
 supine=$1
-kills=${2:-2}
+kills=${2:-1}
 signals=${3:-KILL TERM INT}
 work=$(mktemp -d) || exit 1
 trap 'exit 1' INT TERM

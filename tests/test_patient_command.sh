@@ -67,7 +67,7 @@ turns() {
   shift
   "$supine" fit "$@" --name somebody -o "$name.json" >fit.txt || fail "fit $name"
   near "$(number gain "$name.json")" 0.70 0.05 || fail "$name: $(grep gain fit.txt)"
-  "$supine" precompute s_supine_rest.ply --patient "$name.json" -o "$name.safetensors" \
+  "$supine" precompute s_supine_rest.ply --patient "$name.json" --held-out 20 -o "$name.safetensors" \
     >out 2>note || fail "precompute $name: $(cat note)"
   grep -q 'assumed to be the emptier of the two' note || fail "the assumed state of the scan is not stated"
   "$supine" validate "$name.safetensors" --from supine:rest --state prone:rest:s_prone_rest.ply \
@@ -96,7 +96,7 @@ chain() {
   scan=$1
   mesh=$2
   shift 2
-  "$supine" precompute "$scan.ply" --patient surface.json -o surface.safetensors >out 2>&1 ||
+  "$supine" precompute "$scan.ply" --patient surface.json --held-out 20 -o surface.safetensors >out 2>&1 ||
     fail "precompute $scan: $(cat out)"
   states=$(printf -- "--state supine:%s:${mesh}_supine_%s.ply " "$1" "$1" "$3" "$3")
   "$supine" validate surface.safetensors $states --json >valid.json || fail "validate $scan"

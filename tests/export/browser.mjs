@@ -84,23 +84,28 @@ export async function press(page, key) {
   await page.keyboard.press(key);
 }
 
-/** Return the picture without the texts over it, after it has been drawn and no longer changes. */
+/** Return the picture without the texts over it. */
+const screenshot = (page) => page.locator('#picture').screenshot({ style: '#stage > :not(#picture) { visibility: hidden !important }' });
+
+/** Return the picture after it has been drawn and no longer changes. */
 export async function picture(page) {
   await settled(page);
   for (let before = null; ;) {
-    const now = await page.locator('#picture').screenshot({ style: '#stage > :not(#picture) { visibility: hidden !important }' });
+    const now = await screenshot(page);
     if (before?.equals(now)) return now;
     before = now;
   }
 }
 
-/** Assert that the picture becomes equal to an earlier one within 5 s. */
-export async function assertPicture(page, before, message) {
+/** Assert that the picture becomes equal to an earlier one within 5 s, or different if `equal` is false. */
+export async function assertPicture(page, before, message, equal = true) {
   const end = Date.now() + 5000;
-  let equal = false;
-  do equal = (await picture(page)).equals(before);
-  while (!equal && Date.now() < end);
-  assert.ok(equal, message);
+  let found = false;
+  do {
+    await settled(page);
+    found = (await screenshot(page)).equals(before) === equal;
+  } while (!found && Date.now() < end);
+  assert.ok(found, message);
 }
 
 /** Wait until a change is drawn. */

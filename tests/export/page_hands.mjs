@@ -172,8 +172,8 @@ async function checkArrow(page) {
   await page.evaluate(() => { window.supine.picture.drawGravity = () => {}; });
   assert.equal(await warmPixels(page), 0, 'pixels outside the arrow have its colour');
   await page.evaluate(() => { delete window.supine.picture.drawGravity; });
-  for (const posture of ['1', '2', '3', '5']) {
-    for (const view of ['a', 'p', 'l', 'h']) {
+  for (const [posture, views] of Object.entries({ 1: 'ap', 2: 'lh', 3: 'ah', 5: 'pl' })) {
+    for (const view of views) {
       await press(page, posture);
       await press(page, view);
       await settled(page);
