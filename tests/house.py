@@ -106,15 +106,17 @@ def check_include_cycles(files):
 def objects():
     """For each object file, yield the source file without its ending, and lists of the external names that it defines and
     uses."""
+    sources = {}
     for folder, _, names in os.walk(build):
         match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
         for name in names if match else []:
             file = os.path.normpath(f"{match[1]}{match[2]}/{name[:-len('.o')]}")
             if name.endswith(".c.o") and os.path.exists(os.path.join(source, file)):
-                listed = subprocess.run(["nm", "--extern-only", os.path.join(folder, name)],
-                                        capture_output=True, text=True, check=True).stdout
-                yield (file[:-len(".c")], re.findall(r" [A-TV-Z] (\w+)$", listed, re.M),
-                       re.findall(r" U (\w+)$", listed, re.M))
+                sources[os.path.join(folder, name)] = file[:-len(".c")]
+    listed = subprocess.run(["nm", "--extern-only", *sources], capture_output=True, text=True, check=True).stdout
+    for part in re.split(r"^\n(?=/)", listed, flags=re.M)[1:]:
+        path, names = part.split(":\n", 1)
+        yield (sources[path], re.findall(r" [A-TV-Z] (\w+)$", names, re.M), re.findall(r" U (\w+)$", names, re.M))
 
 
 def check_names(folders):
