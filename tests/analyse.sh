@@ -22,7 +22,7 @@ if [ "$what" = all ] || [ "$what" = clang ]; then
 fi
 if [ "$what" = all ] || [ "$what" = clang-tidy ]; then
   command -v clang-tidy >/dev/null || { echo "clang-tidy is not installed: install it, or give cppcheck or clang"; exit 1; }
-  # Check all sources of the build. status.c defines supine_error_set, so it is checked without analyse.h.
+  # Include analyse.h first in all sources of the build, except status.c, which defines supine_error_set.
   {
     sed -n 's|^ *"file": "\(.*\)",*$|\1|p' build/clang/compile_commands.json | sort -u |
       grep -E "^$PWD/(sh|mesh|precompute|runtime|program|packaging)/" | grep -v '/sh/base/status\.c$' |

@@ -7,7 +7,7 @@
 # 90 %. Needs Debian's gcovr.
 set -eu
 cd "$(dirname "$0")/.."
-# Tests that `quick` leaves out. They are slow with gcov, and nearly all lines that they reach are reached by others.
+# The argument `quick` leaves out these tests. They are slow with gcov, and other tests run nearly all of their lines.
 slow='precompute|thread_count|field|patient_expand|program|breathe|projection|deform|deform_lung|cohort'
 slow="$slow|inside|no_data_lost|labels_orientation|lit_angles|faults|bids|reference|validation_lungs|house"
 slow="$slow|readme_example|series_vtk|stream_page|stream_slicer|stream_link|stream_unity.*|export_.*_node|mesh_hostile"

@@ -20,7 +20,7 @@ double fixture_random(uint64_t *state) {
   return (double)((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
-/* Make a lung of the vertices begin <= i < end. At least 5 vertices form a bipyramid. */
+/* Make a lung from the vertices begin to end - 1. Five or more vertices form a double pyramid. */
 static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_t *state) {
   const size_t corners = end - begin >= 5 ? end - begin - 2 : 0;
   for (size_t i = begin; i < end; ++i) {
@@ -46,7 +46,7 @@ static void make_lung(fixture *f, size_t lung, size_t begin, size_t end, uint64_
   }
 }
 
-/* Compute the displacement u of vertex i by mode k with weight 1, mm. */
+/* Compute the displacement u, mm, that mode k with weight 1 causes at vertex i. */
 static void mode_displacement(const fixture *f, size_t i, size_t k, double u[3]) {
   for (size_t axis = 0; axis < 3; ++axis) {
     u[axis] = f->vector

@@ -21,8 +21,8 @@ printf 'name,x,y,z\na,60,-150,-100\nb,-70,-120,-90\n' >points.csv
 "$first" embed lungs.safetensors points.csv -o points.safetensors >/dev/null 2>&1
 
 failed=0
-# compare ENDING COMMAND...: compare the files with this ending that the command writes in every build and with every
-# number of threads.
+# compare ENDING COMMAND...: run the command in every build with every number of threads. Check that all files with this
+# ending are equal.
 compare() {
   ending=$1
   shift

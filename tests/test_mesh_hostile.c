@@ -5,7 +5,7 @@
 
 #include "mesh_samples.h"
 
-/* Load a file and return the status. Assert a valid mesh or a complete error. */
+/* Load a file and return the status. Assert a valid mesh, or an error with a message. */
 static supine_status attempt(const char *path) {
   supine_mesh mesh = {0};
   supine_error error = {0};
@@ -90,7 +90,7 @@ TEST(test_load_truncated_text_reports_format_error) {
   };
   for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
     const size_t size = strlen(cases[k].text);
-    /* Without its last line end, the file is complete. */
+    /* The file is complete even without its last line feed. */
     for (size_t length = 0; length + 1 < size; ++length) {
       expect_bytes(state, cases[k].name, cases[k].text, length, SUPINE_ERROR_FORMAT);
     }
@@ -121,7 +121,7 @@ TEST(test_load_ply_header_illegal_reports_format_error) {
       PLY_ASCII "element vertex\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element vertex -1\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element vertex 99999999999999999999\n" PLY_HEAD PLY_BODY,
-      /* PLY_HEAD has the element `vertex`, too. */
+      /* PLY_HEAD declares the element `vertex` a second time. */
       PLY_ASCII "element vertex 3\nproperty float x\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element none 0\n" PLY_HEAD PLY_BODY,
       PLY_ASCII "element a 0\nproperty\n" PLY_HEAD PLY_BODY,

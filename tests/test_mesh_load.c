@@ -238,8 +238,8 @@ TEST(test_load_mirrored_node_triangles_face_outwards) {
   supine_mesh_free(&mesh);
 }
 
-/* Load the tetrahedron with the first line `head` under these axes. Return the only x that is not
- * 0: 120 or -120. */
+/* Load the tetrahedron from a file whose first line is `head`, read with these axes. Return the
+ * only x coordinate that is not 0: 120 or -120. */
 static double x_under(void **state, const char *name, const char *head, supine_axes axes,
                       supine_mesh_report *report) {
   char text[512];

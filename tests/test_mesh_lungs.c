@@ -30,7 +30,7 @@ TEST(test_load_real_lungs_known_counts_and_volumes) {
     size_t vertices;
     size_t triangles;
     long genus;
-    double litres; /* +- 0.05 */
+    double litres; /* tolerance 0.05 */
   } cases[] = {
       {"lungs/chaste_left_5k.obj", 5001, 9998, 0, 3.4},
       {"lungs/chaste_right_5k.obj", 5001, 9998, 0, 4.2},

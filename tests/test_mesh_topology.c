@@ -107,7 +107,7 @@ TEST(test_topology_two_tetrahedra_components_in_order) {
 }
 
 TEST(test_topology_components_joined_late_count_as_one) {
-  /* Only the last two triangles join the first three; the third triangle has vertex 0. */
+  /* The first three triangles have no common vertex. The last two join them. */
   static const double vertices[27] = {0};
   static const uint32_t triangles[] = {8, 7, 6, 5, 4, 3, 2, 1, 0, 6, 5, 7, 3, 2, 4};
   supine_mesh mesh = sample_make(9, vertices, 5, triangles);

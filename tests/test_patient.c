@@ -114,7 +114,7 @@ TEST(test_covariances_any_distance_equal_those_of_kriging) {
 TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   static const struct {
     const char *name;
-    double quadratic_rms[2]; /* mm, fitted from the inhaled image and from the exhaled one */
+    double quadratic_rms[2]; /* mm: inhaled to exhaled image, exhaled to inhaled image */
   } cases[] = {{"054", {3.01, 3.30}},
                {"055", {8.07, 9.83}},
                {"056", {3.83, 4.44}},
@@ -160,7 +160,7 @@ TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
   assert_true(band > 92.0 && band < 98.0);
 }
 
-/* At the fitted points, the corrected law leaves the residual that the fit reports. */
+/* The error at the fitted points, after correction by kriging, equals the reported error. */
 TEST(test_correct_fitted_points_leave_reported_residual) {
   supine_patient_pairs pairs = scatter(150, 8);
   supine_patient truth = known(&pairs);
@@ -200,7 +200,7 @@ TEST(test_find_side_given_overrides_midline) {
   assert_true(place.side == 1.0 && place.box[0] < 0.0);
   double u[3];
   supine_patient_displacement(&patient, &place, 1.0, u);
-  assert_true(u[0] == 0.0); /* the law fixes x where box[0] <= 0 */
+  assert_true(u[0] == 0.0); /* where box[0] <= 0, the law does not move points along x */
   supine_patient_pairs_free(&pairs);
 }
 
@@ -246,12 +246,12 @@ TEST(test_fit_noisy_landmarks_recover_constants) {
     displace(&found, pairs.from + 3 * i, v);
     worst = fmax(worst, hypot(hypot(u[0] - v[0], u[1] - v[1]), u[2] - v[2]));
   }
-  assert_true(worst < 0.5); /* mm, the noise */
+  assert_true(worst < 0.5); /* mm */
   supine_patient_pairs_free(&pairs);
 }
 
-/* The entries of a row, which are the derivatives of its displacement with respect to the unknowns,
- * equal difference quotients. */
+/* Each entry of a row of the design matrix is the derivative of a displacement with respect to one
+ * unknown. It equals a difference quotient. */
 TEST(test_power_design_each_unknown_matches_difference_quotient) {
   supine_patient_pairs pairs = scatter(20, 3);
   const supine_patient truth = known(&pairs);
@@ -467,15 +467,16 @@ TEST(test_force_in_fitted_posture_linear_in_box) {
       assert_true(fabs(force - expected) < 1e-14);
     }
   }
-  /* The nine constants of the deep law give its force: base 0.9, and -0.2 along y of the box. */
+  /* The deep law gives a force of 0.9 plus -0.2 times the y coordinate of the lungs' box. */
   const supine_patient_power shape = supine_patient_deep(postures[0], (const double[3]){0});
   const supine_force_law deep = supine_patient_force(&shape, 0.4, postures[0]);
   assert_true(fabs(deep.base - 0.9) < 1e-14 && fabs(deep.box[1] + 0.2) < 1e-14);
   supine_patient_pairs_free(&pairs);
 }
 
-/* A third scan, prone or upright, gives the gain within three standard errors, and the scale of
- * each lung. A scan in the fitted posture does not determine the gain. */
+/* A third scan, prone or upright, determines the scale of each lung, and the gain of the force
+ * along gravity within three standard errors. A scan in the fitted posture does not determine the
+ * gain. */
 TEST(test_gain_fit_third_scan_recovers_gain) {
   static const double postures[2][3] = {{0.0, -1.0, 0.0}, {0.0, 0.0, -1.0}};
   static const double gains[2] = {0.23, 0.71};

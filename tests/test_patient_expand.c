@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Expandability from motion: a lesion and a gradient are recovered from a noisy surface of another
- * mesh, and uniform tissue is found uniform. */
+/* Expandability computed from motion: a lesion and a gradient are recovered from a noisy surface of
+ * another mesh, and uniform tissue is found to be uniform. */
 #include "test.h"
 
 #include <gsl/gsl_randist.h>
@@ -115,7 +115,7 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(fabs(times / lesion->factor - 1.0) < 0.2);
   assert_true(found.expand.kept);
   assert_true(found.expand.held_out[1] < 0.5 * found.expand.held_out[0]);
-  /* The report has the error of the final fit, with regions. */
+  /* The report gives the held-out error of the final fit, with the stiffness of regions. */
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 

@@ -59,7 +59,6 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   }
   const supine_patient patient = fit.patient;
   const supine_patient_surface_report surface = fit.surface;
-  /* The model measures displacement from the emptier state, so the scale below is -1. */
   supine_patient_record record = {.patient = patient, .from_surface = true};
   memcpy(record.state[1].gravity, supine_gravity, sizeof supine_gravity);
   record.force = supine_patient_force(&patient.power, 0.4, supine_gravity);
@@ -87,8 +86,8 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   }
   printf("\n");
   assert_true(sqrt(square) <= 0.15);
-  /* The fit computes the force from the motion. Supine, height is 1 - Y, so the gain 0.4 and the
-   * term -0.2 Y give the slope -0.6. */
+  /* The force has the terms 0.4 (1 - Y) and -0.2 Y, where 1 - Y is the height when supine. The
+   * slope along Y is therefore -0.6. */
   const supine_patient_applied *applied = &fit.applied;
   printf(
       "force: correlation with height %.3f, c7 to c9 %.3f %.3f %.3f, spread %.3f, residual %.3f, "
@@ -111,9 +110,9 @@ TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
   supine_lungs_free(&other);
 }
 
-/* Another law than `deep` moves a surface of another mesh. The fit by `deep` and kriging still
- * reaches the moved surface, and its volume: the change of volume is the integral of the
- * displacement along the normal, which the fit matches. */
+/* A law other than `deep` moves a surface of another mesh. The fit of `deep` with kriging
+ * reproduces the moved surface. It also reproduces the volume, as the displacement along the normal
+ * determines the volume change. */
 TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_mesh coarse = helper_lump(9, 70.3, 5);
   supine_mesh fine = helper_lump(15, 70.3, 5);
@@ -159,7 +158,7 @@ TEST(test_fit_surface_other_law_reaches_state_and_volume) {
   supine_lungs_free(&other);
 }
 
-/* Draw a random correction g of the law; add its component along the surface to the positions. */
+/* Add a random displacement along the surface to the positions. */
 static void slide(const supine_lungs *lungs, const supine_patient_power *law, unsigned long seed,
                   double *positions) {
   const size_t n = lungs->mesh.vertex_count;

@@ -415,8 +415,8 @@ static double frame_difference(const unsigned char *a, const unsigned char *b, s
   return sum / (3.0 * (double)area);
 }
 
-/* Successive frames differ, and the last is shown for a second. The animation back begins where
- * this one ends. */
+/* Successive frames differ, and the last is shown for a second. The reverse animation begins with
+ * the last picture of this one. */
 TEST(test_render_turn_animates_between_postures) {
   enum { FRAMES = 7, WIDTH = 240, HEIGHT = 180 };
   /* Largest difference of two frames of one posture, due to the codec and the text of the angle. */

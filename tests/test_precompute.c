@@ -53,7 +53,7 @@ static supine_lungs real_pair(void) {
   return lungs;
 }
 
-static double reach; /* reach for make_basis, mm; 0 gives the links of the paper */
+static double reach; /* mm; 0 selects links between neighbours only, as in the paper */
 
 static supine_precompute_report make_basis(const supine_lungs *lungs, size_t band, size_t modes,
                                            double soften, size_t held_out) {
@@ -82,8 +82,8 @@ static supine_basis *open_basis(void) {
   return basis;
 }
 
-/* Compare the coefficients in the file with a direct factorisation over all nodes, which has one
- * right-hand side for each harmonic. The quadrature of the force is the same. */
+/* Compare the coefficients in the file with those from a direct factorisation of the equilibrium
+ * matrix, with one right-hand side for each harmonic. */
 static void check_coefficients(const char *const *names, supine_axes axes) {
   enum { BAND = 3, TERMS = 16, LATITUDES = 32 };
   supine_lungs lungs = {0};
@@ -270,8 +270,8 @@ static void check_error_table(const supine_lungs *lungs, const supine_model *mod
   }
 }
 
-/* Check that the stated error equals the error measured in each held-out direction: up to rounding
- * or, with softening, up to the error of combining solves for a few directions. */
+/* Check that the error stated in the file equals the error measured in each held-out direction of
+ * gravity. Softening adds the error of combining solves for a few directions. */
 static void check_stated_error(const supine_lungs *lungs, size_t band, size_t modes,
                                double soften) {
   enum { HELD_OUT = 40 };
@@ -437,7 +437,7 @@ static void check_volumes(const supine_lungs *lungs, size_t band, size_t modes, 
 TEST(test_precompute_volumes_exact_in_every_direction) {
   supine_lungs lungs = phantom(3000);
   check_volumes(&lungs, 3, 0, 0.0, -300.0);
-  /* not -300 mL: a softened phantom folds at -299 mL head down */
+  /* Head down, a softened phantom folds at -299 mL. */
   check_volumes(&lungs, 7, 10, 1.0, -200.0);
   supine_lungs_free(&lungs);
 }
@@ -502,9 +502,8 @@ static double turned_over_at_run_time(double volume) {
   return worst;
 }
 
-/* Lungs that empty in one posture, keep their volume in the opposite one and half empty in the
- * others have more reversed triangles than lungs that half empty in all postures. The tested
- * postures, left, supine and right, reverse many. */
+/* If lungs empty in one posture only, more triangles are reversed than if the lungs lose the same
+ * mean volume in all postures. */
 TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   supine_lungs lungs = phantom(1500);
   const size_t n = lungs.mesh.vertex_count;
@@ -524,9 +523,8 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
   static const int postures[] = {0, 1, 3};
   for (size_t p = 0; p < sizeof postures / sizeof *postures; ++p) {
     const int g = postures[p];
-    /* Coefficients of bands 0 and 1, whose functions are 0.2821 and 0.4886 along an axis: the
-     * volume at rest changes by `part` mL at one end of the axis, by 0 at the other, and by half of
-     * `part` between. */
+    /* The volume at rest is unchanged at one end of the axis and changes by `part` mL at the other.
+     * The constants are the harmonics of bands 0 and 1 along the axis. */
     static const size_t term[3] = {3, 1, 2};
     const double part = -0.76 * full;
     const double sign = g < 3 ? 1.0 : -1.0;
@@ -540,7 +538,7 @@ TEST(test_turned_over_one_posture_emptied_finds_more_reversed) {
         SUPINE_OK);
     assert_int_equal(supine_accuracy_turned_over(&lungs, directions, &field, &forms, even, &least),
                      SUPINE_OK);
-    assert_true(share > least + 0.02); /* the shares are 0.08 to 0.16 */
+    assert_true(share > least + 0.02); /* the shares of reversed triangles are 0.08 to 0.16 */
   }
   supine_physics_volume_forms_free(&forms);
   supine_projection_compression_free(&field);
@@ -562,7 +560,7 @@ TEST(test_precompute_turned_over_share_equals_run_time) {
   assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over < 0.001);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-4);
-  options.model.stiffness = stiffness; /* irregular, so that triangles are reversed */
+  options.model.stiffness = stiffness; /* irregular stiffness reverses triangles */
   assert_int_equal(supine_precompute(&lungs, &options, path, &report, NULL), SUPINE_OK);
   assert_true(report.turned_over > 0.01);
   assert_close(report.turned_over, turned_over_at_run_time(report.accuracy.volume), 1e-3);
@@ -595,7 +593,7 @@ TEST(test_precompute_bad_options_refused) {
   options.modes = 65;
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   options.modes = 16;
-  options.model.force.soften = 1.0; /* needs a reach */
+  options.model.force.soften = 1.0; /* softening is refused without a reach */
   assert_int_equal(supine_precompute(&lungs, &options, path, NULL, &error), SUPINE_ERROR_ARGUMENT);
   supine_lungs_free(&lungs);
 }

@@ -43,8 +43,7 @@ static double *coefficients_of(const supine_projection *projection) {
   return c;
 }
 
-/* Return the weights of the columns of a projection in `count` directions, [count, rank] (malloc).
- */
+/* Return the weight of each projection column for `count` directions, [count, rank] (malloc). */
 static double *weights_at(const supine_lungs *lungs, const supine_model *model,
                           const supine_span *span, size_t count, const double *g) {
   double *range = malloc(2 * count * sizeof *range);
@@ -105,8 +104,8 @@ TEST(test_projection_finer_grid_same_functions) {
   }
 }
 
-/* Check that a weighted sum of at most `rank_most` solves gives the solve for any direction, with a
- * relative error below `most`: the transfer does not depend on gravity. */
+/* Check that the solve for any direction of gravity is a weighted sum of at most `rank_most`
+ * solves, with a relative error below `most`. */
 static void check_superposition(const supine_lungs *lungs, const supine_model *model,
                                 size_t rank_most, double most) {
   enum { COUNT = 20 };

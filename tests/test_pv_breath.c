@@ -74,7 +74,7 @@ TEST(test_breath_each_course_rises_then_falls_and_repeats) {
   }
 }
 
-/* Pressure follows the course of the breath, and volume follows the limbs. */
+/* Pressure follows the course of the breath; the pressure-volume limbs give the volume. */
 TEST(test_breath_volume_follows_scaled_limbs) {
   const supine_pv *normal = supine_breath_normal();
   for (int course = 0; course < SUPINE_PV_COURSE_COUNT; ++course) {
@@ -107,8 +107,8 @@ TEST(test_breath_volume_follows_scaled_limbs) {
   }
 }
 
-/* At constant flow, the pressures of a breath give its volumes on the limb, even on a limb with two
- * steep parts. */
+/* At constant flow, each pressure of a breath gives its volume on the pressure-volume limb, even if
+ * the limb has two steep parts. */
 TEST(test_breath_constant_flow_stiff_limb_pressures_give_volumes) {
   enum { COUNT = 61 };
   const supine_pv_curve stiff = {{0.0, 45.0}, {0.0, 800.0}, {0.5, -4.5, -2.3, 12.0, 2.7}};

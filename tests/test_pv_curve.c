@@ -8,7 +8,7 @@
 
 enum { COUNT = 61 };
 
-/* Tolerance of quadrature and rounding, relative to the range of volumes: about 450 epsilon. */
+/* Error of quadrature and rounding, divided by the range of volumes; about 450 DBL_EPSILON. */
 static const double integration = 1e-13;
 
 static const supine_pv_curve sigmoid = {
@@ -46,8 +46,8 @@ TEST(test_evaluate_constant_control_gives_salazar_knowles) {
 }
 
 TEST(test_evaluate_second_control_gives_gaussian_compliance) {
-  /* With u = c_2 x, compliance is proportional to exp(c_2 (x^2 - 1) / 2), and its integral to an
-   * error function. */
+  /* If only the second control parameter c2 differs from 0, compliance is a Gaussian function of
+   * pressure, and its integral, the volume, is an error function. */
   const double c2 = -7.3;
   const double root = sqrt(-c2 / 2.0);
   const supine_pv_curve curve = {{0.0, 40.0}, {0.0, 1000.0}, {0.0, c2, 0.0, 0.0, 0.0}};

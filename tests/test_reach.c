@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The reach, mm: its definition, the balance of forces, and its independence of the mesh. */
+/* The reach, a distance in mm over which forces spread, has the same effect in any mesh. */
 #include "test.h"
 
 #include <gsl/gsl_linalg.h>
@@ -12,7 +12,7 @@
 
 static supine_model model; /* the paper's law with the reach of the current test */
 
-/* Return the catch [N], the solution for a force [N] and stiffness [N] (malloc). */
+/* Return the catch [N], the force that each vertex keeps, for a force and stiffness [N]. */
 static double *solve(const supine_lungs *lungs, const double *stiffness, const double *force) {
   const size_t n = lungs->mesh.vertex_count;
   supine_equilibrium *equilibrium = NULL;
@@ -53,8 +53,8 @@ static double triangle_area(const supine_mesh *mesh, size_t t) {
   return 3.0 * area[one.triangles[0]];
 }
 
-/* The solution equals that of a dense matrix over all nodes, which are masses and then springs,
- * with the link weights of equilibrium.h. */
+/* The solution equals that of a dense matrix for all masses (vertices) and springs (edges), with
+ * the link weights of equilibrium.h. */
 TEST(test_reach_solution_equals_dense_solution) {
   const double reach = 30.0;
   supine_lungs lungs = lungs_of(helper_lump(4, 60.0, 77), reach);
@@ -105,7 +105,7 @@ TEST(test_reach_solution_equals_dense_solution) {
       gsl_matrix_set(link_weight, n + k, edge[c], w);
     }
   }
-  /* The matrix I - A, where A[i, j] = S_i w_ij / Z_j for link weights w, and Z_j is the sum of S_l
+  /* The matrix I - A, where A[i, j] = s_i w_ij / z_j for link weights w, and z_j is the sum of s_l
    * w_lj over l. */
   gsl_matrix *matrix = gsl_matrix_alloc(nodes, nodes);
   gsl_vector *b = gsl_vector_calloc(nodes);
@@ -132,7 +132,7 @@ TEST(test_reach_solution_equals_dense_solution) {
   double given = 0.0;
   for (size_t i = 0; i < n; ++i) {
     const double own = area[i] / mean;
-    /* catch of mass i: the share Te[i->i] that it keeps, times x_i */
+    /* expected catch: the part of x_i that mass i keeps */
     const double expected = s[i] * own / z[i] * gsl_vector_get(x, i);
     assert_true(fabs(own * found[i] - expected) < 1e-10 * largest);
     balance += own * found[i];

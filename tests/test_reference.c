@@ -36,7 +36,7 @@ static supine_scan scan_named(const char *text) {
   return scan;
 }
 
-/* Return the reference of lungs scanned at full inflation. */
+/* Return the reference surface of lungs scanned at full inflation. */
 static supine_reference reference_of(supine_lungs *full, const supine_model *model) {
   const supine_scan scan = scan_named("full");
   const supine_resting resting = supine_reference_resting_default();
@@ -120,8 +120,8 @@ TEST(test_resting_options_override_defaults) {
   supine_error error = {0};
   assert_memory_equal(resting.share[0], left, sizeof left);
   assert_memory_equal(resting.share[1], right, sizeof right);
-  /* One share for both lungs keeps the ratio of their shares, and is their mean if the lungs have
-   * the usual sizes. */
+  /* If one share of full inflation is given for both lungs, the ratio of their shares stays. The
+   * mean of their shares is the given share if the lungs have the usual sizes. */
   assert_int_equal(supine_reference_resting_set(&resting, "HFP", "0.5", &error), SUPINE_OK);
   assert_true(fabs(0.45 * resting.share[0][3] + 0.55 * resting.share[1][3] - 0.5) < 1e-15);
   assert_true(fabs(resting.share[0][3] / resting.share[1][3] - 0.464 / 0.475) < 1e-15);
@@ -356,7 +356,7 @@ TEST(test_doubt_implausible_volume_names_option) {
   }
 }
 
-/* Real lungs that rest at 0.35 of full inflation reach full inflation in at most 30 solves. */
+/* Real lungs with a rest volume of 0.35 of the full volume inflate fully in at most 30 solves. */
 TEST(test_reference_real_scans_reach_full_inflation) {
   static const char *const pairs[][2] = {{"lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj"},
                                          {"covid/covid001_left.ply", "covid/covid001_right.ply"}};
@@ -457,7 +457,7 @@ TEST(test_basis_of_any_scan_reproduces_scan_and_rest) {
     printf("%s: scan reproduced within %.4f and %.4f mm; error of the basis %.4f mm RMS\n",
            scans[s], farthest(placed, scanned, n), farthest(posed, scanned, n), rms);
     assert_true(farthest(placed, scanned, n) < promised);
-    /* The file computes full inflation from the compressed field, a few mL off. */
+    /* The basis computes full inflation with an error of a few mL. */
     assert_true(farthest(posed, scanned, n) <
                 (rests && scan.state.volume.ml == 0.0 ? promised : 0.15));
     free(placed);
@@ -496,7 +496,7 @@ TEST(test_reference_impossible_states_refused) {
     assert_says(error.message, "--scanned");
     assert_false(found.known);
   }
-  supine_model rough = model; /* a model that folds on the way to full inflation */
+  supine_model rough = model; /* the surface folds on the way to full inflation */
   rough.reach = 0.0;
   double *stiffness = malloc(lungs.mesh.vertex_count * sizeof *stiffness);
   uint64_t seed = 5;

@@ -46,7 +46,7 @@ static double linear(double encoded) {
 }
 
 /* Return the lightness L* of CIE 1976 of an sRGB colour. The colour maps were designed by another
- * measure. */
+ * measure of lightness. */
 static double lightness(const double rgb[3]) {
   const double y = 0.2126 * linear(rgb[0]) + 0.7152 * linear(rgb[1]) + 0.0722 * linear(rgb[2]);
   return 116 * cbrt(y) - 16;
@@ -64,7 +64,7 @@ TEST(test_colours_increasing_value_even_steps_of_lightness) {
         assert_true(rgb[k] >= 0 && rgb[k] <= 1);
       }
       if (i > 0) {
-        /* The sum of all 64 steps is about 70. */
+        /* All 64 steps together change the lightness by about 70. */
         assert_true(here - before > 0.5 && here - before < 1.8);
       }
       before = here;

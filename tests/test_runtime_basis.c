@@ -309,7 +309,7 @@ TEST(test_open_wrong_structure_refused) {
     p.metadata[i].key = "other";
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   }
-  p = sound(); /* volumes at rest are optional; they have nine terms */
+  p = sound(); /* Volumes at rest are optional. They have nine coefficients. */
   p.tensors[p.tensor_count++] = (supine_tensor){"resting_volume", SUPINE_F64, 1, {9}, zeros64};
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensors[9].dtype = SUPINE_F32;
@@ -328,7 +328,7 @@ TEST(test_open_wrong_structure_refused) {
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
   p.tensors[3] = (supine_tensor){"coefficients", SUPINE_F32, 3, {4, 3, 1}, zeros};
   assert_int_equal(open_parts(&p), SUPINE_OK);
-  p = sound(); /* without volume forms, the surface counts as open */
+  p = sound(); /* A basis without volume forms is valid. */
   p.tensor_count = 6;
   assert_int_equal(open_parts(&p), SUPINE_OK);
   p.tensor_count = 7;

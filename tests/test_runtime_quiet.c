@@ -121,7 +121,7 @@ static void use_all(const supine_basis *basis, float *xyz) {
   (void)supine_basis_pose(basis, &state, &pose, &error);
   state = supine_basis_scan(basis);
   for (state.volume.ml = 3; state.volume.ml < 1e10;
-       state.volume.ml *= 1e9) { /* 3 mL is in reach, 3e9 mL is not */
+       state.volume.ml *= 1e9) { /* 3 mL can be added, 3e9 mL cannot */
     if (supine_basis_pose(basis, &state, &pose, &error) == SUPINE_OK &&
         supine_basis_get_info(basis)->has_volume) {
       supine_basis_volumes(basis, &pose, scales);

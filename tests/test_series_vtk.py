@@ -53,7 +53,7 @@ def check_surface(surface, points, triangles, rest, lung):
     normals = vtk_to_numpy(data.GetNormals()).astype(float)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 0.01
     cosine = (normals * normals_of(points, triangles)).sum(1) / np.linalg.norm(normals, axis=1)
-    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.3  # degrees; the steps rotate normals by up to 0.2
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.3  # rounded normals turn by up to 0.2 degrees
     assert (vtk_to_numpy(data.GetArray("lung")) == lung).all()
     fields = surface.GetFieldData()
     assert fields.GetAbstractArray("SPACE").GetValue(0) == "LPS"
@@ -114,7 +114,7 @@ with tempfile.TemporaryDirectory() as folder:
     print(f"{frames} frames of {n} vertices: {share:.3f} of the bytes without compression")
     assert share <= 0.42  # at the fastest level of compression; the slowest gives 0.39
 
-    # A single surface has the same arrays.
+    # A file with a single surface has the same arrays as a file with a breath.
     run("deform", "lungs.safetensors", "--posture", "prone", "-o", "prone.vtp")
     _, surface = read("prone.vtp")
     found = vtk_to_numpy(surface.GetPoints().GetData())

@@ -147,8 +147,8 @@ TEST(test_solve_expandability_file_of_ones_equals_uniform) {
   (void)unlink(ply);
 }
 
-/* If a lung is collapsed, the deformed surface still has the stated volume of each lung and of
- * both. */
+/* If a lung is collapsed, the volumes of the deformed surface still equal the stated volumes of
+ * each lung and of both. */
 TEST(test_precompute_collapsed_lung_volumes_exact) {
   double volumes[2][2]; /* mL gained; first index 0 healthy, 1 collapsed left lung */
   double rests[2][2];
@@ -209,7 +209,7 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
     free(xyz);
     if (ill == 0) {
       healthy = basis;
-    } else { /* at equal scale, a collapsed lung gains 0.3 of a healthy one */
+    } else { /* At equal scale, a collapsed lung gains 0.3 times as much volume. */
       const double healthy_gain = posed_lung_volume(healthy, 0, weights, scales[0]);
       assert_true(fabs(volumes[1][0] - 0.3 * healthy_gain) < 1e-4);
       supine_basis_close(basis);

@@ -12,9 +12,8 @@ static supine_mesh phantom(void) {
   return mesh;
 }
 
-/* Return the largest difference between the force that a solution implies and the applied force,
- * relative to the largest force. With a reach, compare forces divided by the stiffness, which are
- * the right-hand sides of the equilibrium. */
+/* Return the largest difference between the applied force and the force computed back from a
+ * solution, relative to the largest force. With a reach, first divide both by the stiffness. */
 static double residual(const supine_lungs *lungs, const supine_model *model, const double g[3],
                        const supine_solution *solution) {
   const size_t n = solution->vertex_count;
@@ -34,8 +33,8 @@ static double residual(const supine_lungs *lungs, const supine_model *model, con
   return relative;
 }
 
-/* Solve with and without a reach. Assert the residual, and a finite catch. Without a reach, the
- * catch is a sum over paths, so assert that it is not negative. */
+/* Solve with and without a reach. Assert a small residual and a finite catch, the force that each
+ * vertex keeps. Without a reach, no catch is negative. */
 static void check(const char *what, supine_mesh *mesh, const double *stiffness) {
   static const double g[3] = {0.48, 0.64, -0.6};
   supine_lungs lungs = {0};

@@ -24,7 +24,7 @@ TEST(test_solve_plane_equals_mass_spring_damper) {
   for (size_t i = 0; i < n; ++i) {
     middle = fmax(middle, ours[i]);
   }
-  assert_true(middle > 5.0 * corner); /* so that the field is not trivial */
+  assert_true(middle > 5.0 * corner); /* the displacement varies over the sheet */
   damper_free(&system);
   frame_free(&f);
   free(force);
@@ -117,7 +117,7 @@ static void count_steps(void *context, size_t steps, double held) {
   *(size_t *)context = steps;
 }
 
-/* To reach an error of 1e-6, Pitcher/Catcher visits link ends less often than the
+/* For an error of 1e-6, the paper's Pitcher/Catcher solver visits link ends less often than the
  * mass-spring-damper system ([Santhanam2008] Fig. 7). */
 TEST(test_pitcher_catcher_converges_before_mass_spring_damper) {
   frame f = frame_plane(15, 10.0);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Volumes computed from volume forms, compared with those of the surface, and the scale or the
- * gains for a given volume. */
+/* Volumes computed from polynomials in weights or gains (volume forms) equal those of the surface.
+ * The scale or the gains for a given volume are found. */
 #include <float.h>
 
 #include "test.h"
@@ -91,8 +91,8 @@ TEST(test_scale_random_volumes_reached) {
   fixture_destroy(f);
 }
 
-/* Make a basis whose volume is exactly a s + b s^2 + c s^3 mL at scale s: one mode, whose weight is
- * 1 in any direction. */
+/* Make a basis whose volume is exactly a s + b s^2 + c s^3 mL at scale s. It has one mode, whose
+ * weight is 1 in any direction. */
 static supine_basis *open_cubic(double a, double b, double c, unsigned char **bytes) {
   fixture *f = fixture_create(5, 1, 0, 1, false, true, 1, 3);
   f->mode[0] = 1 / 0.28209479177387814;
@@ -106,27 +106,27 @@ static supine_basis *open_cubic(double a, double b, double c, unsigned char **by
 
 TEST(test_scale_cubic_volume_gives_root_connected_to_zero) {
   static const struct {
-    /* volume in mL; expected scale, NAN if the volume is refused */
+    /* The scale s solves a s + b s^2 + c s^3 = volume; NAN if the volume is refused. */
     double a, b, c, volume, scale;
   } cases[] = {
       {2, 0, 0, 10, 5},
       {2, 0, 0, -10, -5},
-      {-2, 0, 0, 10, -5}, /* the field shrinks the lung */
-      {0, 0, 0, 1, NAN},  /* nothing moves */
-      {0, 0, 1, 8, NAN},  /* the slope is 0 at s = 0 */
+      {-2, 0, 0, 10, -5}, /* the displacement shrinks the lung */
+      {0, 0, 0, 1, NAN},  /* the volume never changes */
+      {0, 0, 1, 8, NAN},  /* s^3 has the slope 0 at s = 0 */
       {0, 0, 0, 0, 0},
-      {2, 1, 0, 8, 2},        /* 2 s + s^2 = 8: s = 2, not -4 */
-      {2, 1, 0, -0.75, -0.5}, /* minimum V = -1 at s = -1 */
-      {2, 1, 0, -1, -1},      /* the minimum V = -1 */
+      {2, 1, 0, 8, 2},        /* 2 s + s^2 = 8 at s = 2; s = -4 is beyond the minimum */
+      {2, 1, 0, -0.75, -0.5}, /* 2 s + s^2 has the minimum -1 at s = -1 */
+      {2, 1, 0, -1, -1},      /* the minimum of 2 s + s^2 */
       {2, 1, 0, -1.0001, NAN},
-      {1, 0, 1, 10, 2}, /* s + s^3 */
+      {1, 0, 1, 10, 2}, /* s + s^3 = 10 at s = 2 */
       {1, 0, 1, -30, -3},
-      {3, 0, -1, 2, 1},       /* 3 s - s^3 has a maximum V = 2 at s = 1; s = -2 also gives 2 */
-      {3, 0, -1, 2.001, NAN}, /* only s near -2, beyond the minimum, gives it */
+      {3, 0, -1, 2, 1},       /* 3 s - s^3 has the maximum 2 at s = 1; s = -2 also gives 2 */
+      {3, 0, -1, 2.001, NAN}, /* 3 s - s^3 = 2.001 only near s = -2, beyond the minimum */
       {3, 0, -1, 1.375, 0.5},
-      {6, -4.5, 1, 2.5, 1},       /* maximum V = 2.5 at s = 1, minimum at s = 2 */
-      {6, -4.5, 1, 2.6, NAN},     /* only s > 2, beyond the minimum, gives it */
-      {1e-300, 0, 0, 1e300, NAN}, /* overflows */
+      {6, -4.5, 1, 2.5, 1},       /* 6 s - 4.5 s^2 + s^3 has the maximum 2.5 at s = 1 */
+      {6, -4.5, 1, 2.6, NAN},     /* 6 s - 4.5 s^2 + s^3 = 2.6 only beyond the minimum */
+      {1e-300, 0, 0, 1e300, NAN}, /* the scale overflows */
       {1e-3, 0, 0, 1e3, 1e6},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
@@ -180,8 +180,8 @@ TEST(test_pose_open_surface_refused) {
   fixture_destroy(f);
 }
 
-/* Volume form of a box of 3000 mL at full inflation. At gains of -1, its sides are shorter by 20,
- * 25 and 30 %. */
+/* Volume form of a box of 3000 mL at full inflation. Gains of -1 shorten its sides by 20, 25 and 30
+ * percent. */
 static const supine_volume_form box_form = {{3000 * 0.2, 3000 * 0.25, 3000 * 0.3, 3000 * 0.25 * 0.3,
                                              3000 * 0.2 * 0.3, 3000 * 0.2 * 0.25,
                                              3000 * 0.2 * 0.25 * 0.3}};
@@ -199,7 +199,7 @@ TEST(test_volume_form_gains_any_volume_reached_on_path) {
     assert_int_equal(supine_volume_form_gains(&box_form, box_bend, rest, part * rest, gains, NULL),
                      SUPINE_OK);
     assert_true(fabs(box_volume(gains) - part * rest) <= 1e-9);
-    /* All poses are on one path: gains of the axes differ by the bend times a common factor. */
+    /* On the path, the gain of axis 0 is the mean of the gains of axes 1 and 2. */
     assert_true(fabs(gains[1] + gains[2] - 2 * gains[0]) <= 1e-12);
     for (size_t axis = 0; axis < 3; ++axis) {
       assert_true(gains[axis] < last[axis]);
@@ -218,8 +218,7 @@ TEST(test_volume_form_gains_at_rest_equal_on_all_axes) {
   }
 }
 
-/* On the three axes, the path has the slopes 1, 0.1, 1.9 at rest and 1, 1.45, 0.55 at full
- * inflation. */
+/* The gains change as 1 : 0.1 : 1.9 at rest, and as 1 : 1.45 : 0.55 at full inflation. */
 TEST(test_volume_bend_path_has_stated_slopes) {
   static const double stated[2][3] = {{1, 1.45, 0.55}, {1, 0.1, 1.9}};
   for (size_t end = 0; end < 2; ++end) {
@@ -236,8 +235,8 @@ TEST(test_volume_bend_path_has_stated_slopes) {
   }
 }
 
-/* The path has the stated values beyond full inflation, between full inflation and rest, and below
- * rest. */
+/* The gains have the stated values beyond full inflation, between full inflation and rest, and
+ * below rest. */
 TEST(test_volume_bend_path_has_stated_values) {
   static const double at[][3] = {
       {-0.2, -0.2864, -0.1136}, {0.4, 0.5512, 0.2488}, {1.3, 1.244062423021089, 1.355937576978911}};

@@ -13,7 +13,7 @@ TOLERANCE_MM = 5e-3  # largest error of the library's packed storage, mm
 
 assert crc64(b"123456789") == 0x6C40DF5F0B497347  # published check value of CRC-64/ECMA-182
 
-SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # rotation by rows; columns: left, back and head in a room whose z is up
+SUPINE = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # rotation by rows, to a room whose z axis is up
 LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]
 
 
@@ -37,15 +37,15 @@ for version in (1, 2):
         kind, device, _, content = answer(link, stamp, send)
         assert (kind, device) == ("NDARRAY", "SUPINE")
         frames[stamp] = unpack(kind, content)
-        assert len(frames[stamp]) == basis.modes + 6  # weights, then gains of two lungs along three axes
+        assert len(frames[stamp]) == basis.modes + 6  # modes; 3 gains for each of 2 lungs
     # All message types give the same weights for a posture; weights of different postures differ.
     assert far(frames[101], frames[103]) < 1e-5 and far(frames[101], frames[105]) < 1e-5
     assert far(frames[102], frames[104]) < 1e-5 and far(frames[102], frames[106]) < 1e-5
     assert far(frames[101], frames[102]) > 0.05
-    # Surfaces sent by the server equal those computed from the file and the weights.
+    # Surfaces sent by the server equal those computed from the basis file and the received weights.
     link.check = False  # checking 650 kB per frame takes too long in plain Python
     link.ask_for("points")
-    _, (points, strips) = link.newest(10.0)  # the answer to the request: the last frame, with triangles
+    _, (points, strips) = link.newest(10.0)
     assert faces(list(corners(strips))) == faces(basis.triangles)
     for stamp, pose in ((201, SUPINE), (202, LEFT)):
         kind, _, _, content = answer(link, stamp, lambda: link.send_pose(pose, stamp=stamp))
@@ -53,7 +53,7 @@ for version in (1, 2):
         assert not strips
         assert far(points, basis.deform(frames[stamp - 100])) < TOLERANCE_MM
         assert far(points, basis.vertices) > 1.0
-    link.set_volume("full")  # full inflation is the surface of the file, except upright
+    link.set_volume("full")  # Full inflation on the side equals the file's surface.
     kind, _, _, content = answer(link, 203, lambda: link.send_pose(LEFT, stamp=203))
     assert far(unpack(kind, content)[0], basis.vertices) < TOLERANCE_MM
     link.send("STRING", "VOLUME", string("rest+400"))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Send observed points, and receive the located lungs with their expected error: stream_points.py SUPINE SAMPLES
 
-The observed points are moved by the law and shifted. They are sent as one TRANSFORM per sensor, then as one POINT."""
+The observed points come from deformed and shifted lungs. They are sent as one TRANSFORM per sensor, then as one POINT."""
 import csv
 import os
 import re
@@ -16,7 +16,7 @@ from answers import answer  # noqa: E402
 from supine_link import Link, transform, unpack  # noqa: E402
 
 SHIFT = (12.0, -7.0, 20.0)
-LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]  # rotation of a body on its left side, by rows
+LEFT = [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]  # Rotation matrix, by rows, of a body on its left side.
 TURNED = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 
@@ -79,7 +79,7 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
         for version in (1, 2):
             link = Link("127.0.0.1", port, version=version, check=True)
             names = list(seen)
-            if version == 1:  # recorded times count from the first pose, not from an earlier point
+            if version == 1:  # Recorded times count from the first pose, even if a point arrived earlier.
                 answer(link, 4, lambda: link.send("TRANSFORM", names[0], transform(TURNED, seen[names[0]]), 4))
             link.send_pose(LEFT, stamp=5)
             for name in names[:-1]:  # the rotation of a sensor is ignored

@@ -4,7 +4,7 @@
 #include "tests/test.h"
 #include <supine/posture.h>
 
-/* allows a few roundings of 32-bit floats */
+/* several times the rounding error of a 32-bit float */
 static const double tolerance = 1e-6;
 
 static void expect_gravity(const double gravity[3], const char *posture) {
@@ -72,7 +72,7 @@ TEST(test_gravity_tracker_matrices_give_postures) {
     double r[9];
     double gravity[3];
     matrix_of(&placements[i], r);
-    assert_true(fabs(determinant(r) - 1.0) < tolerance); /* a rotation */
+    assert_true(fabs(determinant(r) - 1.0) < tolerance);
     assert_int_equal(take(r, gravity), SUPINE_STREAM_EXACT);
     expect_gravity(gravity, placements[i].posture);
   }
@@ -110,20 +110,19 @@ TEST(test_gravity_tracker_quaternions_give_postures) {
   }
 }
 
-/* The setup takes a world whose y is up and a marker whose axes are right, front and head. */
+/* In this world y is up; the marker's axes point to the patient's right, front and head. */
 TEST(test_gravity_setup_rotates_world_and_marker) {
   supine_stream_setup setup = {.down = {0, -1, 0}};
   const double half_turn[4] = {0, 0, 0, 1};
   supine_stream_rotation(half_turn, setup.body);
-  /* On the back: the front (y of the marker) points up, along the world's y, and the head (z) along
-   * the world's x, so right (x) is along the world's z. */
+  /* The patient lies on the back: the marker's x, y, z point along z, y, x of the world. */
   const double r[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
   double gravity[3];
   const char *why = NULL;
   assert_true(fabs(determinant(r) - 1.0) < tolerance);
   assert_int_equal(supine_stream_gravity_rotation(&setup, r, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "supine");
-  /* A tilt sensor with the axes of the marker measures that right is down. */
+  /* A tilt sensor with the marker's axes measures gravity towards the patient's right. */
   const double down[3] = {3, 0, 0};
   assert_int_equal(supine_stream_gravity_down(&setup, down, gravity, &why), SUPINE_STREAM_EXACT);
   expect_gravity(gravity, "right");
@@ -142,7 +141,7 @@ TEST(test_gravity_invalid_rotations_refused) {
     double m[9];
     double gravity[3];
     matrix_of(&placements[i], r);
-    scaled(r, 1.0001, 0.9999, 1.0, m); /* rounding of a tracker */
+    scaled(r, 1.0001, 0.9999, 1.0, m); /* a small rounding error */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_EXACT);
     scaled(r, 25.4, 25.4, 25.4, m); /* a matrix scaled to inches */
     assert_int_equal(take(m, gravity), SUPINE_STREAM_REPAIRED);
@@ -191,7 +190,7 @@ TEST(test_gravity_invalid_quaternions_and_vectors_refused) {
   expect_gravity(gravity, "supine");
 }
 
-/* The smoothed direction follows a steady turn with a lag of `seconds`. */
+/* The smoothed direction lags behind a steady turn of gravity by a given time. */
 TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
   const double seconds = 0.2;
   const double step = 1e-3;
@@ -201,7 +200,7 @@ TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
     const double angle = speed * step * i;
     const double gravity[3] = {sin(angle), cos(angle), 0};
     const double left = supine_stream_gravity_smooth(gravity, step, seconds, smooth);
-    if (i == 2000) { /* the lag may differ by one step */
+    if (i == 2000) { /* The lag may be wrong by up to one time step. */
       assert_true(fabs(left - speed * seconds) < speed * step);
       assert_true(fabs(atan2(smooth[0], smooth[1]) - (angle - left)) < 1e-12);
     }
@@ -210,7 +209,7 @@ TEST(test_gravity_smooth_steady_turn_has_stated_lag) {
   double none[3] = {0, 1, 0};
   assert_true(supine_stream_gravity_smooth(still, step, 0.0, none) == 0.0);
   assert_memory_equal(none, still, sizeof still);
-  /* A reversal of gravity is half done after `seconds` times ln 2. */
+  /* After gravity reverses, half of the turn takes `seconds` times ln 2. */
   double opposite[3] = {0, 0, 1};
   assert_true(fabs(supine_stream_gravity_smooth(still, seconds * log(2.0), seconds, opposite) -
                    M_PI / 2.0) < 1e-9);

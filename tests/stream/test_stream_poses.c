@@ -44,7 +44,7 @@ TEST(test_poses_bad_files_refused) {
 TEST(test_latency_known_values_give_percentiles) {
   supine_stream_latency *latency = fixture_allocate(1, sizeof *latency);
   assert_true(supine_stream_latency_quantile(latency, 0.5) == 0.0);
-  for (int i = 1; i <= 1000; ++i) { /* 10.5, 20.5, ... us, the centres of bins */
+  for (int i = 1; i <= 1000; ++i) { /* latencies of 10.5, 20.5, ... us */
     ++latency->bin[10 * i];
   }
   latency->count = 1000;

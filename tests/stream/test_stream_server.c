@@ -20,15 +20,15 @@
 
 enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
 
-/* Coefficients of harmonics of the volume at rest: 20 mL above the reference surface, plus 8 mL
- * times the y of gravity. */
+/* Spherical-harmonic coefficients of the volume at rest. It exceeds the volume of the reference
+ * surface by 20 mL plus 8 mL times the y component of gravity. */
 static const double resting[9] = {20.0 / 0.2820947917738781, 8.0 / 0.4886025119029199};
 
 static double resting_in(const double gravity[3]) {
   return 20.0 + 8.0 * gravity[1];
 }
 
-/* A server that runs in a thread of its own, with its basis. */
+/* A server that runs in a thread of its own, and the basis that it uses. */
 typedef struct stage {
   fixture *made;
   unsigned char *bytes;
@@ -65,7 +65,7 @@ static stage *stage_create(void) {
   size_t size = 0;
   supine_error error;
   s->made = fixture_create(VERTICES, MODES, 2, LUNGS, false, true, 15.0, 29);
-  /* Make the constant term dominate: with random terms alone some poses would fold. */
+  /* Make the constant part of each mode dominate, to avoid poses with a folded surface. */
   for (size_t k = 0; k < MODES; ++k) {
     double *mode = s->made->mode + 9 * k;
     for (int i = 1; i < 9; ++i) {
@@ -265,8 +265,8 @@ static void expect_pose(const supine_pose *pose, const unsigned char *content) {
   }
 }
 
-/* Return the pose at a direction of gravity and a volume in mL above rest, with one gain for all
- * lungs. */
+/* Return the pose for a direction of gravity and a volume in mL above rest. All lungs have the same
+ * gain. */
 static supine_pose pose_of(const stage *s, const double gravity[3], double above) {
   supine_pose pose = {.weights = {0}};
   double gain = 0.0;
@@ -277,7 +277,7 @@ static supine_pose pose_of(const stage *s, const double gravity[3], double above
   return pose;
 }
 
-/* Assert that `content` has the weights and gains of a direction of gravity and a volume in mL
+/* Assert that `content` has the weights and gains for a direction of gravity and a volume in mL
  * above rest. */
 static void expect_weights(const stage *s, const double gravity[3], double above,
                            const unsigned char *content) {
@@ -377,7 +377,7 @@ TEST(test_server_send_request_switches_content) {
     for (uint64_t i = 0; i < 4; ++i) {
       const uint64_t stamp = 10 * (w + 1) + i;
       assert_true(send_pose(peer, poses[i], stamp));
-      do { /* the request itself is also answered, by the current pose */
+      do { /* The server also answers the request itself, with the current pose. */
         assert_true(receive(peer, &header, body));
         whole = whole == 0 ? header.size : whole;
         assert_true(whole > points);
@@ -388,7 +388,7 @@ TEST(test_server_send_request_switches_content) {
       const supine_pose pose = pose_of(s, poses[i], 30.0);
       float xyz[300];
       supine_deform_range(s->basis, &pose, 0, 100, xyz);
-      for (int k = 0; k < 300; ++k) { /* the server calls supine_deform_range too */
+      for (int k = 0; k < 300; ++k) {
         assert_true(fabsf(float_at(body + 40 + 4 * k) - xyz[k]) < 1e-4f);
       }
     }
@@ -431,7 +431,7 @@ TEST(test_server_many_poses_newest_answered) {
   stage_destroy(s);
 }
 
-/* Send `count` poses, one every 2 ms; return the number of poses before one is answered late. */
+/* Send `count` poses, one every 2 ms; return how many are answered before the first late answer. */
 static int keep_rate(int peer, int count, uint64_t stamp) {
   supine_stream_header header;
   unsigned char body[4096];
@@ -493,12 +493,12 @@ TEST(test_server_fifty_peers_one_more_refused) {
       (void)receive_stamp(peer[i], 500 + round, &header, body);
     }
   }
-  const int extra = connect_peer(port); /* one peer too many: the server closes its connection */
+  const int extra = connect_peer(port); /* refused: too many peers */
   assert_true(closed_by_server(extra));
   (void)close(extra);
   (void)close(peer[0]);
   sleep_for(0.2);
-  peer[0] = connect_peer(port); /* takes the place of the closed peer */
+  peer[0] = connect_peer(port); /* This connection takes the place of the closed one. */
   assert_true(send_pose(peer[0], poses[0], 900));
   (void)receive_stamp(peer[0], 900, &header, body);
   for (int i = 0; i < MANY; ++i) {
@@ -661,7 +661,7 @@ TEST(test_server_replay_recorded_poses_same) {
   s->options.replay = &kept;
   s->options.record = record;
   supine_stream_poses_begin(record);
-  const int peer = connect_peer(stage_run(s)); /* the connection starts the replay */
+  const int peer = connect_peer(stage_run(s)); /* the server replays from the first connection on */
   supine_stream_header header;
   unsigned char body[4096];
   unsigned char last[4096];
@@ -671,9 +671,9 @@ TEST(test_server_replay_recorded_poses_same) {
     memcpy(last, body, sizeof last);
     ++frames;
   }
-  const supine_stream_counts counts = stage_end(s); /* after the end of the replay */
+  const supine_stream_counts counts = stage_end(s);
   assert_int_equal(counts.poses, COUNT);
-  assert_in_range(frames, 2, COUNT + 1); /* including one frame before the first pose */
+  assert_in_range(frames, 2, COUNT + 1); /* one frame precedes the first pose */
   expect_weights(s, pose[COUNT - 1].gravity, 30.0, last);
   (void)close(peer);
   assert_int_equal(fclose(record), 0);
@@ -708,8 +708,8 @@ TEST(test_server_moving_lungs_send_frames) {
     assert_true(receive(peer, &header, body));
     ++frames;
   }
-  /* About 95 frames are expected: ln(1e6 pi / 2) time constants of 0.1 s, with a frame every 15 ms.
-   * A busy machine sends fewer. */
+  /* The smoothed direction needs about 1.4 s to come within 1e-6 rad of the last pose, which is 95
+   * frames at 15 ms. A busy machine sends fewer frames. */
   assert_in_range(frames, 10, 120);
   expect_weights(s, poses[2], 30.0, body);
   const supine_pv_breath breath = {60.0, 60.0, 0.5, 5.0, SUPINE_PV_COSINE};
@@ -731,7 +731,7 @@ TEST(test_server_moving_lungs_send_frames) {
   }
   const double supine[3] = {0, 1, 0};
   const double deep = pose_of(s, supine, 60.0).gains[0][0] - pose_of(s, supine, 0.0).gains[0][0];
-  /* Frames every 15 ms reach the whole range from rest to the peak within 5 %. */
+  /* Between rest and peak, the gains of the frames change as the volume demands, within 5 %. */
   assert_true(fabs((double)(high - low) - fabs(deep)) < 0.05 * fabs(deep));
   (void)close(other);
   stage_destroy(s);

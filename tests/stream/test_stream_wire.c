@@ -107,7 +107,7 @@ TEST(test_read_transform_of_library_gives_rotation_or_position) {
       assert_true(m.number[k] == (double)(k + 1));
     }
   }
-  /* A TRANSFORM of another device gives a position, like that of an observed point. */
+  /* If poses come from the device Probe, a TRANSFORM of another device is an observed point. */
   const supine_stream_message place = read_ok(&header, body, "Probe");
   assert_int_equal(place.kind, SUPINE_STREAM_POSITION);
   assert_string_equal(place.text, "Patient");
@@ -181,7 +181,7 @@ TEST(test_read_qtdata_of_library_gives_quaternion_of_device) {
   expect_quaternion(&m, 0.8, 0, 0.6, 0);
   m = read_ok(&header, body, "Probe");
   expect_quaternion(&m, 0.8, 0.6, 0, 0);
-  m = read_ok(&header, body, NULL); /* NULL accepts any device: the last instrument counts */
+  m = read_ok(&header, body, NULL); /* no device named: the last one is used */
   expect_quaternion(&m, 0.8, 0, 0, 0.6);
   assert_int_equal(read_ok(&header, body, "Nobody").kind, SUPINE_STREAM_NOTHING);
 }
@@ -253,7 +253,7 @@ TEST(test_read_strings_of_library_give_volume_or_request) {
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_REQUEST);
   header = header_of("STRING", "Patient", 1, body, 12);
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
-  body[3] = 64; /* one byte more than the reader stores */
+  body[3] = 64; /* The text has 64 bytes, one more than the reader stores. */
   header = header_of("STRING", "VOLUME", 1, body, 4 + 64);
   assert_int_equal(read_ok(&header, body, NULL).kind, SUPINE_STREAM_NOTHING);
 }
@@ -287,7 +287,7 @@ TEST(test_read_points_of_library_give_names_and_positions) {
   }
 }
 
-/* Every truncation of a body, with a right checksum, gives nothing. */
+/* Every truncated body is refused, even with a correct checksum. */
 TEST(test_read_every_truncation_refused) {
   static const struct {
     const char *type, *device;
@@ -382,7 +382,7 @@ static void sample_destroy(sample *s) {
   fixture_destroy(s->made);
 }
 
-/* Assert that `bytes` are the library's message of version 1 with this body. */
+/* Assert that `bytes` equal the OpenIGTLink library's message of version 1 with this body. */
 static void expect_message(const unsigned char *bytes, const char *type, uint64_t stamp,
                            unsigned char *body, size_t size) {
   igtl_header header = {
@@ -394,8 +394,8 @@ static void expect_message(const unsigned char *bytes, const char *type, uint64_
   assert_memory_equal(bytes + sizeof header, body, size);
 }
 
-/* Assert that the frame of a sample has its K weights, then the gains x, y, z of each lung; destroy
- * the sample. */
+/* Assert that the frame of a sample has the weights of all modes, then the gains along x, y and z
+ * of each lung. Destroy the sample. */
 static void expect_weights_frame(sample s) {
   supine_stream_frames *frames = NULL;
   supine_error error;

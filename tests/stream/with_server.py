@@ -42,7 +42,7 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
             server.kill()
             raise
     print(rest, end="")
-    if result == 77:  # skipped
+    if result == 77:  # the program was skipped
         sys.exit(result)
     # Every program sends poses, so the server must report their latency.
     if not re.search(r"pose received to \w+ sent: median [\d.]+ ms, 99 % within [\d.]+ ms, "
