@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Find which of the 48 possible assignments of coordinates to axes fits the shape of lungs best.
  *
- * The score of an assignment is the sum of four terms; for a single lung, of the first three. They
- * contain the third moments of a lung of volume V about the lung's centre,
+ * The score of an assignment is the sum of the four terms below; for a single lung, the fourth is
+ * left out. They contain third moments of a lung of volume V about the lung's centre,
  *
  *     m_abc = integral of a b c dV / (V sd_a sd_b sd_c)
  *
  * where a, b and c are coordinates x (outwards from the midline), y (to the back) or z (to the
- * head), and sd_a is the standard deviation of a. The last column is the range of each term in nine
- * lungs of five people and two synthetic lungs:
+ * head), and sd_a is the standard deviation of a. The last column of the table shows the range of
+ * each term in nine lungs of five people and in two synthetic lungs:
  *
  *     hollow towards the heart   m_xxx - m_xyy - m_xzz     0.23 to 0.59
  *     deepest at the back        m_yzz - m_yyy             0.49 to 0.89
@@ -29,19 +29,19 @@ static const double least_lead = 0.2;
 /* Limit of |ln(V_right / V_left)| in the score, with the volumes V of the lungs, so that a
  * collapsed lung does not decide alone. */
 static const double most_ratio = 0.25;
-/* Largest ratio of a single lung's standard deviation along x (side to side) to that along y, and
- * to that along z. Measured ratios to that along y are 0.6 to 0.7. */
+/* Axes are refused for a single lung if its standard deviation along x (side to side) is more than
+ * this times that along y or z. In real lungs it is 0.6 to 0.7 times that along y. */
 static const double thin = 0.85;
 /* A surface holds two lungs if, along one axis, its standard deviation exceeds `wide` times each of
  * the others and its kurtosis is less than `most_kurtosis`, that of a uniform distribution. */
 static const double wide = 1.15;
 static const double most_kurtosis = 1.8;
-/* The side of a single lung is unknown if the magnitude of hollow() is below this. */
+/* A lung's side is unknown if the first term of its score (above) is below this in magnitude. */
 static const double least_side = 0.12;
 
 typedef struct shape {
   double volume;                  /* mm^3 */
-  double centre[3], deviation[3]; /* centre and standard deviation, mm */
+  double centre[3], deviation[3]; /* centroid and standard deviation, mm */
   double kurtosis[3];
   double moments[3][3][3]; /* third moments, normalised by volume and deviations */
 } shape;
@@ -62,8 +62,8 @@ static void add_point(const double p[3], double w, double sum[3], double square[
 /* Return the mean of x^4 over a tetrahedron whose corners have x = 0, a, b and c: the sum of all
  * monomials of degree 4 in a, b and c, divided by 35. */
 static double mean_fourth(double a, double b, double c) {
-  double ab = 1.0;  /* sum of all a^i b^j with i + j = n at the start of step n */
-  double abc = 1.0; /* sum of all a^i b^j c^k with i + j + k = n at the start of step n */
+  double ab = 1.0;  /* at the start of loop step n: sum of all a^i b^j with i + j = n */
+  double abc = 1.0; /* at the start of loop step n: sum of all a^i b^j c^k, i + j + k = n */
   double power = 1.0;
   for (int n = 0; n < 4; ++n) {
     power *= a;
@@ -73,9 +73,9 @@ static double mean_fourth(double a, double b, double c) {
   return abc / 35.0;
 }
 
-/* Integrate moments over the tetrahedra between `origin` and each triangle, the first three by
- * Keast's rule of five points, which is exact for cubic polynomials. Return the sum of their signed
- * volumes. */
+/* Integrate moments about `origin` over the tetrahedra between `origin` and each triangle: those of
+ * orders 1 to 3 by Keast's five-point rule, which is exact for cubic polynomials. Return the sum of
+ * the tetrahedra's signed volumes. */
 static double integrate(const supine_mesh *mesh, const double origin[3], double sum[3],
                         double square[3], double third[3][3][3], double fourth[3]) {
   static const double rule[5][4] = {{-0.8, 0.25, 0.25, 0.25},
@@ -126,7 +126,7 @@ static void find_box(const supine_mesh *mesh, double low[3], double high[3]) {
   }
 }
 
-/* Measure a surface. Return false if it encloses less than 0.1 % of its box. */
+/* Measure a surface. Return false if it encloses less than 0.1 % of the volume of its box. */
 static bool measure(const supine_mesh *mesh, shape *s) {
   double sum[3];
   double square[3];
@@ -137,7 +137,7 @@ static bool measure(const supine_mesh *mesh, shape *s) {
   for (int k = 0; k < 3; ++k) {
     s->centre[k] = 0.5 * (low[k] + high[k]);
   }
-  for (int pass = 0; pass < 2; ++pass) { /* first about the box's centre, then the centroid */
+  for (int pass = 0; pass < 2; ++pass) { /* moments about the box's centre, then the centroid */
     s->volume = integrate(mesh, s->centre, sum, square, s->moments, fourth);
     if (mesh->triangle_count == 0 ||
         fabs(s->volume) <= 1e-3 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])) {

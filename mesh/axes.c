@@ -25,8 +25,8 @@ void supine_mesh_axes_apply(supine_axes axes, double scale, double point[3]) {
   double matrix[3][3];
   const double from[3] = {point[0], point[1], point[2]};
   supine_mesh_axes_matrix(axes, matrix);
-  for (int k = 0; k < 3;
-       ++k) { /* exact, because entries are 0, 1 and -1; adding 0 turns -0 into 0 */
+  for (int k = 0; k < 3; ++k) {
+    /* Adding 0.0 turns -0.0 into 0.0. */
     point[k] =
         scale * (matrix[k][0] * from[0] + matrix[k][1] * from[1] + matrix[k][2] * from[2]) + 0.0;
   }

@@ -152,12 +152,12 @@ typedef struct supine_mesh_save_options {
   const float *expected_error; /**< optional [vertex_count], always in mm: point data
                                   "expected_error_mm" of VTP and PLY */
   /** @{ For VTP only, all optional. */
-  const float *normals;            /**< [vertex_count, 3] point data "Normals" */
-  const unsigned char *lung;       /**< [vertex_count] index of the lung, point data "lung" */
-  const supine_mesh_field *fields; /**< [field_count] numbers for the field data */
+  const float *normals;            /**< [vertex_count, 3] written as point data "Normals" */
+  const unsigned char *lung;       /**< [vertex_count] index of the lung, as point data "lung" */
+  const supine_mesh_field *fields; /**< [field_count] written as field data */
   size_t field_count;
-  double rounding; /**< mm, 0 for no rounding: lengths are rounded to multiples of the largest power
-                      of two, in the file's unit, that does not exceed this, and normals to 1/256 */
+  double rounding; /**< mm; 0 for no rounding. Lengths are rounded to multiples of the largest power
+                      of two, in the file's unit, that does not exceed this; normals to 1/256. */
   /** @} */
 } supine_mesh_save_options;
 
@@ -172,7 +172,7 @@ supine_status supine_mesh_save(const char *path, const supine_mesh *mesh,
 
 /** A VTP file of a surface that moves over time, in the form that VTK and ParaView read. The
  * triangles are stored once; every array is compressed. The field data hold the times, "time_s",
- * and all fields, with one tuple for each frame. The file appears completely or not at all. */
+ * and options->fields, with one tuple for each frame. The file appears completely or not at all. */
 typedef struct supine_mesh_series supine_mesh_series;
 
 /** Begin a series. All arguments must outlive it; before each frame the caller updates the arrays

@@ -9,7 +9,8 @@
 
 #include "mesh/repair.h"
 
-/* Loose triangles are dropped up to this share of all; a mesh with more of them is no surface. */
+/* Triangles without an edge that belongs to exactly two triangles are dropped if they are at most
+ * this share of all triangles. A mesh with more of them is no surface. */
 static const double most_loose = 0.01;
 
 typedef struct links {
@@ -77,7 +78,7 @@ static uint32_t find_root(const links *l, uint32_t t, uint8_t *turned) {
     root = l->parent[root];
   }
   *turned = sum;
-  while (l->parent[t] != root && t != root) { /* link every triangle of the path to the root */
+  while (l->parent[t] != root && t != root) { /* make the root the parent of all on the way */
     const uint32_t next = l->parent[t];
     const uint8_t here = l->turned[t];
     l->parent[t] = root;
@@ -149,7 +150,7 @@ static supine_status separate_touching(supine_mesh *mesh, const links *l, size_t
   const size_t corners = 3 * mesh->triangle_count;
   size_t count = mesh->vertex_count;
   uint32_t *surface_of = malloc((count + corners + 1) * sizeof *surface_of);
-  uint32_t *next_copy = calloc(count + corners + 1, sizeof *next_copy); /* 0 if none */
+  uint32_t *next_copy = calloc(count + corners + 1, sizeof *next_copy);
   supine_status status = surface_of == NULL || next_copy == NULL ? SUPINE_ERROR_MEMORY : SUPINE_OK;
   if (status == SUPINE_OK) {
     memset(surface_of, 0xFF, (count + corners) * sizeof *surface_of); /* UINT32_MAX: unknown */

@@ -31,8 +31,7 @@ static void sort_sides(supine_mesh_side *sides, size_t count) {
 
 supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh) {
   const size_t count = 3 * mesh->triangle_count;
-  uint32_t *next =
-      calloc(mesh->vertex_count + 2, sizeof *next); /* where to store each vertex's next side */
+  uint32_t *next = calloc(mesh->vertex_count + 2, sizeof *next);
   supine_mesh_side *sides = malloc((count + 1) * sizeof *sides);
   if (next == NULL || sides == NULL) {
     free(next);

@@ -103,7 +103,7 @@ void supine_image_set_axes(supine_image *image, supine_axes axes) {
   supine_mesh_axes_matrix(image->axes, from);
   for (int v = 0; v < 4; ++v) {
     const double p[3] = {vectors[v][0], vectors[v][1], vectors[v][2]};
-    for (int k = 0; k < 3; ++k) { /* convert the vector back to the header's coordinates */
+    for (int k = 0; k < 3; ++k) {
       vectors[v][k] = from[0][k] * p[0] + from[1][k] * p[1] + from[2][k] * p[2];
     }
     supine_mesh_axes_apply(axes, 1.0, vectors[v]);
@@ -127,7 +127,7 @@ void supine_image_locate(const supine_image *image, const double point[3], doubl
   for (int k = 0; k < 3; ++k) {
     from[k] = point[k] - image->origin[k];
   }
-  for (int a = 0; a < 3; ++a) { /* solve for the voxel by Cramer's rule */
+  for (int a = 0; a < 3; ++a) { /* solve for voxel[a] by Cramer's rule */
     double replaced[3][3];
     memcpy(replaced, image->step, sizeof replaced);
     memcpy(replaced[a], from, sizeof from);

@@ -79,8 +79,8 @@ void supine_image_gather(const supine_image *image, size_t from, const size_t *i
  * clipped. */
 void supine_image_put(supine_image *image, size_t begin, size_t count, const double *values);
 
-/** Change the axes assumed for the header's coordinates to `axes`, unless AUTO, and recompute the
- * origin and the steps. */
+/** Assume `axes` for the coordinates in the header, and recompute the origin and the steps. If
+ * `axes` is AUTO, change nothing. */
 void supine_image_set_axes(supine_image *image, supine_axes axes);
 
 /** Compute the centre of voxel `index` = i + size[0] (j + size[1] k), mm, LPS. */

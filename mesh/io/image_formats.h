@@ -10,12 +10,12 @@
 
 /* How a file stores its voxels. */
 typedef struct image_storage {
-  int64_t offset; /* bytes of the file that precede the voxels, packed or not */
-  int64_t skip;   /* bytes of the unpacked stream that precede the voxels */
+  int64_t offset; /* start of the voxel data, compressed or not, in the file, bytes */
+  int64_t skip;   /* bytes to skip at the start of the decompressed voxel data */
   bool packed;    /* whether the voxels are compressed by zlib or gzip */
   bool text;      /* whether the voxels are decimal numbers */
   bool big_endian;
-  int integer; /* 1 for signed, -1 for unsigned 64-bit integers, read as F64; 0 for others */
+  int integer; /* 1 or -1 if the file has signed or unsigned 64-bit integers; otherwise 0 */
   double slope, intercept; /* voxel = slope x number + intercept; not scaled if slope is 0 */
 } image_storage;
 

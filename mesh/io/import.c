@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Run assimp in a process of its own: on a corrupt file its importers may crash, leak, or exceed
- * their time or memory, which then ends only that process. */
+/* Run assimp in a process of its own: on a corrupt file its importers may crash, leak memory, or
+ * exceed their limits of time and memory. Then only that process ends. */
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -59,8 +59,8 @@ static supine_status import_fail(const char *path, const char *words, supine_err
     }
   }
   line[length] = '\0';
-  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: malformed: %s", path,
-                          length == 0 ? "the importer failed" : line);
+  return supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: malformed: %s; save the mesh as PLY",
+                          path, length == 0 ? "assimp gives no reason" : line);
 }
 
 /* Import the file at file->path or, unless `kind` is NULL, file->bytes in the format `kind`. */
@@ -136,7 +136,7 @@ static void confine(size_t bytes) {
   const struct rlimit none = {0, 0};
   (void)setrlimit(RLIMIT_CPU, &time);
   (void)setrlimit(RLIMIT_CORE, &none);
-#ifndef SUPINE_SANITIZED /* sanitizers reserve terabytes of addresses */
+#ifndef SUPINE_SANITIZED /* sanitizers need terabytes of addresses, so the limit is left out */
   const struct rlimit memory = {(rlim_t)GIGABYTES_MOST << 30, (rlim_t)GIGABYTES_MOST << 30};
   (void)setrlimit(RLIMIT_AS, &memory);
 #endif
@@ -198,7 +198,7 @@ static supine_status take_outcome(const char *path, FILE *stream, supine_mesh *m
     }
   }
   return supine_error_set(error, SUPINE_ERROR_FORMAT,
-                          "%s: malformed: the importer crashed or exceeded its time or memory; "
+                          "%s: malformed: assimp crashed, or exceeded its time or memory; "
                           "save the mesh as PLY or STL",
                           path);
 }
@@ -232,8 +232,8 @@ supine_status supine_mesh_import(mesh_file *file, supine_mesh *mesh, size_t *dro
 }
 
 /* Check that three numbers follow `keyword` in every line that begins with it, because assimp does
- * not. Return the number of the first wrong line, or 0. Also turn mtllib lines, which name a file
- * of colours, into comments, and set `last` to the first word of the last line. */
+ * not check this. Return the number of the first wrong line, or 0. Also turn mtllib lines, which
+ * name a file of colours, into comments, and set `last` to the first word of the last line. */
 static size_t check_lines(mesh_file *file, const char *keyword, mesh_text *last) {
   mesh_text text = {file->bytes, file->bytes + file->size};
   mesh_text line;

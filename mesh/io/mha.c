@@ -13,7 +13,7 @@
 
 enum { HEADER_MAX = 1 << 16 };
 
-/* MetaIO's MET_LONG has 4 bytes on every machine. */
+/* MetaIO's types of voxels. Its MET_LONG has 4 bytes on every machine. */
 static const struct {
   const char *name;
   supine_image_voxel voxel;
@@ -36,7 +36,7 @@ typedef struct header {
   size_t length; /* bytes before the voxels */
 } header;
 
-/* Return the last value of any of three keys, or "" if there is none; "" stands for no key. */
+/* Return the last value that has one of three keys, or "" if none has. Unused keys are "". */
 static const char *value_of(const header *h, const char *key, const char *second,
                             const char *third) {
   const char *value = "";

@@ -33,7 +33,7 @@ static supine_status teem_fails(const char *path, supine_error *error) {
       last = at[1] != '\0' ? at + 1 : last;
     }
   }
-  (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s", path,
+  (void)supine_error_set(error, SUPINE_ERROR_FORMAT, "%s: %s; write the image again", path,
                          last != NULL ? last : "malformed");
   free(text);
   return SUPINE_ERROR_FORMAT;

@@ -234,7 +234,7 @@ static supine_status take_items(ply *in, const element *of) {
   supine_status status = SUPINE_OK;
   for (uint64_t i = 0; status == SUPINE_OK && i < of->count; ++i) {
     if (in->encoding == ASCII && !supine_mesh_text_line(&in->text, &in->line)) {
-      return cut_short(in, of, i); /* each item has a line of its own */
+      return cut_short(in, of, i);
     }
     for (size_t p = 0; p < of->property_count && status == SUPINE_OK; ++p) {
       const property *item = &in->properties[of->first_property + p];

@@ -70,8 +70,8 @@ typedef struct mesh_faces {
   const char *path;
   supine_mesh *mesh;
   size_t capacity; /**< number of triangles that have been allocated */
-  size_t count;    /**< faces read, including points and lines */
-  size_t dropped;  /**< points and lines skipped */
+  size_t count;    /**< number of faces read, including points and lines */
+  size_t dropped;  /**< number of points and lines skipped */
 } mesh_faces;
 
 /** Cut a face into triangles, and add them. A face of more than MESH_CORNERS_MAX corners is refused
@@ -91,7 +91,7 @@ mesh_reader supine_mesh_read_ply;
 mesh_reader supine_mesh_read_vtp;
 mesh_reader supine_mesh_read_stl;
 mesh_reader supine_mesh_read_obj;
-/** Read any other format that assimp knows. */
+/** Read a format without a reader above through assimp. */
 mesh_reader supine_mesh_import;
 /** Return whether assimp is installed and imports this ending. */
 bool supine_mesh_import_knows(const char *ending);

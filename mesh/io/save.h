@@ -15,9 +15,9 @@ typedef struct mesh_writer {
   unsigned char source[3]; /**< axis of `mesh`, 0 to 2, that gives each coordinate of the file */
   double factor[3]; /**< sign of each coordinate (1 or -1), divided by the file's unit in mm */
   bool mirrored; /**< whether axes are left-handed: triangles are then written in reverse order */
-  double step;   /**< step of rounded lengths, in the file's unit; 0 for no rounding */
-  char space[4]; /**< letters of the axes: "LPS", "RAS", ... */
-  char unit[24]; /**< unit of lengths: "mm", "cm", ... */
+  double step; /**< lengths are rounded to multiples of this, in the file's unit; 0: not rounded */
+  char space[4];     /**< letters of the axes: "LPS", "RAS", ... */
+  char unit[24];     /**< unit of lengths: "mm", "cm", ... */
   char comment[256]; /**< one printable line, or "" */
 } mesh_writer;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Write VTK XML PolyData with compressed appended arrays, for one surface, or for a series:
- * surfaces with the same triangles, called frames. The arrays of a series are written frame by
- * frame. Then the head of the file is written a second time, with the offsets of the arrays. */
+/* Write VTK XML PolyData with compressed appended arrays, for one surface, or for a series
+ * of frames, which are surfaces with the same triangles. The arrays of a series are written frame
+ * by frame. Then the head of the file is written a second time, with the offsets of the arrays. */
 #include <stdlib.h>
 
 #include <libdeflate.h>
@@ -150,7 +150,7 @@ static void put_sizes(FILE *out, const uint64_t *sizes, size_t count) {
   }
 }
 
-/* Fill and compress the blocks begin <= i < end of the array file->packing. */
+/* Fill and compress blocks begin <= i < end of file->packing. A size of 0 means out of memory. */
 static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) {
   vtp *file = context;
   const vtp_array *array = file->packing;
@@ -164,7 +164,7 @@ static void pack_blocks(void *context, size_t begin, size_t end, size_t thread) 
       array->put(file, i * each + k, &at);
     }
     struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
-    file->sizes[3 + i] = /* 0 if out of memory */
+    file->sizes[3 + i] =
         compressor == NULL
             ? 0
             : libdeflate_zlib_compress(compressor, raw, (size_t)(at - raw),
@@ -267,7 +267,7 @@ static void write_field_data(const vtp *file, FILE *out) {
   (void)fputs("<FieldData>\n", out);
   write_text("SPACE", writer->space, out);
   write_text("units", units, out);
-  if (file->times != NULL) { /* readers take the name TimeValue for the time of a single frame */
+  if (file->times != NULL) {
     write_numbers(file, &(supine_mesh_field){"time_s", 1, file->times}, out);
   }
   for (size_t i = 0; i < writer->options.field_count; ++i) {

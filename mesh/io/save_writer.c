@@ -71,7 +71,7 @@ static double rounded(const mesh_writer *writer, double length) {
 }
 
 void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal[3]) {
-  static const double steps = 256.0; /* if lengths are rounded, normals are rounded to 1/256 */
+  static const double steps = 256.0; /* normals are rounded to multiples of 1 / steps */
   for (size_t axis = 0; axis < 3; ++axis) {
     const double value = (double)writer->options.normals[3 * i + writer->source[axis]];
     const double turned = copysign(value, value * writer->factor[axis]);
@@ -80,7 +80,7 @@ void supine_mesh_writer_normal(const mesh_writer *writer, size_t i, float normal
 }
 
 void supine_mesh_writer_position(const mesh_writer *writer, size_t i, float position[3]) {
-  for (size_t axis = 0; axis < 3; ++axis) { /* adding 0 turns -0 into 0 */
+  for (size_t axis = 0; axis < 3; ++axis) { /* + 0.0 turns -0.0 into 0.0 */
     position[axis] =
         (float)(rounded(writer, writer->factor[axis] *
                                     writer->mesh->vertices[3 * i + writer->source[axis]]) +

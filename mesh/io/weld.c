@@ -12,7 +12,7 @@ static uint64_t hash_position(const double position[3]) {
   uint64_t bits[3];
   memcpy(bits, position, sizeof bits);
   uint64_t hash = 0;
-  for (int k = 0; k < 3; ++k) { /* mix the high bits into the low bits */
+  for (int k = 0; k < 3; ++k) {
     hash = (hash ^ bits[k]) * UINT64_C(0x9E3779B97F4A7C15);
     hash ^= hash >> 32;
   }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Choose the side of each label: the left lung, the right lung, either or none. */
+/* Choose the side of each label: left lung, right lung, both (split later), or none. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,7 +64,7 @@ static void list_labels(const labels_tally *tally, const uint8_t *side, uint8_t 
   }
 }
 
-/* Give the labels in a text such as "10+11" the side `value`. Return their end, NULL if invalid. */
+/* Parse labels such as "10+11", and set the side of each. Return their end; NULL if invalid. */
 static const char *read_sum(const char *at, uint8_t value, uint8_t *side) {
   for (;; ++at) {
     char *end;

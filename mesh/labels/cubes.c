@@ -54,7 +54,7 @@ static void average_rows(const labels_mask *mask, size_t m, double ratio, float 
   }
 }
 
-static const float half = 0.5F; /* a cube is inside if its share is at least this */
+static const float half = 0.5F; /* a cube is inside if at least this share of it is in the mask */
 /* Shares are rounded to multiples of 1 / levels, so that they are equal on all processors. */
 static const float levels = 65536.0F;
 

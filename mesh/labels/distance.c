@@ -8,11 +8,11 @@
 #include "mesh/labels/mask.h"
 #include "sh/base/parallel.h"
 
-static const float far_away = 1e30F; /* squared distance in a row without voxels of the set, mm^2 */
+static const float far_away = 1e30F; /* stands for an infinite squared distance, mm^2 */
 
 typedef struct sweep {
   const labels_mask *mask;
-  bool zero; /* whether zero voxels, rather than nonzero voxels, form the set */
+  bool zero; /* whether to find distances to zero voxels, rather than to nonzero voxels */
   float *squares;
   int axis;
   size_t length; /* larger of the mask's size[1] and size[2] */
@@ -119,7 +119,7 @@ supine_status supine_labels_close(labels_mask *mask, double radius, size_t *adde
     free(squares);
     return SUPINE_ERROR_MEMORY;
   }
-  for (size_t i = 0; i < count; ++i) { /* 2 marks voxels outside the mask but within the radius */
+  for (size_t i = 0; i < count; ++i) { /* 2: outside the mask but within `radius` */
     mask->at[i] = mask->at[i] != 0 ? 1 : squares[i] <= reach ? 2 : 0;
   }
   const supine_status status = supine_labels_distance(mask, true, squares);

@@ -206,7 +206,7 @@ static void leave_other(const labels_mask *both, uint8_t value, labels_mask *mas
   }
 }
 
-/* Close gaps up to the width in the options, keep the largest piece, and fill its cavities. */
+/* Close gaps as the options say, keep the largest piece, and fill its cavities. */
 static supine_status clean(const work *w, uint8_t value, labels_mask *mask,
                            supine_labels_lung *lung) {
   const double ml = supine_labels_voxel_ml(mask);

@@ -18,22 +18,22 @@ typedef struct supine_labels_options {
   const char *labels;
   supine_axes axes; /**< axes of the header's coordinates; AUTO for those that the header names */
   double edge;      /**< approximate distance between vertices, mm; 0 for SUPINE_LABELS_EDGE */
-  double close;     /**< gaps up to twice this width are closed, mm; 0 for none */
+  double close;     /**< half the width of the widest gaps to close, mm; 0 closes none */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;
 } supine_labels_options;
 
-/** Voxels and surface of one lung. Volumes in mL. */
+/** Voxels and surface of one lung. */
 typedef struct supine_labels_lung {
   int side;        /**< +1 left, -1 right */
-  double mask;     /**< volume of the voxels that the surface is made from */
-  double closed;   /**< volume added by closing */
+  double mask;     /**< volume of the voxels that the surface is made from, mL */
+  double closed;   /**< volume added by closing gaps, mL */
   size_t islands;  /**< number of pieces dropped */
-  double dropped;  /**< volume of the pieces dropped */
+  double dropped;  /**< volume of the pieces dropped, mL */
   size_t cavities; /**< number of cavities filled */
-  double filled;   /**< volume of the cavities filled */
-  double surface;  /**< volume that the surface encloses */
+  double filled;   /**< volume of the cavities filled, mL */
+  double surface;  /**< volume that the surface encloses, mL */
   long tunnels;    /**< genus of the surface: number of tunnels through the lung */
   bool cut;        /**< whether the lung reaches the image's border, where it is cut off */
 } supine_labels_lung;
@@ -41,8 +41,8 @@ typedef struct supine_labels_lung {
 /** Geometry and labels of a map, and how touching lungs were split. */
 typedef struct supine_labels_report {
   size_t size[3];
-  double spacing[3];  /**< distances between voxels, mm */
-  char axes[64];      /**< such as "i to the left, j to the back, k to the head" */
+  double spacing[3]; /**< distances between voxels, mm */
+  char axes[64];     /**< the image's axes, such as "i to the left, j to the back, k to the head" */
   const char *source; /**< header field that gives origin and steps, such as "sform" */
   bool frames_differ; /**< whether qform and sform of a NIfTI header differ */
   char taken[256];    /**< labels of each side, such as "2 left; 1 right (convention lungmask)" */
@@ -68,8 +68,8 @@ typedef struct supine_labels_report {
  *             large
  * @retval SUPINE_ERROR_FORMAT    voxels that are not labels, images that differ in size or frame
  * @retval SUPINE_ERROR_INTERRUPTED, SUPINE_ERROR_MEMORY, and the statuses of supine_image_read
- * Memory: the map and 1 byte per voxel. To split lungs takes 10 bytes more per voxel of the lungs'
- * box, to close gaps 4 bytes more. */
+ * Memory: the map and 1 byte per voxel. Splitting lungs takes 10 bytes more per voxel of the
+ * lungs' box, and closing gaps takes 4 bytes more. */
 supine_status supine_labels_surfaces(const char *const *paths, size_t count,
                                      const supine_labels_options *options, supine_mesh *surfaces,
                                      supine_labels_report *report, supine_error *error);

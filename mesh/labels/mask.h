@@ -18,7 +18,7 @@ typedef struct labels_mask {
   uint8_t *at;       /**< [size[2], size[1], size[0]] values */
 } labels_mask;
 
-enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* EITHER: not yet split */
+enum { LABELS_LEFT = 1, LABELS_RIGHT = 2, LABELS_EITHER = 3 }; /* EITHER: side not yet known */
 
 /* ---- mask.c ---- */
 size_t supine_labels_mask_count(const labels_mask *mask);
@@ -119,7 +119,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
 
 /* ---- cubes.c ---- */
 
-/** Share of each cube that is inside the mask. */
+/** Cubes, with the share of each that is inside the mask. */
 typedef struct labels_cubes {
   size_t size[3];
   double origin[3]; /**< centre of cube 0, in voxels of the mask */

@@ -27,7 +27,7 @@ static const float half = 0.5F;
 typedef struct build {
   const labels_cubes *cubes;
   size_t stride[3]; /* index step from a cube to the next along each axis */
-  uint32_t *vertex; /* [cubes] vertex of the cell whose first cube this is, if there is a vertex */
+  uint32_t *vertex; /* [cubes] vertex of the cell that starts at this cube; unset if it has none */
   surface_net *net;
 } build;
 
@@ -162,7 +162,7 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
     net_free(&made);
     return SUPINE_ERROR_MEMORY;
   }
-  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* all NONE */
+  memset(made.neighbour, 0xFF, made.count * sizeof *made.neighbour); /* sets all to NONE */
   find_vertices(&b, true);
   find_quads(&b, true);
   free(b.vertex);
@@ -170,8 +170,8 @@ static supine_status create(const labels_cubes *cubes, surface_net *net) {
   return SUPINE_OK;
 }
 
-/* Factors of smoothing by shrinking and inflation. Their pass band, 1 / 0.5 - 1 / 0.51 = 0.04,
- * keeps waves longer than some 16 cubes and removes the steps between slices. */
+/* Factors of smoothing by shrinking and inflation. The filter's pass band, 1 / 0.5 - 1 / 0.51 =
+ * 0.04, keeps waves longer than some 16 cubes and removes the steps between slices. */
 static const double shrink = 0.5;
 static const double swell = -0.51;
 enum { TURNS = 40 }; /* number of times that the net is shrunk and inflated */

@@ -12,10 +12,10 @@ typedef struct supine_labels_shape {
 } supine_labels_shape;
 
 /** Make the surfaces of labels of a map (.nrrd, .nii, .nii.gz, .mha), as supine_labels_surfaces
- * does, but with all pieces and cavities. Vertices are about one voxel apart; in a large part, 1/50
- * of the cube root of the part's volume.
+ * does, but keep all pieces and cavities. Vertices are about one voxel apart. In a large part, they
+ * are 1/50 of the cube root of the part's volume apart.
  * @param wanted  [wanted_count] labels, 1 to 65535; all labels present if the count is 0
- * @param parts   [*count] output in the order of `wanted`, or by label; release with
+ * @param parts   [*count] output in the order of `wanted`, or by ascending label; release with
  *             supine_labels_shapes_free
  * @retval SUPINE_ERROR_MESH    a label has no voxels, all voxels are 0, or more than 256 labels are
  *             present but none is named

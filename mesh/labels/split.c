@@ -9,7 +9,7 @@
 
 /* Smallest accepted ratio of the smaller lung's volume to the larger lung's volume. */
 static const double least_share = 0.1;
-/* Widest bridge between touching lungs that is cut, mm. */
+/* A bridge between touching lungs is cut if it is at most this wide, mm. */
 static const double widest_neck = 40.0;
 
 typedef struct pair {
@@ -115,7 +115,7 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
        depth += step) {
     labels_pieces pieces = {0};
     pair found;
-    if (depth == step) { /* the lungs touch: compute the depth of each voxel */
+    if (depth == step) { /* first erosion: compute the depth of each voxel */
       status = supine_labels_distance(both, true, squares);
     }
     erode(both, squares, depth, eroded.at);

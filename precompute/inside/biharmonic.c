@@ -133,7 +133,7 @@ static lapack_int factorise(kernel *k) {
  *     K y = f,    K z = P,    (P^T z) b = P^T y,    w = y - z b
  *
  * The weights are stored as -w, then b.
- * @param p  P [4, size], then f [R, size], each column by column; overwritten by z and y
+ * @param p  P, then f, each column by column, size numbers in each; overwritten by z, then y
  * @retval SUPINE_ERROR_NUMERICAL  K or P^T z is singular: all centres lie in one plane */
 static supine_status find_weights(supine_inside_biharmonic *fit, kernel *k, double *p) {
   static const double flat = 1e-5;
@@ -237,7 +237,7 @@ typedef struct evaluation {
   size_t count;
 } evaluation;
 
-/* Add the terms of the centres first <= j < last to the values of point_count points x. */
+/* Add the terms w_j |x - p_j| of the centres first <= j < last to the values at the points x. */
 SUPINE_CLONES static void add_centres(const supine_inside_biharmonic *fit, size_t first,
                                       size_t last, const double (*x)[POINTS], size_t point_count,
                                       double *values) {

@@ -14,11 +14,11 @@
 
 /** Zero-initialise for supine_inside_biharmonic_fit; supine_inside_biharmonic_free frees it. */
 typedef struct supine_inside_biharmonic {
-  size_t count;     /**< number of centres, M */
-  size_t columns;   /**< number of values per point, R */
-  size_t *chosen;   /**< [M] indices of the centres among the points, in order of choice */
-  double *centres;  /**< [M, 3] positions relative to `middle`, divided by `unit` */
-  double *weights;  /**< [R, M + 4] factors of the distances from centres, then of 1, x, y, z */
+  size_t count;     /**< number of centres */
+  size_t columns;   /**< number of values per point */
+  size_t *chosen;   /**< [count] indices of the centres among the points, in order of choice */
+  double *centres;  /**< [count, 3] positions relative to `middle`, divided by `unit` */
+  double *weights;  /**< [columns, count + 4] factors of distances from centres and of 1, x, y, z */
   double middle[3]; /**< centre of the points' box, mm */
   double unit;      /**< half the diagonal of the points' box, mm */
   double spacing;   /**< largest distance of any point from the centre nearest to it, mm */
@@ -31,8 +31,8 @@ typedef struct supine_inside_biharmonic {
  * @param values  [count, columns]
  * @retval SUPINE_ERROR_NUMERICAL  the points lie in one plane
  * @retval SUPINE_ERROR_MEMORY
- * Cost: count x M distances to choose; M^3 / 6 multiplications to factorise one matrix of 8 M^2
- * bytes, of which half are used. */
+ * Cost: count x M distances to choose M centres; M^3 / 6 multiplications to factorise a matrix of
+ * 8 M^2 bytes, of which half are used. */
 supine_status supine_inside_biharmonic_fit(size_t count, const double *points, size_t columns,
                                            const double *values, size_t centre_max,
                                            supine_inside_biharmonic *fit, supine_error *error);
@@ -41,7 +41,7 @@ void supine_inside_biharmonic_free(supine_inside_biharmonic *fit);
 /** Evaluate the interpolation.
  * @param points  [count, 3] mm
  * @param values  [count, columns], written
- * Cost: M square roots and M R multiplications for each point. */
+ * Cost: a square root and `columns` multiplications for each pair of a point and a centre. */
 void supine_inside_biharmonic_evaluate(const supine_inside_biharmonic *fit, size_t count,
                                        const double *points, double *values);
 

@@ -11,7 +11,7 @@
 typedef struct supine_inside_content {
   size_t count;
   double *points; /**< [count, 3] mm, LPS */
-  uint32_t *part; /**< [count] index of the part; in a grid, of the node as a voxel of `grid` */
+  uint32_t *part; /**< [count] index of the point's part or, in a grid, of its node */
   size_t triangle_count;
   uint32_t *triangles; /**< [triangle_count, 3] indices of points */
   size_t part_count;   /**< number of named parts; 0 for a grid */
@@ -43,10 +43,10 @@ supine_status supine_inside_content_surface(const char *name, const supine_mesh 
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);
 
-/** Make a grid of all nodes inside the lungs, and of the nodes outside whose distance is less than
- * the sum of a cell's three edges, so that every point inside lies between nodes.
+/** Make a grid of all nodes inside the lungs, and of the nodes outside that are nearer to a lung
+ * than the sum of a cell's three edges, so that every point inside lies between nodes.
  *
- * @param like     image of which every n-th voxel along each axis is a node; NULL for axes x, y, z
+ * @param like     image of which every n-th voxel along each axis is a node; NULL: along x, y, z
  * @param spacing  distance between nodes, mm; with `like`, rounded to a multiple of its spacing
  * @param margin   distance, mm, by which the grid extends beyond the lungs' box
  * @param content  zero-initialised

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Choose the nodes of a grid that lie inside the lungs, row by row. */
+/* Choose the nodes of a grid that lie inside the lungs or just outside, row by row. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -80,7 +80,7 @@ static supine_status make_grid(const supine_inside_shells *shells, const supine_
 typedef struct search {
   const supine_inside_shells *shells;
   const supine_image *grid;
-  double limit;        /* largest distance of a kept node from the lungs, mm */
+  double limit;        /* nodes farther from the lungs than this, mm, are dropped */
   unsigned char *keep; /* [nodes] 2 inside a lung, 1 outside but within the limit, 0 dropped */
 } search;
 
@@ -135,15 +135,15 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
                                          supine_inside_content *content, supine_error *error) {
   supine_image grid = {0};
   if (!(spacing > 0.0) || !isfinite(spacing)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a grid of %g mm: give a spacing above 0",
-                            spacing);
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the grid's spacing is %g mm: give one above 0", spacing);
   }
   supine_status status = make_grid(shells, like, spacing, margin, &grid, error);
   if (status != SUPINE_OK) {
     return status;
   }
   double diagonal = 0.0;
-  for (int k = 0; k < 3; ++k) { /* upper bound: the sum of a cell's three edges */
+  for (int k = 0; k < 3; ++k) {
     diagonal += supine_length(grid.step[k]);
   }
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];

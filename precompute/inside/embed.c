@@ -19,17 +19,17 @@ typedef struct embedding {
   const supine_inside_shells *shells;
   const supine_inside_content *content;
   const supine_inside_options *options;
-  size_t columns;             /* numbers for each point: 3 K for K modes */
-  supine_inside_place *place; /* [N] place of each point in its lung, in the content's order */
-  unsigned char *lung;        /* [N] lung of each point, in the content's order */
-  size_t *order;              /* [N] indices of the content's points, lung by lung */
-  float *vertices;            /* [N, 3] at full inflation, mm; sorted, like all below, by `order` */
-  float *coefficients;        /* [N, 3, K] displacement by each mode, mm */
-  float *depth;               /* [N] mm below the surface; negative outside */
-  uint32_t *part;             /* [N] index of the part */
-  unsigned char *group;       /* [N] index of the lung */
-  uint32_t *triangles;        /* [M, 3] indices of vertices */
-  uint32_t *rigid; /* [rigid_count, 2] begin and end of the vertices of each rigid part */
+  size_t columns;             /* numbers for each point: 3 for each mode */
+  supine_inside_place *place; /* place of each point in its lung, in the content's order */
+  unsigned char *lung;        /* lung of each point, in the content's order */
+  size_t *order;              /* indices of the content's points, lung by lung */
+  float *vertices;      /* [points, 3] at full inflation, mm; sorted by `order`, as are all below */
+  float *coefficients;  /* [points, 3, modes] displacement by each mode, mm */
+  float *depth;         /* [points] mm below the surface; negative outside */
+  uint32_t *part;       /* [points] index of the part */
+  unsigned char *group; /* [points] index of the lung */
+  uint32_t *triangles;  /* [triangles, 3] indices of vertices */
+  uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;
 } embedding;
 
@@ -99,7 +99,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report) {
     while (end < n && e->part[end] == e->part[begin]) {
       ++end;
     }
-    if (e->content->rigid[e->part[begin]] && end > begin + 1) { /* a single point does not rotate */
+    if (e->content->rigid[e->part[begin]] && end > begin + 1) {
       e->rigid[2 * e->rigid_count] = (uint32_t)begin;
       e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
     }
@@ -122,7 +122,7 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
   }
 }
 
-/* Compute vertices begin <= i < end at full inflation from displacements `values` by each mode. */
+/* Compute vertices at full inflation: positions in the scan minus displacements in the scan. */
 static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
                            const double *values) {
   const size_t modes = e->columns / 3;
@@ -183,7 +183,8 @@ static void move_block(embedding *e, const double *displacement,
 
 static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t end,
                                 supine_error *error) {
-  static const double reach_spacings = 2.0; /* reach (embed.h) / (centres' spacing + mean edge) */
+  /* `reach` of embed.h, divided by the sum of the centres' spacing and the surface's mean edge */
+  static const double reach_spacings = 2.0;
   const supine_inside_shell *shell = &e->shells->shell[lung];
   const size_t centres =
       e->options->centres > 0 ? e->options->centres : (size_t)SUPINE_INSIDE_CENTRES;
@@ -211,9 +212,9 @@ cleanup:
   return status;
 }
 
-/* Find a rigid part at full inflation: its shape in the scan, rotated and shifted so that the
- * displacement in the scan moves it back there. The rotation is found by iteration, because the
- * rotation by the displacement depends on it. */
+/* Rotate and shift a rigid part to full inflation, so that the pose of the scan moves the part to
+ * the place that it has in the scan. Iterate, because the rotation by that pose depends on the
+ * result. */
 static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
@@ -229,7 +230,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double *scan = e->content->points + 3 * e->order[i];
       double p[3];
-      for (size_t a = 0; a < 3; ++a) { /* rotate by the transpose of r */
+      for (size_t a = 0; a < 3; ++a) {
         p[a] = r[a] * (scan[0] - given[0]) + r[3 + a] * (scan[1] - given[1]) +
                r[6 + a] * (scan[2] - given[2]);
       }
@@ -246,7 +247,7 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   }
 }
 
-/* Return whether metadata with this key describes the surface and is not valid for its content. */
+/* Return whether metadata with this key is valid for the lungs' surface but not for the content. */
 static bool is_of_surface(const char *key) {
   static const char *const keys[] = {"kind", "made_by", "checksum", "turned_over_percent",
                                      "mode_count"};
@@ -363,9 +364,9 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
     return supine_error_set(error, SUPINE_ERROR_MESH, "nothing to embed: give content with points");
   }
   if (!allocate(&e)) {
-    status =
-        supine_error_set(error, SUPINE_ERROR_MEMORY, "no memory for %zu points of %zu coefficients",
-                         content->count, e.columns);
+    status = supine_error_set(error, SUPINE_ERROR_MEMORY,
+                              "no memory for %zu points, each with %zu coefficients",
+                              content->count, e.columns);
     goto cleanup;
   }
   supine_parallel_for(content->count, GRAIN, 0, find_places, &e);

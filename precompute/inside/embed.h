@@ -39,16 +39,16 @@ typedef struct supine_inside_report {
   size_t in_lung[SUPINE_LUNGS_MAX]; /**< number of points in or nearest to each lung */
   size_t outside;                   /**< number of points outside every lung */
   size_t farthest;    /**< index of the outside point that is farthest from the lungs */
-  double farthest_mm; /**< distance of that point from the lungs, mm */
+  double farthest_mm; /**< distance of the farthest outside point from the lungs, mm */
   size_t rigid;       /**< number of rigid parts of more than one vertex */
 } supine_inside_report;
 
 /** Embed content in the lungs of an open basis, and write a basis file of the content, with these
- * additional tensors
+ * additional tensors, for N points and R rigid parts:
  *
- *     part       U32 [N]     index of the point's name; for a grid, of its node
+ *     part       U32 [N]     index of the point's part; for a grid, of its node
  *     depth      F32 [N]     mm below the surface in the scan, negative outside
- *     names      U8 [.]      names of the parts, separated by newlines (not for a grid)
+ *     names      U8 [bytes]  names of the parts, separated by newlines (not for a grid)
  *     rigid      U32 [R, 2]  vertices begin <= i < end of each rigid part (if there are any)
  *     grid       F64 [4, 3]  origin and the three steps, mm (for a grid)
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)

@@ -19,7 +19,7 @@ static double mean_edge(const supine_inside_shell *shell) {
 }
 
 /* Extract one lung's surface.
- * @param scanned  [N, 3] positions of the basis's vertices in the scan, mm */
+ * @param scanned  [vertices, 3] positions of the basis's vertices in the scan, mm */
 static supine_status create_shell(const supine_basis_info *info, const float *scanned, size_t lung,
                                   supine_inside_shell *shell, supine_error *error) {
   const size_t begin = info->lung_begin[lung];
@@ -123,8 +123,8 @@ void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t
   }
 }
 
-/* Update the walk's place in one lung for a new point, unless the last place implies that the point
- * is farther than `far` from the surface, on the same side as the last point. */
+/* Update walk->place[lung] for a new point. Keep the old place if it proves that the new point is
+ * on the same side of the surface as the old point, and farther than `far` from the surface. */
 static void step_to(const supine_inside_shells *shells, const double point[3], size_t lung,
                     double far, supine_inside_walk *walk) {
   supine_inside_place *place = &walk->place[lung];

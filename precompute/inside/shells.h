@@ -42,7 +42,7 @@ void supine_inside_shells_free(supine_inside_shells *shells);
 void supine_inside_shell_displacement(const supine_inside_shells *shells, size_t lung,
                                       double *displacement);
 
-/** Memory of a search for successive nearby points: a place found before in each lung. */
+/** The last places that a search found in each lung, to search faster for a point nearby. */
 typedef struct supine_inside_walk {
   bool known[SUPINE_LUNGS_MAX];
   supine_inside_place place[SUPINE_LUNGS_MAX]; /**< [lung] place of an earlier point */
@@ -51,8 +51,8 @@ typedef struct supine_inside_walk {
 
 /** Return the lung that a point is in, or the nearest lung; walk->place[lung] is the point's place.
  * @param walk  zeroed for the first point
- * @param far   mm; if the surface is farther, the place may be that of an earlier point on the same
- *             side; with INFINITY, it is always that of the point itself */
+ * @param far   mm; for a point farther from the surface than this, the place may be that of an
+ *             earlier point on the same side; with INFINITY, it is always the point's own place */
 size_t supine_inside_shells_find(const supine_inside_shells *shells, const double point[3],
                                  double far, supine_inside_walk *walk);
 

@@ -12,8 +12,8 @@
 
 enum { LEAF = 8, DISTANCE_GRAIN = 64 };
 
-/* Distance of a box, in radii of the box, beyond which a dipole replaces its triangles. The
- * error of the winding number, which is compared with 0.5, is then less than 0.01. */
+/* A dipole replaces the triangles of a box that is farther away than this many radii of the box.
+ * The error of the winding number, which is compared with 0.5, is then less than 0.01. */
 static const double dipole_distance = 2.0;
 /* Points nearer than this, mm, count as on the surface, as positions are in float32. */
 static const double on_surface = 1e-3;
@@ -28,7 +28,7 @@ typedef struct node {
 /* The dipole that replaces the triangles of a node for a distant point. */
 typedef struct dipole {
   double area, centre[3]; /* area, mm^2, and its centre, mm */
-  double normal[3];       /* sum of the triangles' unit normals times their areas, mm^2 */
+  double normal[3];       /* sum of the triangles' unit normals, each times its area, mm^2 */
   double radius;          /* radius of a ball about `centre` that contains the box, mm */
 } dipole;
 
@@ -247,10 +247,11 @@ static double along(const double offset[3], const double edge[3]) {
 }
 
 /* Find the barycentric coordinates b of the point nearest to x in a triangle. Return false, with b
- * undefined, if its squared distance from x certainly exceeds `best`. */
+ * undefined, if the triangle's squared distance from x certainly exceeds `best`. */
 static bool nearest_in_triangle(const double *const p[3], const double x[3], double best,
                                 double b[3]) {
-  static const double slender = 1e-4; /* squared sine of p[0]'s angle below which b is inexact */
+  /* If the squared sine of the angle at corner p[0] is below this, b is inexact. */
+  static const double slender = 1e-4;
   double u[3];
   double v[3];
   double w[3];
@@ -266,13 +267,12 @@ static bool nearest_in_triangle(const double *const p[3], const double x[3], dou
   b[1] = (vv * uw - uv * vw) / determinant;
   b[2] = (uu * vw - uv * uw) / determinant;
   b[0] = 1.0 - b[1] - b[2];
-  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) { /* false for NaN: a triangle without area */
+  if (b[0] >= 0.0 && b[1] >= 0.0 && b[2] >= 0.0) {
     return true;
   }
   const double ww = supine_dot(w, w);
   const double opposite_square[3] = {uu + vv - 2.0 * uv, vv, uu};
-  /* Squared distance from x's projection beyond which the triangle is farther from x than
-   * sqrt(best). */
+  /* best minus the squared distance of x from the triangle's plane, plus a rounding margin */
   const double limit = best + 1e-9 * ww - (ww - b[1] * uw - b[2] * vw);
   bool farther = false;
   for (int k = 0; k < 3; ++k) {
@@ -424,7 +424,7 @@ supine_inside_place supine_inside_surface_nearest(const supine_inside_surface *s
                                                   const supine_inside_place *near) {
   supine_inside_place place = {.point = {point[0], point[1], point[2]}};
   double best = INFINITY;
-  if (near != NULL) { /* `near` gives an upper bound of the distance */
+  if (near != NULL) {
     const double limit =
         (fabs(near->depth) + supine_distance(point, near->point)) * (1.0 + 1e-9) + 1e-9;
     best = limit * limit;
@@ -467,7 +467,7 @@ supine_inside_place supine_inside_surface_find(const supine_inside_surface *surf
   supine_inside_place place = supine_inside_surface_nearest(surface, point, near);
   const bool inside = place.depth <= on_surface ||
                       (near != NULL && supine_distance(point, near->point) < fabs(near->depth)
-                           ? near->depth > 0.0 /* on the same side as `near` */
+                           ? near->depth > 0.0
                            : angle(surface, 0, point) > half);
   place.depth = inside ? place.depth : -place.depth;
   return place;

@@ -21,7 +21,7 @@ typedef struct supine_inside_place {
 } supine_inside_place;
 
 /** Build a tree of boxes over the triangles.
- * @param vertices   [., 3] mm, must outlive the tree
+ * @param vertices   [vertices, 3] mm, must outlive the tree
  * @param triangles  [count, 3], 0 < count < 2^31, facing outwards; must outlive the tree
  * @param sides      whether supine_inside_surface_find will be called, which needs more memory
  * @retval SUPINE_ERROR_MEMORY */

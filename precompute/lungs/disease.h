@@ -29,7 +29,7 @@ typedef struct supine_lesion {
  * not change how other tissue moves at a given depth of the breath; at a given volume of the lungs,
  * all displacements grow by one ratio, to make up for the lesion.
  *
- * @param reached  optional output: number of vertices nearer than the radius; if 0, no effect
+ * @param reached  optional output: number of vertices nearer to the lesion's centre than the radius
  * @retval SUPINE_ERROR_ARGUMENT  a centre that is not finite, a radius or factor that is not
  *             positive and finite */
 supine_status supine_tissue_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,

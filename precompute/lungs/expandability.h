@@ -3,27 +3,26 @@
  * Regional alveolar expandability a ([Santhanam2008] III-E): how readily each part of a lung
  * expands. The stiffness of a mass node is E = 1/a.
  *
- * Only ratios count, as E is scaled to geometric mean 1. Vertices are in the model's order
- * (lungs.h): the left lung's first, and within each lung in the order in which its file first names
- * them. */
+ * Only ratios count, as E is scaled to geometric mean 1. Vertices are in the order of lungs.h: the
+ * left lung's first, and within each lung in the order in which its file first names them. */
 #ifndef SUPINE_EXPANDABILITY_H
 #define SUPINE_EXPANDABILITY_H
 
 #include "precompute/lungs/lungs.h"
 
-/** Expandability a as a function of a box coordinate t. */
+/** Expandability a along a box coordinate t, 0 to 1, with the values `from` at 0 and `to` at 1. */
 typedef enum supine_expandability_shape {
-  SUPINE_EXPANDABILITY_UNIFORM = 0, /**< a = 1 */
-  SUPINE_EXPANDABILITY_LINEAR,      /**< a = from + (to - from) t */
-  SUPINE_EXPANDABILITY_EXPONENTIAL  /**< a = from (to / from)^t */
+  SUPINE_EXPANDABILITY_UNIFORM = 0, /**< 1 everywhere */
+  SUPINE_EXPANDABILITY_LINEAR,      /**< from + (to - from) t at the box coordinate t */
+  SUPINE_EXPANDABILITY_EXPONENTIAL  /**< from (to / from)^t at the box coordinate t */
 } supine_expandability_shape;
 
 /** A regional model of expandability. t is a box coordinate (lungs.h), 0 to 1: axis 0 from the
  * midline outwards, 1 from the back to the front, 2 from the apex to the base. */
 typedef struct supine_expandability_law {
   supine_expandability_shape shape;
-  int axis;        /**< 0, 1 or 2 */
-  double from, to; /**< values of a, > 0, at t = 0 and at t = 1 */
+  int axis;        /**< axis of t: 0, 1 or 2 */
+  double from, to; /**< expandability, > 0, at t = 0 and at t = 1 */
 } supine_expandability_law;
 
 /** Compute the expandability a [N] of all vertices by a regional model that is not UNIFORM. */
@@ -31,11 +30,11 @@ void supine_tissue_expandability_regional(const supine_lungs *lungs,
                                           const supine_expandability_law *law, double *a);
 
 /** Read the expandability a [count] from the column `expandability` of a CSV file. Lines are in the
- * model's order, or in any order if a column `vertex` numbers the vertices from 0. Empty lines, and
- * lines that begin with #, are skipped.
+ * order of the vertices, or in any order if a column `vertex` numbers the vertices from 0. Empty
+ * lines, and lines that begin with #, are skipped.
  * @retval SUPINE_ERROR_READ    the file is missing or unreadable
  * @retval SUPINE_ERROR_FORMAT  a value that is missing or not positive and finite, a vertex twice
- *             or not in the model: the message names line and vertex
+ *             or out of range: the message names line and vertex
  * @retval SUPINE_ERROR_MEMORY */
 supine_status supine_tissue_expandability_load(const char *path, size_t count, double *a,
                                                supine_error *error);

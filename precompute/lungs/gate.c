@@ -50,7 +50,7 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
                         name, specks, plural(specks), 100.0 * speck_share, pieces,
                         pieces == 1 ? " is" : "s are");
   }
-  if (pieces > 6) { /* more than the five lobes of two lungs and one other piece */
+  if (pieces > 6) { /* five lobes and one other piece are plausible */
     supine_findings_add(findings, "%s: warning: %zu pieces; remove those that are not lung", name,
                         pieces);
   }

@@ -14,7 +14,7 @@ typedef struct supine_lungs_source {
   supine_axes axes; /**< axes of all files; AUTO if they differ */
   bool axes_given;
   bool units_given;
-  const double *midline; /**< x of the midline, mm, or NULL (supine_lungs_create) */
+  const double *midline; /**< x of the midline, mm; NULL to find it from the lungs */
 } supine_lungs_source;
 
 /** Repair and check surfaces, and join them into lungs.

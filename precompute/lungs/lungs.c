@@ -8,15 +8,14 @@
 
 /* A component with less than this share of the vertices does not count as a lung. */
 static const double significant_share = 0.05;
-/* Two surfaces are the same lung if the positions of their boxes' faces differ by less than this
- * share of the longest side: by thousandths if one lung is meshed at two resolutions, but by far
- * more for two lobes or lungs. */
+/* Two surfaces are the same lung if the faces of their bounding boxes differ in position by at most
+ * this share of the longest side. Two meshes of one lung differ by thousandths. */
 static const double same_box_share = 0.01;
-/* Least ratio of the longest sides of two surfaces: lobes and lungs of one chest differ by less
- * than a factor of ten. */
+/* A surface is refused if its longest side is less than this share of another surface's longest
+ * side. The lobes and lungs of one chest differ by less than a factor of ten. */
 static const double least_side_share = 0.05;
-/* Largest ratio of a lung's extent beyond the midline to its extent on its own side: lungs reach
- * across the midline behind the breastbone. */
+/* A midline is refused if a lung reaches farther beyond it than this share of the lung's extent on
+ * its own side. Lungs do reach across the midline behind the breastbone. */
 static const double most_beyond_share = 0.5;
 
 /* A surface and the mean x of its vertices. Surfaces are joined from left to right. */
@@ -49,7 +48,7 @@ static supine_status join(const supine_mesh *meshes, size_t count, supine_mesh *
   }
   if (count == 0 || triangles == 0 || vertices == 0) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
-                            "the model has no triangles: give a closed surface");
+                            "the surface has no triangles: give a closed surface");
   }
   if (vertices > UINT32_MAX) {
     return supine_error_set(error, SUPINE_ERROR_MESH,
@@ -278,7 +277,8 @@ supine_status supine_lungs_create(const supine_mesh *meshes, size_t count, const
                                   supine_lungs *lungs, supine_error *error) {
   supine_lungs made = {0};
   if (midline != NULL && !isfinite(*midline)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give a finite midline");
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "the midline is %g: give its x in mm",
+                            *midline);
   }
   supine_status status = check_surfaces(meshes, count, error);
   status = status == SUPINE_OK ? join(meshes, count, &made.mesh, error) : status;

@@ -14,21 +14,21 @@ typedef struct supine_lungs {
   size_t lung_count;        /**< 1 or 2 */
   size_t lung_begin[3];     /**< lung j: lung_begin[j] <= vertex < lung_begin[j + 1] */
   size_t triangle_begin[3]; /**< lung j: triangle_begin[j] <= triangle < triangle_begin[j + 1] */
-  int side[2];              /**< +1 left, -1 right */
+  int side[2];              /**< [lung] +1 left, -1 right */
   bool reversed[2];         /**< whether the lung's triangles faced inwards and were reversed */
   double minimum[3];        /**< bounding box over all lungs, mm */
   double maximum[3];
-  double *scanned; /**< [N, 3] vertices in the scan, mm, if `mesh` is at full inflation instead;
-                      otherwise NULL */
+  double *scanned; /**< [vertices, 3] positions in the scan, mm, if `mesh` shows full inflation
+                      instead of the scan; otherwise NULL */
   double midline;  /**< x of the sagittal plane where the box coordinate X is 0, mm */
 } supine_lungs;
 
-/** Join surfaces into a model.
+/** Join surfaces into one or two lungs.
  *
- * Components whose centres lie left and right of the box's centre, and that hardly overlap in x,
- * are two lungs; otherwise all of them are one lung. The midline is the box's centre for two lungs
- * and the face of the box nearest x = 0 for one. If the triangles of a lung face inwards, they are
- * reversed.
+ * Components to the left and to the right of the box's centre are two lungs if the left ones hardly
+ * overlap the right ones in x. Otherwise all components are one lung. The midline is the box's
+ * centre for two lungs and the face of the box nearest x = 0 for one. If the triangles of a lung
+ * face inwards, they are reversed.
  *
  * @param meshes   [count] not changed
  * @param midline  x of the plane between left and right, mm; found if NULL

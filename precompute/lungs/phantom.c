@@ -79,8 +79,7 @@ static size_t number(size_t face, size_t f, size_t i, size_t j) {
       }
     }
   }
-  const size_t row =
-      (i - 1) * (f - 1) - (i - 1) * i / 2; /* rows inside a face have f - 2, f - 3, ... vertices */
+  const size_t row = (i - 1) * (f - 1) - (i - 1) * i / 2;
   return CORNERS + EDGES * (f - 1) + face * ((f - 1) * (f - 2) / 2) + row + (j - 1);
 }
 
@@ -219,7 +218,8 @@ supine_status supine_phantom_create(size_t vertices, double millilitres, supine_
     const supine_status status = shape(lung, count, part);
     if (status != SUPINE_OK) {
       supine_mesh_free(&made);
-      return supine_error_set(error, status, "lung shape: %s", supine_status_string(status));
+      return supine_error_set(error, status, "cannot make the lungs: %s",
+                              supine_status_string(status));
     }
   }
   const double factor = cbrt(1e3 * millilitres / supine_mesh_volume(&made));
